@@ -50,14 +50,14 @@ class GoArounds:
     landings: tuple[LandingStart, ...]
 
 
-def climb_rows(way: Floats, top: float) -> int:
+def climb_rows(positions: Floats, end_altitude: float) -> int:
     """Return the number of positions (t, 3) of a go-around before its climb ends; t if the climb never ends.
 
     >>> climb_rows(np.array([[0.0, 0.0, 10.0], [0.0, 20.0, 14.0], [0.0, 40.0, 18.0]]), 13.0)
     1
     """
-    above = way[:, 2] > top
-    return int(np.argmax(above)) if above.any() else len(way)
+    is_above = positions[:, 2] > end_altitude
+    return int(np.argmax(is_above)) if is_above.any() else len(positions)
 
 
 def aborted_at(place: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass) -> Records:
@@ -69,30 +69,32 @@ def aborted_at(place: Sequence[float], course: float, slope: float, airspeed: fl
     airspeed: true airspeed, m/s.  The wind is taken from the aircraft.
     """
     start: Records = np.zeros(1, RETURN_START)
-    made = aircraft.record
-    blows = mean_wind_speed(made.wind_speed, made.wind_gradient, made.wind_reference, float(place[2]))
-    east, north = blows * made.wind_east, blows * made.wind_north
+    record = aircraft.record
+    wind_speed = mean_wind_speed(record.wind_speed, record.wind_gradient, record.wind_reference, float(place[2]))
+    wind_east, wind_north = wind_speed * record.wind_east, wind_speed * record.wind_north
     sin, cos = math.sin(course), math.cos(course)
-    across = east * cos - north * sin
-    over = max(1.0, math.sqrt(max(1.0, airspeed * airspeed - across * across)) + east * sin + north * cos)
+    cross_wind = wind_east * cos - wind_north * sin
+    speed = max(
+        1.0, math.sqrt(max(1.0, airspeed * airspeed - cross_wind * cross_wind)) + wind_east * sin + wind_north * cos
+    )
     start["east"], start["north"], start["up"] = place
-    start["velocity_east"], start["velocity_north"], start["velocity_up"] = over * sin, over * cos, -over * slope
+    start["velocity_east"], start["velocity_north"], start["velocity_up"] = speed * sin, speed * cos, -speed * slope
     return start
 
 
 def fly_go_arounds(
     starts: Records,
-    top: float,
+    end_altitude: float,
     pitch: float,
     landings: Sequence[LandingStart],
     parameters: ArduPilotParameters,
     aircraft: PointMass,
-    around: ReturnEnvironment,
+    environment: ReturnEnvironment,
 ) -> GoArounds:
     """Simulate a go-around from each of n places on a glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    top: altitude above which the climb ends, m AMSL.  pitch: pitch of the climb, rad.
+    end_altitude: altitude above which the climb ends, m AMSL.  pitch: pitch of the climb, rad.
     landings: one or more landing sequences; each go-around joins the nearest one where its climb is over.  A loiter in
         a sequence is the last place: the go-around is over once around it.
 
@@ -114,63 +116,63 @@ def fly_go_arounds(
     (True, True, True)
     """
     flown = np.zeros(len(starts), RETURN_RESULT)
-    law, staged, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
-    climb.climbs, climb.top, climb.slew = True, top, parameters.throttle_slew or math.inf
+    record, climb_parameters, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
+    climb.climbs, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
 
     def fly(k: int, landing: LandingStart) -> Floats:
-        ends = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.onward), parameters)])
-        ends["airspeed"], ends["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
-        most = rtl_timeout(starts[k], ends[1:], aircraft) + max(0.0, top - float(starts[k]["up"]))
-        way = np.zeros((int(most) + 2, 3))
+        stages = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.onward), parameters)])
+        stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
+        timeout = rtl_timeout(starts[k], stages[1:], aircraft) + max(0.0, end_altitude - float(starts[k]["up"]))
+        track = np.zeros((int(timeout) + 2, 3))
         fly_stages(
             starts[k],
-            ends,
-            law,
-            staged,
+            stages,
+            record,
+            climb_parameters,
             climb,
             aircraft.record,
             aircraft.excess,
             aircraft.power,
-            around.heights,
-            around.to_pixel,
-            around.spheres,
-            around.radii,
-            around.known,
-            most,
+            environment.heights,
+            environment.to_pixel,
+            environment.spheres,
+            environment.radii,
+            environment.known,
+            timeout,
             -math.inf,
             -math.inf,
             False,
-            way,
+            track,
             flown[k],
         )
-        return way[: int(flown[k]["rows"])].copy()
+        return track[: int(flown[k]["rows"])].copy()
 
-    found = []
+    flights = []
     for k in range(len(starts)):
-        way, landing = fly(k, landings[0]), landings[0]
+        track, landing = fly(k, landings[0]), landings[0]
         # The climb does not depend on the sequence.
-        over = way[min(climb_rows(way, top), len(way) - 1)]
-        nearest = nearest_landing((float(over[0]), float(over[1]), float(over[2])), landings)
-        if nearest is not None and nearest != landing:
-            way, landing = fly(k, nearest), nearest
-        found.append((way, landing))
-    return GoArounds(flown, tuple(way for way, _ in found), tuple(landing for _, landing in found))
+        climb_end = track[min(climb_rows(track, end_altitude), len(track) - 1)]
+        nearest_sequence = nearest_landing((float(climb_end[0]), float(climb_end[1]), float(climb_end[2])), landings)
+        if nearest_sequence is not None and nearest_sequence != landing:
+            track, landing = fly(k, nearest_sequence), nearest_sequence
+        flights.append((track, landing))
+    return GoArounds(flown, tuple(track for track, _ in flights), tuple(landing for _, landing in flights))
 
 
 def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
-    """Return the parameters of the climb, which fix the pitch and control the speed by pitch, as in a take-off."""
-    staged = parameters.record()
-    staged.tecs_speed_weight = 2.0
-    staged.tecs_pitch_min = 0.0
-    staged.pitch_limit_min = staged.pitch_limit_max = pitch
-    return staged
+    """Return the climb's parameters, as in a take-off: TECS_SPDWEIGHT 2, and both pitch limits at ``pitch``, rad."""
+    climb_parameters = parameters.record()
+    climb_parameters.tecs_speed_weight = 2.0
+    climb_parameters.tecs_pitch_min = 0.0
+    climb_parameters.pitch_limit_min = climb_parameters.pitch_limit_max = pitch
+    return climb_parameters
 
 
 def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
     """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the places up to the first loiter."""
-    flown = truncate_at_first_loiter(sequence)
-    stages: Records = np.zeros(len(flown), WAYPOINT)
-    for stage, one in zip(stages, flown, strict=True):
-        fill_stage(stage, one, parameters)
+    places = truncate_at_first_loiter(sequence)
+    stages: Records = np.zeros(len(places), WAYPOINT)
+    for stage, place in zip(stages, places, strict=True):
+        fill_stage(stage, place, parameters)
     return stages

@@ -162,7 +162,7 @@ def fly_returns(
     targets: Sequence[ReturnCircle | None],
     parameters: ArduPilotParameters,
     aircraft: PointMass,
-    around: ReturnEnvironment,
+    environment: ReturnEnvironment,
     *,
     landings: Sequence[LandingStart | None] = (),
     keep: bool = False,
@@ -203,36 +203,36 @@ def fly_returns(
         for target, landing in zip(targets, landings or [None] * len(targets), strict=True)
     ]
     if engine_out:
-        stages = [np.concatenate([straight_on(start), ends]) for start, ends in zip(starts, stages, strict=True)]
+        stages = [np.concatenate([straight_on(start), route]) for start, route in zip(starts, stages, strict=True)]
     flown = np.zeros(len(starts), RETURN_RESULT)
-    times = [rtl_timeout(start, ends, aircraft) for start, ends in zip(starts, stages, strict=True)]
-    way = np.zeros((int(max(times, default=0.0)) + 2 if keep else 0, 3))
-    ways, law = [], parameters.record()
-    floor, apart = (np.full(len(starts), -math.inf),) * 2 if least is None else least
-    for k, ends in enumerate(stages):
+    timeouts = [rtl_timeout(start, route, aircraft) for start, route in zip(starts, stages, strict=True)]
+    positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if keep else 0, 3))
+    ways, record = [], parameters.record()
+    min_clearances, min_outsides = (np.full(len(starts), -math.inf),) * 2 if least is None else least
+    for k, route in enumerate(stages):
         fly_stages(
             starts[k],
-            ends,
-            law,
-            law,
+            route,
+            record,
+            record,
             NO_CLIMB,
             aircraft.record,
             aircraft.excess,
             aircraft.power,
-            around.heights,
-            around.to_pixel,
-            around.spheres,
-            around.radii,
-            around.known,
-            times[k],
-            float(floor[k]),
-            float(apart[k]),
+            environment.heights,
+            environment.to_pixel,
+            environment.spheres,
+            environment.radii,
+            environment.known,
+            timeouts[k],
+            float(min_clearances[k]),
+            float(min_outsides[k]),
             engine_out,
-            way,
+            positions,
             flown[k],
         )
         if keep:
-            ways.append(way[: int(flown[k]["rows"])].copy())
+            ways.append(positions[: int(flown[k]["rows"])].copy())
     return SwiftReturns(flown, tuple(ways))
 
 
@@ -266,8 +266,8 @@ def truncate_at_first_loiter(places: Sequence[LandingStart]) -> Sequence[Landing
     >>> [one.item for one in truncate_at_first_loiter(spots)]
     [1, 2]
     """
-    circles = [k for k, one in enumerate(places) if one.circles]
-    return places[: circles[0] + 1] if circles else places
+    loiter_indices = [k for k, place in enumerate(places) if place.circles]
+    return places[: loiter_indices[0] + 1] if loiter_indices else places
 
 
 def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParameters) -> None:
@@ -286,21 +286,21 @@ _STRAIGHT_LEG_LENGTH_M = 10_000.0
 def straight_on(start: Record) -> Records:
     """Return a waypoint far ahead on course and slope, as `flight.guidance.lateral_reference_laws.WAYPOINT` (1,)."""
     ahead: Records = np.zeros(1, WAYPOINT)
-    over = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
+    ground_speed = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
     for axis, velocity in (("east", "velocity_east"), ("north", "velocity_north"), ("up", "velocity_up")):
-        ahead[axis] = start[axis] + _STRAIGHT_LEG_LENGTH_M * start[velocity] / over
+        ahead[axis] = start[axis] + _STRAIGHT_LEG_LENGTH_M * start[velocity] / ground_speed
     return ahead
 
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
     """Return the timeout of an RTL, s."""
-    slowest = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
-    east, north, up, seconds = start["east"], start["north"], start["up"], 0.0
+    min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
+    east, north, altitude, seconds = start["east"], start["north"], start["up"], 0.0
     for end in stages:
         distance = math.hypot(end["east"] - east, end["north"] - north)
-        around = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["circle"])
-        seconds += (distance + around) / slowest + abs(end["up"] - up) / 2.0
-        east, north, up = end["east"], end["north"], end["up"]
+        lap_length = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["circle"])
+        seconds += (distance + lap_length) / min_ground_speed + abs(end["up"] - altitude) / 2.0
+        east, north, altitude = end["east"], end["north"], end["up"]
     return float(_TIMEOUT_BASE_S + _TIMEOUT_RATIO * seconds)
 
 
@@ -312,7 +312,7 @@ def fly_stages(
     climb_parameters: Record,
     climb: Record,
     aircraft: Record,
-    excess_table: Floats,
+    excesses: Floats,
     power: Floats,
     heights: Heights,
     to_pixel: PolyMapRecord,
@@ -337,7 +337,7 @@ def fly_stages(
     target, estimated, state, memory = waypoints[1], motions[0], states[0], memories[0]
     _initialise_outcome(start, estimated, has_terrain, result)
     _load_stage(stages, 0, waypoints, estimated, memory)
-    _initialise_memory(start, parameters, aircraft, excess_table, state, memory)
+    _initialise_memory(start, parameters, aircraft, excesses, state, memory)
     pitch, path_angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK
     roll_fraction = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
     pitch_fraction = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
@@ -350,8 +350,8 @@ def fly_stages(
         eas2tas = true_by_equivalent(estimated.up)
         is_last = stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
-        arrival_radius = RTL_ARRIVAL_LOITER_RADII * abs(target.circle) * eas2tas * eas2tas
-        if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, arrival_radius):
+        radius = RTL_ARRIVAL_LOITER_RADII * abs(target.circle) * eas2tas * eas2tas
+        if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):
             _record_arrival(estimated, time, engine_out, result)
         result.seconds = time
         _update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
@@ -360,36 +360,24 @@ def fly_stages(
         if result.ended != RETURN_TIMEOUT:
             break
         if _is_stage_complete(
-            estimated,
-            target,
-            memory,
-            loiter,
-            climb,
-            engine_out and stage == 0,
-            stage == 0,
-            time,
-            is_last,
-            arrival_radius,
-            dt,
+            estimated, target, memory, loiter, climb, engine_out and stage == 0, stage == 0, time, is_last, radius, dt
         ):
             if is_last:
                 result.ended = RETURN_ARRIVED
                 break
             stage += 1
             _load_stage(stages, stage, waypoints, estimated, memory)
-        state.pitch, is_gliding = pitch, engine_out and stage > 0
+        state.pitch, glides = pitch, engine_out and stage > 0
         if climb.climbs and stage == 0:
             _demand_climb(state, estimated, climb_parameters, memory, climb, target.airspeed, eas2tas, dt)
         else:
-            _update_demands(
-                state, estimated, waypoints, parameters, memory, aircraft, excess_table, eas2tas, is_gliding, dt
-            )
+            _update_demands(state, estimated, waypoints, parameters, memory, aircraft, excesses, eas2tas, glides, dt)
         nav_roll = limited_nav_roll(memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters)
         state.roll += roll_fraction * (nav_roll - state.roll)
         pitch += pitch_fraction * (memory.pitch_demand + parameters.pitch_trim - pitch)
         path_angle += path_fraction * (pitch - angle_of_attack(state, aircraft) - path_angle)
         throttle = 0.0 if engine_out else memory.throttle_demand
-        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excess_table, power, dt)
+        energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, dt)
     if result.clearance <= 0.0:
         result.ended = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
@@ -544,12 +532,7 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
         target = waypoints[k]
-        target.east, target.north, target.turn, target.airspeed = (
-            stage.east,
-            stage.north,
-            stage.turn,
-            stage.airspeed,
-        )
+        target.east, target.north, target.turn, target.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
         target.centre_east, target.centre_north, target.up, target.circle = (
             stage.centre_east,
             stage.centre_north,
@@ -557,11 +540,7 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
             stage.circle,
         )
         target.returns, target.slope_base, target.straight = stage.returns, stage.slope_base, stage.straight
-        target.pass_by, target.min_ground_speed, target.home_up = (
-            stage.pass_by,
-            stage.min_ground_speed,
-            stage.home_up,
-        )
+        target.pass_by, target.min_ground_speed, target.home_up = stage.pass_by, stage.min_ground_speed, stage.home_up
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     if is_previous_reached and not is_past_finish_line(
         estimated, stages[index - 1].east, stages[index - 1].north, stage.east, stage.north
