@@ -436,14 +436,14 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     def begin(self, memory: Record, own: Record) -> None:
         """Write the parameters, the contacts, the take-off and the landing into the memory."""
         super().begin(memory, own)
-        own.staged = own.parameters
+        own.stage_parameters = own.parameters
         ground = own.ground
         contacts = self.contacts[:CONTACTS]
         ground.contacts = len(contacts)
         for index, contact in enumerate(contacts):
             ground.contact[index] = contact.forward, contact.right, contact.down
-            ground.stands[index] = contact.stands
-        ground.turnover = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
+            ground.is_support[index] = contact.stands
+        ground.turnover_speed = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
         ground.stage = IN_AIR
         if self.ways.take_off is not None:
             self._begin_take_off(self.ways.take_off, ground)
@@ -452,11 +452,14 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 
     def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
         parameters, launch = self.parameters, take_off.launch
-        ground.stage, ground.rolls = TAKING_OFF, launch.method == "runway"
+        ground.stage, ground.is_on_runway = TAKING_OFF, launch.method == "runway"
         ground.motor_start = self.motor_start
-        ground.slew, ground.full = takeoff_slew(parameters), parameters.takeoff_throttle or parameters.throttle_max
-        ground.home_up, ground.top, ground.launch_up = take_off.base, take_off.top, take_off.home[2]
-        ground.pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
+        ground.throttle_slew, ground.takeoff_throttle = (
+            takeoff_slew(parameters),
+            parameters.takeoff_throttle or parameters.throttle_max,
+        )
+        ground.home_up, ground.takeoff_end_altitude, ground.launch_up = take_off.base, take_off.top, take_off.home[2]
+        ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when it moved at 5 m/s, at which its course over the ground is known.
         acceleration = take_off.acceleration
         ground.time_at_course_speed = (
@@ -479,9 +482,9 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         glide = self.landing_glide(
             approach.begin - landing_altitude, approach.run, approach.tail_wind, landing_altitude
         )
-        ground.lands, ground.landing_leg = True, approach.leg
+        ground.has_landing, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
-        ground.begin, ground.slope = approach.begin, glide.slope
+        ground.glide_start_altitude, ground.slope = approach.begin, glide.slope
         # `AP_TECS::_update_height_demand`.
         ground.flares_by_demand = self.parameters.version != "4.6"
         ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance

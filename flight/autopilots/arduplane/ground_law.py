@@ -72,56 +72,59 @@ APPROACHING = 3
 # ... and the flare.
 FLARING = 4
 GROUND_STATE = record_dtype(
-    ("stage", np.int64),
-    ("lands", np.bool_),
-    ("rolls", np.bool_),  # True for a take-off from a runway, which the aircraft may touch
-    ("lifted", np.bool_),
-    ("landed", np.bool_),  # True once it touched down
+    ("stage", np.int64),  # in a landing `type_slope_stage`
+    ("has_landing", np.bool_),  # True if the flight ends on the ground
+    ("is_on_runway", np.bool_),  # True for a take-off from a runway, which the aircraft may touch
+    ("has_lifted_off", np.bool_),
+    ("has_touched_down", np.bool_),  # True once it touched down
     "time",  # s since the release
     # Points that may touch the ground, from the center of gravity: m forward, right, down.
     ("contact", np.float64, (CONTACTS, 3)),
-    ("stands", np.int64, (CONTACTS,)),  # 1 for a point on which the aircraft stands, else 0
+    ("is_support", np.int64, (CONTACTS,)),  # 1 for a point on which the aircraft stands, else 0
     ("contacts", np.int64),
-    ("touches", np.bool_),
-    ("tipped", np.bool_),  # True if the lowest touching point is not one on which the aircraft stands
-    "turnover",  # m/s, ground speed above which that ends the flight
+    ("touches_ground", np.bool_),
+    ("is_tipped", np.bool_),  # True if the lowest touching point is not one on which the aircraft stands
+    "turnover_speed",  # m/s, ground speed above which that ends the flight
     "rest_time",  # s at rest
     # Take-off.
     "motor_start",  # s, time of the motor start
-    "slew",  # fraction of the throttle range, 1/s
-    "full",  # 0..1, throttle
+    "throttle_slew",  # fraction of the throttle range, 1/s
+    "takeoff_throttle",  # 0..1, throttle
     "home_up",  # m AMSL, of home
-    "top",  # m AMSL, end of the take-off
+    "takeoff_end_altitude",  # m AMSL, end of the take-off (`auto_state.takeoff_altitude_rel_cm` over home)
     "launch_up",  # m AMSL, of the launch
-    "pitch",  # rad, minimum of the climb
+    "takeoff_pitch",  # rad, minimum of the climb (`auto_state.takeoff_pitch_cd`)
     ("leg", np.int64),  # leg after the take-off
     "time_at_course_speed",  # s since the ground speed was first above `_COURSE_SPEED_MPS`
     "yaw",  # rad, at the launch
     ("is_heading_held", np.bool_),
-    "heading",  # rad, heading that is held
-    "leveling",  # m below the end, where leveling off began; 0 before
-    "max_airspeed",  # m/s, maximum equivalent airspeed since the launch
+    "heading",  # rad, heading that is held (`steer_state.hold_course_cd`)
+    # m below the end, where leveling off began; 0 before (`auto_state.height_below_takeoff_to_level_off_cm`).
+    "leveling_height",
+    "max_airspeed",  # m/s, maximum equivalent airspeed since the launch (`auto_state.highest_airspeed`)
     # Landing.
     ("landing_leg", np.int64),
     "east",  # m, of the landing point
     "north",
     "up",  # m AMSL
-    "begin",  # m AMSL, of the waypoint before
+    "glide_start_altitude",  # m AMSL, of the waypoint before
     "slope",
     "flare_height",  # m above the landing point, start of the flare
     "flare_distance",  # m before the landing point, start of the flare
     "airspeed",  # m/s, equivalent
-    "entry_sink",  # m/s, sink rate at the start of the flare
-    "entry_height",  # m above the landing point, at the start of the flare
+    "entry_sink",  # m/s, sink rate at the start of the flare (`_hgt_rate_at_flare_entry`)
+    "entry_height",  # m above the landing point, at the start of the flare (`_hgt_at_start_of_flare`)
     ("approaches_at_once", np.bool_),  # True if a loiter to an altitude precedes the landing
     ("flares_by_demand", np.bool_),  # True if the flare begins with the demanded sink rate, False with the flown one
-    "flare_adjusted",  # m AMSL, altitude demand of the flare that continues the glide's demand
-    "flare_ideal",  # m AMSL, altitude demand of the flare that continues the flown altitude
+    # m AMSL, altitude demand of the flare that continues the glide's demand (`_flare_hgt_dem_adj`).
+    "flare_adjusted",
+    # m AMSL, altitude demand of the flare that continues the flown altitude (`_flare_hgt_dem_ideal`).
+    "flare_ideal",
 )
 ARDUPLANE_GROUND = record_dtype(
     ("memory", ARDUPILOT_MEMORY),
     ("parameters", ARDUPILOT_PARAMETERS),
-    ("staged", ARDUPILOT_PARAMETERS),  # parameters of the current stage
+    ("stage_parameters", ARDUPILOT_PARAMETERS),  # parameters of the current stage
     ("ground", GROUND_STATE),
 )
 GROUND_NUMBERS = ARDUPLANE_GROUND.itemsize // 8
@@ -188,7 +191,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
             work.commands,
             work.timing.dt,
         )
-        if ground.lands and memory.leg >= ground.landing_leg:
+        if ground.has_landing and memory.leg >= ground.landing_leg:
             ground.stage = ON_GLIDE
             ground.approaches_at_once = waypoints[memory.leg].to_height
     else:
@@ -227,15 +230,17 @@ def update_ground_contact(state: Record, clearance: float, ground: Record) -> No
     clearance: height of the center of gravity above ground, m.
     ground: a `GROUND_STATE` record.
     """
-    ground.touches, ground.tipped = False, False
-    lowest = clearance
-    nose, tilt = math.sin(state.pitch), math.cos(state.pitch)
+    ground.touches_ground, ground.is_tipped = False, False
+    lowest_depth = clearance
+    sin_pitch, cos_pitch = math.sin(state.pitch), math.cos(state.pitch)
     for k in range(ground.contacts):
-        place = ground.contact[k]
-        down = tilt * (math.sin(state.roll) * place[1] + math.cos(state.roll) * place[2]) - nose * place[0]
-        if down >= lowest:
+        contact = ground.contact[k]
+        depth = (
+            cos_pitch * (math.sin(state.roll) * contact[1] + math.cos(state.roll) * contact[2]) - sin_pitch * contact[0]
+        )
+        if depth >= lowest_depth:
             # The lowest touching point decides: an aircraft on its skids may be pressed into the ground.
-            lowest, ground.touches, ground.tipped = down, True, ground.stands[k] == 0
+            lowest_depth, ground.touches_ground, ground.is_tipped = depth, True, ground.is_support[k] == 0
 
 
 @inner
@@ -245,31 +250,31 @@ def end_status(work: Record, ground: Record) -> int:
     work: a `flight.simulation.tick.WORKSPACE` record.
     ground: a `GROUND_STATE` record, whose stage any control law may set.
     """
-    state, speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
-    empty = work.air.energy >= work.settings.battery
+    state, ground_speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
+    is_battery_empty = work.air.energy >= work.settings.battery
     if ground.stage == IN_AIR:
-        return GROUND if ground.touches else status_in_air(work)
+        return GROUND if ground.touches_ground else status_in_air(work)
     if abs(state.roll) > STEEPEST_BANK:
         return END_OVERBANK
-    if ground.tipped and speed > ground.turnover:
+    if ground.is_tipped and ground_speed > ground.turnover_speed:
         return END_TIPPED_OVER
     if ground.stage == TAKING_OFF:
-        if ground.touches and (ground.lifted or not ground.rolls):
+        if ground.touches_ground and (ground.has_lifted_off or not ground.is_on_runway):
             return GROUND
-        if ground.rolls and ground.motor_start > ground.time and ground.time > _MOTOR_START_TIMEOUT_S:
+        if ground.is_on_runway and ground.motor_start > ground.time and ground.time > _MOTOR_START_TIMEOUT_S:
             return NO_MOTOR
-        return END_BATTERY_EMPTY if empty else 0
-    if ground.touches and not ground.landed:
+        return END_BATTERY_EMPTY if is_battery_empty else 0
+    if ground.touches_ground and not ground.has_touched_down:
         if math.hypot(ground.east - work.true.east, ground.north - work.true.north) > _TOUCHDOWN_DISTANCE_M:
             return GROUND
-        ground.landed = True
-    if ground.touches and speed < _STOPPED_SPEED_MPS:
+        ground.has_touched_down = True
+    if ground.touches_ground and ground_speed < _STOPPED_SPEED_MPS:
         ground.rest_time += work.timing.dt
         return COMPLETED if ground.rest_time >= _STOPPED_TIME_S else 0
     ground.rest_time = 0.0
-    if not ground.touches and ground.stage < FLARING and state.airspeed < work.settings.slowest:
+    if not ground.touches_ground and ground.stage < FLARING and state.airspeed < work.settings.slowest:
         return STALLED
-    return END_BATTERY_EMPTY if empty and not ground.touches else 0
+    return END_BATTERY_EMPTY if is_battery_empty and not ground.touches_ground else 0
 
 
 # ----------------------------------------------------------------------
@@ -280,16 +285,18 @@ def end_status(work: Record, ground: Record) -> int:
 def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: Records) -> None:
     """Run one tick of the take-off, which fills the commands; at the end of the take-off, begin the first leg."""
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
-    dt, staged = work.timing.dt, arduplane.staged
-    factor = true_by_equivalent(estimated.up)
+    dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
+    eas2tas = true_by_equivalent(estimated.up)
     # The measured track begins where the take-off ends.
     work.memory.leg, work.memory.distance = ground.leg, pieces[0].start
     work.memory.cross_track, work.memory.height_error = 0.0, 0.0
     if not memory.is_initialised:
         initialise_memory(state, estimated, waypoints, work.memory, arduplane.parameters, memory)
         ground.yaw = state.yaw
-    ground.max_airspeed = max(ground.max_airspeed, state.airspeed / factor)
-    ground.lifted = ground.lifted or (ground.rolls and estimated.up > ground.launch_up + 2.0 and not ground.touches)
+    ground.max_airspeed = max(ground.max_airspeed, state.airspeed / eas2tas)
+    ground.has_lifted_off = ground.has_lifted_off or (
+        ground.is_on_runway and estimated.up > ground.launch_up + 2.0 and not ground.touches_ground
+    )
     memory.time_to_update -= dt
     if memory.time_to_update < 0.5 * dt:
         memory.time_to_update += NAVIGATION_TICK
@@ -297,56 +304,70 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
         memory.altitude_demand_raw, memory.altitude_demand_limited = estimated.up, estimated.up
         memory.altitude_demand, memory.climb_rate_demand = estimated.up, 0.0
         memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
-        _set_take_off_parameters(estimated, arduplane.parameters, staged, ground)
-        wanted = min(staged.airspeed_max, max(staged.airspeed_min, waypoints[ground.leg].airspeed))
-        work.memory.speed_command = wanted * factor
-        update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
+        _set_take_off_parameters(estimated, arduplane.parameters, stage_parameters, ground)
+        target_airspeed = min(
+            stage_parameters.airspeed_max, max(stage_parameters.airspeed_min, waypoints[ground.leg].airspeed)
+        )
+        work.memory.speed_command = target_airspeed * eas2tas
+        update_tecs(state, estimated, stage_parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK)
         if ground.max_airspeed < arduplane.parameters.takeoff_rotation:
             memory.pitch_demand = arduplane.parameters.takeoff_ground_pitch
-    wanted_throttle = ground.full if ground.time >= ground.motor_start else 0.0
-    step = ground.slew * dt
-    throttle = min(work.commands.throttle + step, max(work.commands.throttle - step, wanted_throttle))
+    throttle_demand = ground.takeoff_throttle if ground.time >= ground.motor_start else 0.0
+    max_step = ground.throttle_slew * dt
+    throttle = min(work.commands.throttle + max_step, max(work.commands.throttle - max_step, throttle_demand))
     memory.throttle_demand = throttle
-    control_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
-    if estimated.up > ground.top:
+    control_attitude(state, estimated, work.gains, work.memory, stage_parameters, memory, eas2tas, work.commands, dt)
+    if estimated.up > ground.takeoff_end_altitude:
         _begin_first_leg(estimated, waypoints, pieces, work.memory, ground, memory)
 
 
 @inner
-def _set_take_off_parameters(estimated: Record, parameters: Record, staged: Record, ground: Record) -> None:
-    """Set the parameters of the take-off: fixed pitch, speed by pitch, and a bank limit that grows with height."""
-    staged.tecs_speed_weight = 2.0
-    staged.tecs_pitch_min = 0.0
-    staged.pitch_limit_min = ground.pitch * _leveling_fraction(estimated, parameters, ground)
-    # The minimum pitch is also the maximum: no observed take-off had more, as TECS's integrators are wound up, and stay
-    # so for longer.
-    staged.pitch_limit_max = staged.pitch_limit_min
-    low, over = parameters.takeoff_level_height, estimated.up - ground.launch_up
-    share = min(1.0, max(0.0, (over - low) / (2.0 * low))) if low > 0.0 else 1.0
-    least = min(parameters.level_roll_limit, parameters.roll_limit)
-    staged.roll_limit = least + share * (parameters.roll_limit - least)
+def _set_take_off_parameters(estimated: Record, parameters: Record, stage_parameters: Record, ground: Record) -> None:
+    """Set the parameters of the take-off: fixed pitch, speed by pitch, and a bank limit that grows with height.
+
+    Follows `Plane::takeoff_calc_pitch` and `Plane::takeoff_calc_roll`.
+    """
+    stage_parameters.tecs_speed_weight = 2.0
+    stage_parameters.tecs_pitch_min = 0.0
+    stage_parameters.pitch_limit_min = ground.takeoff_pitch * _leveling_fraction(estimated, parameters, ground)
+    # The minimum pitch is also the maximum: no observed take-off had more, because TECS's integrators stay wound up.
+    stage_parameters.pitch_limit_max = stage_parameters.pitch_limit_min
+    level_height, height = parameters.takeoff_level_height, estimated.up - ground.launch_up
+    fraction = min(1.0, max(0.0, (height - level_height) / (2.0 * level_height))) if level_height > 0.0 else 1.0
+    min_roll_limit = min(parameters.level_roll_limit, parameters.roll_limit)
+    stage_parameters.roll_limit = min_roll_limit + fraction * (parameters.roll_limit - min_roll_limit)
 
 
 @inner
 def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:
     """Return the fraction of the minimum pitch that remains near the end of the take-off.
 
+    Follows `Plane::get_takeoff_pitch_min_cd`.
+
     The pitch is reduced once the climb would reach the final altitude within TKOFF_PLIM_SEC.
     """
-    left = ground.top - estimated.up
-    if ground.leveling > 0.0:
-        return min(1.0, max(0.0, left / ground.leveling))
-    soon = left <= parameters.takeoff_leveling * estimated.velocity_up
-    if soon and left > 0.0 and estimated.velocity_up > 0.1 and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M:
-        ground.leveling = left
+    remaining_height = ground.takeoff_end_altitude - estimated.up
+    if ground.leveling_height > 0.0:
+        return min(1.0, max(0.0, remaining_height / ground.leveling_height))
+    is_near_end = remaining_height <= parameters.takeoff_leveling * estimated.velocity_up
+    if (
+        is_near_end
+        and remaining_height > 0.0
+        and estimated.velocity_up > 0.1
+        and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M
+    ):
+        ground.leveling_height = remaining_height
     return 1.0
 
 
 @inner
 def _demand_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
-    """Demand the side acceleration to the held heading, or zero before it is known."""
-    speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-    if ground.time_at_course_speed > 0.0 or speed > _COURSE_SPEED_MPS:
+    """Demand the lateral acceleration to the held heading, or 0 before it is known.
+
+    Follows `AP_L1_Control::update_heading_hold`.
+    """
+    ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+    if ground.time_at_course_speed > 0.0 or ground_speed > _COURSE_SPEED_MPS:
         ground.time_at_course_speed += NAVIGATION_TICK
     delay = 0.0 if parameters.is_4_7 else _HEADING_HOLD_DELAY_S
     if not ground.is_heading_held and ground.time_at_course_speed > 0.0 and ground.time_at_course_speed >= delay:
@@ -355,8 +376,10 @@ def _demand_heading(state: Record, estimated: Record, parameters: Record, ground
         ground.heading = course - wrap(state.yaw - ground.yaw)
     memory.lateral_acceleration = 0.0
     if ground.is_heading_held:
-        angle = min(0.5 * math.pi, max(-0.5 * math.pi, wrap(ground.heading - state.yaw)))
-        memory.lateral_acceleration = 2.0 * math.sin(angle) * speed * _HEADING_GAIN / parameters.navl1_period
+        heading_error = min(0.5 * math.pi, max(-0.5 * math.pi, wrap(ground.heading - state.yaw)))
+        memory.lateral_acceleration = (
+            2.0 * math.sin(heading_error) * ground_speed * _HEADING_GAIN / parameters.navl1_period
+        )
 
 
 @inner
@@ -377,89 +400,101 @@ def _begin_first_leg(
 
 
 @inner
-def _tick_landing(work: Record, arduplane: Record, point: Record) -> None:
+def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> None:
     """Run one tick of the landing.
 
-    point: waypoint of the landing point.
+    landing_point: waypoint of the landing point.
     """
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
-    dt, staged = work.timing.dt, arduplane.staged
-    factor = true_by_equivalent(estimated.up)
+    dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
+    eas2tas = true_by_equivalent(estimated.up)
     work.memory.done = False
     memory.time_to_update -= dt
     if memory.time_to_update < 0.5 * dt:
         memory.time_to_update += NAVIGATION_TICK
-        left = _follow_line_to_point(estimated, arduplane.parameters, ground, memory)
-        _update_stage(estimated, arduplane.parameters, ground, memory, left)
-        _demand_glide(estimated, arduplane.parameters, ground, memory, left[0])
-        _set_landing_parameters(estimated, arduplane.parameters, staged, ground, left[1])
-        stated = ground.airspeed if ground.stage > ON_GLIDE else arduplane.parameters.airspeed_cruise
-        wanted = airspeed_target(state, estimated, stated, point, staged, memory, factor)
-        work.memory.speed_command = wanted * factor
+        line_position = _follow_line_to_point(estimated, arduplane.parameters, ground, memory)
+        _update_stage(estimated, arduplane.parameters, ground, memory, line_position)
+        _demand_glide(estimated, arduplane.parameters, ground, memory, line_position[0])
+        _set_landing_parameters(estimated, arduplane.parameters, stage_parameters, ground, line_position[1])
+        commanded_airspeed = ground.airspeed if ground.stage > ON_GLIDE else arduplane.parameters.airspeed_cruise
+        target_airspeed = airspeed_target(
+            state, estimated, commanded_airspeed, landing_point, stage_parameters, memory, eas2tas
+        )
+        work.memory.speed_command = target_airspeed * eas2tas
         if ground.stage == FLARING:
             # Slow and without throttle it must not be in underspeed: the flare ignores it.
             memory.throttle_demand = 0.0
-        update_tecs(state, estimated, staged, memory, wanted * factor, factor, NAVIGATION_TICK)
+        update_tecs(state, estimated, stage_parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK)
     work.memory.height_error = estimated.up - memory.altitude_demand
-    before = work.commands.throttle
-    control_attitude(state, estimated, work.gains, work.memory, staged, memory, factor, work.commands, dt)
+    previous_throttle = work.commands.throttle
+    control_attitude(state, estimated, work.gains, work.memory, stage_parameters, memory, eas2tas, work.commands, dt)
     if ground.stage == FLARING:
-        slew = arduplane.parameters.throttle_slew
+        throttle_slew = arduplane.parameters.throttle_slew
         # Without a slew limit the throttle closes at once.
-        work.commands.throttle = max(0.0, before - slew * dt) if slew > 0.0 else 0.0
+        work.commands.throttle = max(0.0, previous_throttle - throttle_slew * dt) if throttle_slew > 0.0 else 0.0
 
 
 @inner
 def _follow_line_to_point(
     estimated: Record, parameters: Record, ground: Record, memory: Record
 ) -> tuple[float, float, float, float]:
-    """Demand the side acceleration along the line to the landing point and beyond.
+    """Demand the lateral acceleration along the line to the landing point and beyond.
+
+    Follows `AP_L1_Control::update_waypoint`.
 
     Return the distance to the point along the line (m), the flown fraction of the line, the angle between course and
     line as L1 measures it (rad), and the cross-track distance (m).
     """
     leg_e, leg_n = ground.east - memory.from_east, ground.north - memory.from_north
-    run = max(1e-6, math.hypot(leg_e, leg_n))
-    unit_e, unit_n = leg_e / run, leg_n / run
-    off_e, off_n = estimated.east - memory.from_east, estimated.north - memory.from_north
-    along, cross_track = off_e * unit_e + off_n * unit_n, off_e * unit_n - off_n * unit_e
-    far = math.hypot(off_e, off_n) + _LINE_EXTENSION_M
-    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
-    length = l1_length(speed, parameters.navl1_period, parameters.navl1_damping)
+    line_length = max(1e-6, math.hypot(leg_e, leg_n))
+    unit_e, unit_n = leg_e / line_length, leg_n / line_length
+    offset_e, offset_n = estimated.east - memory.from_east, estimated.north - memory.from_north
+    along, cross_track = offset_e * unit_e + offset_n * unit_n, offset_e * unit_n - offset_n * unit_e
+    extended_length = math.hypot(offset_e, offset_n) + _LINE_EXTENSION_M
+    ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
     angle, aim = l1_angles(
         estimated,
         memory.from_east,
         memory.from_north,
-        memory.from_east + far * unit_e,
-        memory.from_north + far * unit_n,
-        length,
+        memory.from_east + extended_length * unit_e,
+        memory.from_north + extended_length * unit_n,
+        l1_distance,
     )
     memory.cross_track_integrator = l1_integrate(
         aim, memory.cross_track_integrator, parameters.navl1_xtrack_i, NAVIGATION_TICK
     )
     if not math.isnan(aim):
         angle += aim + memory.cross_track_integrator
-    memory.lateral_acceleration = l1_acceleration(angle, speed, length, parameters.navl1_damping)
-    return run - along, along / run, abs(angle), abs(cross_track)
+    memory.lateral_acceleration = l1_acceleration(angle, ground_speed, l1_distance, parameters.navl1_damping)
+    return line_length - along, along / line_length, abs(angle), abs(cross_track)
 
 
 @inner
 def _update_stage(
-    estimated: Record, parameters: Record, ground: Record, memory: Record, left: tuple[float, float, float, float]
+    estimated: Record,
+    parameters: Record,
+    ground: Record,
+    memory: Record,
+    line_position: tuple[float, float, float, float],
 ) -> None:
     """Change to the approach, or to the flare, when its condition is met.
 
-    left: distance to the landing point, as `_follow_line_to_point` returns it, m.
+    Follows `AP_Landing::type_slope_verify_land`.
+
+    line_position: as `_follow_line_to_point` returns it.
     """
-    _, share, angle, cross_track = left
-    height, sink = estimated.up - ground.up, -estimated.velocity_up
+    _, fraction, line_angle, cross_track = line_position
+    height, sink_rate = estimated.up - ground.up, -estimated.velocity_up
     if ground.stage == ON_GLIDE:
-        lined_up = angle < _LINE_UP_ANGLE_RAD
-        below = share > _APPROACH_START_FRACTION and lined_up and estimated.up < ground.begin
+        is_lined_up = line_angle < _LINE_UP_ANGLE_RAD
+        is_below_glide_start = (
+            fraction > _APPROACH_START_FRACTION and is_lined_up and estimated.up < ground.glide_start_altitude
+        )
         if (
-            (share >= 0.0 and lined_up and cross_track < _LINE_UP_CROSS_TRACK_M)
-            or below
-            or share > _APPROACH_LATEST_FRACTION
+            (fraction >= 0.0 and is_lined_up and cross_track < _LINE_UP_CROSS_TRACK_M)
+            or is_below_glide_start
+            or fraction > _APPROACH_LATEST_FRACTION
             or ground.approaches_at_once
         ):
             ground.stage = APPROACHING
@@ -467,68 +502,80 @@ def _update_stage(
         return
     flare_height_reached = height <= parameters.flare_height
     flare_time_reached = (
-        parameters.flare_time > 0.0 and height <= sink * parameters.flare_time and share > _APPROACH_LATEST_FRACTION
+        parameters.flare_time > 0.0
+        and height <= sink_rate * parameters.flare_time
+        and fraction > _APPROACH_LATEST_FRACTION
     )
-    if (ground.stage == APPROACHING and (flare_height_reached or flare_time_reached)) or share >= 1.0:
+    if (ground.stage == APPROACHING and (flare_height_reached or flare_time_reached)) or fraction >= 1.0:
         ground.stage = FLARING
-        ground.entry_sink = -memory.climb_rate_demand if ground.flares_by_demand else sink
+        ground.entry_sink = -memory.climb_rate_demand if ground.flares_by_demand else sink_rate
         ground.entry_height = height
         ground.flare_adjusted, ground.flare_ideal = memory.altitude_demand, estimated.up
 
 
 @inner
-def _demand_glide(estimated: Record, parameters: Record, ground: Record, memory: Record, left: float) -> None:
+def _demand_glide(
+    estimated: Record, parameters: Record, ground: Record, memory: Record, remaining_distance: float
+) -> None:
     """Demand the altitude of the glide, and in the flare a sink rate that blends to its final value.
 
-    left: distance to the landing point, m.
+    Follows `AP_Landing::type_slope_setup_landing_glide_slope` and `AP_TECS::_update_height_demand`.
+
+    remaining_distance: to the landing point, m.
     """
     memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
     if ground.stage < FLARING:
-        speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
-        glide = ground.up + ground.flare_height + ground.slope * (left - ground.flare_distance)
-        memory.altitude_demand = min(ground.begin, glide)
-        memory.climb_rate_demand = -ground.slope * speed if glide < ground.begin else 0.0
+        ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+        glide_altitude = ground.up + ground.flare_height + ground.slope * (remaining_distance - ground.flare_distance)
+        memory.altitude_demand = min(ground.glide_start_altitude, glide_altitude)
+        memory.climb_rate_demand = -ground.slope * ground_speed if glide_altitude < ground.glide_start_altitude else 0.0
     else:
-        height, entry = estimated.up - ground.up, ground.entry_height
-        share = 1.0
-        if entry > parameters.flare_holdoff:
-            share = min(1.0, max(0.0, (entry - height) / (entry - parameters.flare_holdoff)))
-        last = parameters.landing_sink + parameters.landing_sink_change * max(0.0, -left)
-        memory.climb_rate_demand = -ground.entry_sink * (1.0 - share) - last * share
+        height, entry_height = estimated.up - ground.up, ground.entry_height
+        fraction = 1.0
+        if entry_height > parameters.flare_holdoff:
+            fraction = min(1.0, max(0.0, (entry_height - height) / (entry_height - parameters.flare_holdoff)))
+        final_sink = parameters.landing_sink + parameters.landing_sink_change * max(0.0, -remaining_distance)
+        memory.climb_rate_demand = -ground.entry_sink * (1.0 - fraction) - final_sink * fraction
         ground.flare_adjusted += memory.climb_rate_demand * NAVIGATION_TICK
         ground.flare_ideal += memory.climb_rate_demand * NAVIGATION_TICK
         # As in `AP_TECS::_update_height_demand` since 4.6.3.
-        memory.altitude_demand = ground.flare_adjusted * (1.0 - share) + ground.flare_ideal * share
+        memory.altitude_demand = ground.flare_adjusted * (1.0 - fraction) + ground.flare_ideal * fraction
     memory.altitude_demand_raw, memory.altitude_demand_limited = memory.altitude_demand, memory.altitude_demand
 
 
 @inner
 def _set_landing_parameters(
-    estimated: Record, parameters: Record, staged: Record, ground: Record, share: float
+    estimated: Record, parameters: Record, stage_parameters: Record, ground: Record, line_fraction: float
 ) -> None:
     """Set the parameters of the landing.
 
-    share: flown fraction of the line.
+    line_fraction: flown fraction of the line to the landing point.
     """
-    staged.tecs_time = parameters.landing_time
-    staged.airspeed_min, staged.tecs_pitch_damping = parameters.airspeed_min, parameters.tecs_pitch_damping
-    weight = parameters.landing_speed_weight
-    if weight < 0.0:
-        weight = parameters.tecs_speed_weight * (1.0 - min(1.0, max(0.0, share)))
-    staged.tecs_speed_weight = weight
-    staged.roll_limit, staged.pitch_limit_max = parameters.roll_limit, parameters.pitch_limit_max
-    bottom = parameters.pitch_limit_min
+    stage_parameters.tecs_time = parameters.landing_time
+    stage_parameters.airspeed_min, stage_parameters.tecs_pitch_damping = (
+        parameters.airspeed_min,
+        parameters.tecs_pitch_damping,
+    )
+    speed_weight = parameters.landing_speed_weight
+    if speed_weight < 0.0:
+        speed_weight = parameters.tecs_speed_weight * (1.0 - min(1.0, max(0.0, line_fraction)))
+    stage_parameters.tecs_speed_weight = speed_weight
+    stage_parameters.roll_limit, stage_parameters.pitch_limit_max = parameters.roll_limit, parameters.pitch_limit_max
+    pitch_min = parameters.pitch_limit_min
     if parameters.tecs_pitch_min < 0.0:
-        bottom = max(bottom, parameters.tecs_pitch_min)
-    staged.tecs_pitch_min = 0.0
+        pitch_min = max(pitch_min, parameters.tecs_pitch_min)
+    stage_parameters.tecs_pitch_min = 0.0
     if ground.stage == FLARING:
-        staged.roll_limit = min(parameters.roll_limit, parameters.level_roll_limit)
-        staged.tecs_pitch_damping = parameters.flare_damping
+        stage_parameters.roll_limit = min(parameters.roll_limit, parameters.level_roll_limit)
+        stage_parameters.tecs_pitch_damping = parameters.flare_damping
         if parameters.is_4_7 and parameters.airspeed_stall > 0.0:
             # `AP_TECS::_update_speed`, `Plane::calc_airspeed_errors`.
-            staged.airspeed_min = parameters.airspeed_stall
-        down = min(1.0, max(0.0, 1.0 - (estimated.up - ground.up) / max(0.1, ground.entry_height)))
-        bottom = (1.0 - down) * bottom + down * max(bottom, parameters.landing_pitch)
+            stage_parameters.airspeed_min = parameters.airspeed_stall
+        flare_progress = min(1.0, max(0.0, 1.0 - (estimated.up - ground.up) / max(0.1, ground.entry_height)))
+        pitch_min = (1.0 - flare_progress) * pitch_min + flare_progress * max(pitch_min, parameters.landing_pitch)
         if parameters.landing_pitch_max != 0.0:
-            staged.tecs_pitch_max, staged.pitch_limit_max = parameters.landing_pitch_max, parameters.landing_pitch_max
-    staged.pitch_limit_min = bottom
+            stage_parameters.tecs_pitch_max, stage_parameters.pitch_limit_max = (
+                parameters.landing_pitch_max,
+                parameters.landing_pitch_max,
+            )
+    stage_parameters.pitch_limit_min = pitch_min

@@ -78,7 +78,7 @@ ARDUPILOT_MEMORY = record_dtype(
     "last_velocity_east",  # m/s, at the last update
     "last_velocity_north",
     "last_velocity_up",
-    "airspeed_smoothed",  # m/s, smoothed sensor reading (`AP_AHRS::airspeed_estimate`)
+    "airspeed_smoothed",  # m/s, smoothed sensor reading (logged as `CTUN.As`)
     "tas",  # m/s, filtered from the reading and the acceleration (`_TAS_state`)
     "tas_rate_correction",  # m/s^2, correction of the acceleration by the filter (`_integDTAS_state`)
     "tas_rate",  # m/s^2, along the nose, mean removed (`_vel_dot` without `_vel_dot_lpf`)

@@ -328,7 +328,7 @@ def fly_stages(
 ) -> None:
     """Fly from stage to stage for at most ``timeout`` s, and fill in the outcome.
 
-    climb: a record of `CLIMB`.  climb_parameters: the parameters of that climb.
+    climb: of `CLIMB`.  climb_parameters: parameters of that climb.  excesses: table of specific excess power.
     """
     # The same spacing as in `waypoint_column`.  A loiter is flown until the RTL is over: no leg follows it.
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)

@@ -45,9 +45,9 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
     """
     path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
-    own = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE_GROUND)[0]
+    arduplane = block[WORKSPACE_NUMBERS:path_begins].view(ARDUPLANE_GROUND)[0]
     path: Record = block[path_begins:].view(PATH_ROW)
-    settings, memory, ground = work.settings, work.memory, own.ground
+    settings, memory, ground = work.settings, work.memory, arduplane.ground
     if not begin_tick(work, heights):
         return NOT_A_NUMBER
     ground.time = work.timing.tick * work.timing.dt
@@ -69,10 +69,10 @@ def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
     on_last_leg: True if the program flies to its landing.
     """
     if ground.stage == TAKING_OFF:
-        ground.lifted = ground.lifted or (
-            ground.rolls and true.up > ground.launch_up + _LIFT_OFF_HEIGHT_M and not ground.touches
+        ground.has_lifted_off = ground.has_lifted_off or (
+            ground.is_on_runway and true.up > ground.launch_up + _LIFT_OFF_HEIGHT_M and not ground.touches_ground
         )
-        if true.up > ground.top:
+        if true.up > ground.takeoff_end_altitude:
             ground.stage = IN_AIR
     elif ground.stage == IN_AIR:
         if on_last_leg:

@@ -191,7 +191,7 @@ def test_the_flare_is_the_same_on_a_field_lower_or_higher_than_home() -> None:
 @pytest.mark.parametrize("after_loiter", [False, True])
 def test_after_a_loiter_to_an_altitude_the_approach_begins_at_once(after_loiter: bool) -> None:
     """`AP_Landing::type_slope_verify_land`: otherwise lined up, below the waypoint before, or past half of the leg."""
-    ground = record(GROUND_STATE, stage=ON_GLIDE, begin=500.0, approaches_at_once=after_loiter)
+    ground = record(GROUND_STATE, stage=ON_GLIDE, glide_start_altitude=500.0, approaches_at_once=after_loiter)
     own = memory()
     # 900 m before the point, at a tenth of the leg, 40 degrees and 80 m off the line.
     _update_stage(flying(up=500.0), parameters(), ground, own, (900.0, 0.1, math.radians(40.0), 80.0))

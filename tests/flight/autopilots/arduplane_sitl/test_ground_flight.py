@@ -111,7 +111,7 @@ def phase(stage: int, up: float, *, to_go: float = 300.0, on_last_leg: bool = Fa
     """The phase after one look, of an aircraft so high over the landing point and so far before it, flying east."""
     true, ground = np.zeros(1, MOTION)[0], np.zeros(1, GROUND_STATE)[0]
     true.east, true.up, true.velocity_east = -to_go, up, 20.0
-    ground.stage, ground.top, ground.flare_height = stage, 60.0, 4.0
+    ground.stage, ground.takeoff_end_altitude, ground.flare_height = stage, 60.0, 4.0
     find_phase(true, ground, on_last_leg)
     return int(ground.stage)
 
