@@ -378,11 +378,11 @@ class Autopilot(ABC):
         """Compiled simulation loop of the control law and the aircraft model; None if only JSBSim flies it."""
         return None
 
-    def begin(self, memory: Record, own: Record) -> None:
+    def initialise_records(self, guidance: Record, record: Record) -> None:
         """Initialise the records of the control law before the first tick.
 
-        memory: a `flight.guidance.inner_loops.GUIDANCE_MEMORY` record.
-        own: a record of the type `own`, or None if that type is None.
+        guidance: a `flight.guidance.inner_loops.GUIDANCE_MEMORY` record.
+        record: a record of the type `own`, or None if that type is None.
         """
         return
 
@@ -393,12 +393,12 @@ class Autopilot(ABC):
         """
         raise ValueError(f"{self.title} flies neither take-off nor landing")
 
-    def take_over(self, before: Record, own: Record, here: Floats) -> None:
+    def transfer_state(self, previous_record: Record, record: Record, start: Floats) -> None:
         """Start another route at the aircraft's position, and keep the state of the control law.
 
-        before: record of the autopilot on the previous route.
-        own: record for the new route, after `begin`.
-        here: (3,) start of the route, m.
+        previous_record: record of the autopilot on the previous route.
+        record: record for the new route, after `initialise_records`.
+        start: (3,) start of the route, m.
         """
         return
 

@@ -261,7 +261,7 @@ class Flight(Airborne):
         self._trim_at_start(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
         autopilot = self._law(setup).law
-        autopilot.begin(self.memory, self._workspace.own)
+        autopilot.initialise_records(self.memory, self._workspace.own)
         self._start_disturbances(setup)
         self._compiled, self.engine = self._choose_engine(autopilot)
         self._loop = self._make_loop(autopilot)
@@ -284,8 +284,8 @@ class Flight(Airborne):
         for name in _PATH_MEMORY_FIELDS:
             setattr(self.memory, name, 0)
         autopilot = setup.autopilot.law
-        autopilot.begin(self.memory, self._workspace.own)
-        autopilot.take_over(previous_memory, self._workspace.own, setup.route.waypoints[0])
+        autopilot.initialise_records(self.memory, self._workspace.own)
+        autopilot.transfer_state(previous_memory, self._workspace.own, setup.route.waypoints[0])
         self._loop = self._make_loop(autopilot)
 
     def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:

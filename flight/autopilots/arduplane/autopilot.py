@@ -171,16 +171,16 @@ class ArduPlane(Autopilot):
         """Compiled simulation loop of the control law and the aircraft model."""
         return arduplane_loop
 
-    def begin(self, memory: Record, own: Record) -> None:
-        """Write the parameters into the memory."""
-        own.parameters = self.parameters.record()
+    def initialise_records(self, guidance: Record, record: Record) -> None:
+        """Copy the parameters into the controllers' record."""
+        record.parameters = self.parameters.record()
 
-    def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Begin a new leg here, as after a change of mode, and keep the state of TECS and airspeed filter."""
-        own.memory = before.memory
+    def transfer_state(self, previous_record: Record, record: Record, start: Floats) -> None:
+        """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
+        record.memory = previous_record.memory
         for name in _LEG_FIELDS:
-            setattr(own.memory, name, 0)
-        own.memory.from_east, own.memory.from_north, own.memory.from_up = here
+            setattr(record.memory, name, 0)
+        record.memory.from_east, record.memory.from_north, record.memory.from_up = start
 
     def described(self, aircraft: str) -> str:
         """Return a description of the law with the parameters that matter most in a flight."""
@@ -236,7 +236,7 @@ class ArduPlane(Autopilot):
         fence_parameters = parameters.changed(FENCE_ENABLE=1.0) if mission.enables_fence else parameters
         if fence_parameters.has_fence_of_its_own:
             texts.append(f"the circle and the altitudes of FENCE_TYPE {parameters.fence_type:g} are not judged")
-        if mission.returns and parameters.follows_terrain_home:
+        if mission.returns and parameters.rtl_follows_terrain:
             texts.append(
                 f"TERRAIN_FOLLOW {parameters.terrain_follow:g} has the return follow the terrain, which is not flown"
             )
@@ -433,11 +433,11 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
             running_time * takeoff_slew(parameters) if running_time else 0.0,
         )
 
-    def begin(self, memory: Record, own: Record) -> None:
-        """Write the parameters, the contacts, the take-off and the landing into the memory."""
-        super().begin(memory, own)
-        own.stage_parameters = own.parameters
-        ground = own.ground
+    def initialise_records(self, guidance: Record, record: Record) -> None:
+        """Copy the parameters, the contacts, the take-off and the landing into the controllers' record."""
+        super().initialise_records(guidance, record)
+        record.stage_parameters = record.parameters
+        ground = record.ground
         contacts = self.contacts[:CONTACTS]
         ground.contacts = len(contacts)
         for index, contact in enumerate(contacts):

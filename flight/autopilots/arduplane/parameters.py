@@ -419,10 +419,10 @@ class ArduPilotParameters(ParameterSet):
         return bool(int(self.flight_options) & CLIMB_BEFORE_TURN)
 
     @property
-    def follows_terrain_home(self) -> bool:
+    def rtl_follows_terrain(self) -> bool:
         """True if an RTL follows the terrain: bit 0 or 4 of TERRAIN_FOLLOW.
 
-        >>> [ArduPilotParameters.defaults().changed(TERRAIN_FOLLOW=bits).follows_terrain_home for bits in (0, 1, 8, 16)]
+        >>> [ArduPilotParameters.defaults().changed(TERRAIN_FOLLOW=bits).rtl_follows_terrain for bits in (0, 1, 8, 16)]
         [False, True, False, True]
         """
         return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS_BIT | _FOLLOW_HOME_BIT))

@@ -63,9 +63,9 @@ class PlanflyGuidance(Autopilot):
         """Compiled simulation loop of the guidance and the aircraft model."""
         return planfly_loop
 
-    def begin(self, memory: Record, own: Record) -> None:
+    def initialise_records(self, guidance: Record, record: Record) -> None:
         """Set the lateral law in the guidance memory."""
-        memory.lateral_law = LAWS[self.guidance]
+        guidance.lateral_law = LAWS[self.guidance]
 
     def gust_sink(self, climb_reserve: float, turbulence: Turbulence) -> float:
         """Return the altitude loss in a downdraft with an exceedance probability of 1 %, m.

@@ -150,17 +150,17 @@ class Px4(Autopilot):
         """Compiled simulation loop of PX4's controllers and the aircraft model."""
         return px4_loop
 
-    def begin(self, memory: Record, own: Record) -> None:
+    def initialise_records(self, guidance: Record, record: Record) -> None:
         """Copy the parameters into the controllers' record."""
-        own.parameters = self.parameters.record()
+        record.parameters = self.parameters.record()
 
-    def take_over(self, before: Record, own: Record, here: Floats) -> None:
-        """Start a new leg at ``here``, as after a change of mode, and keep the state of TECS and airspeed filter."""
-        own.memory = before.memory
+    def transfer_state(self, previous_record: Record, record: Record, start: Floats) -> None:
+        """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
+        record.memory = previous_record.memory
         for name in _LEG_FIELDS:
-            setattr(own.memory, name, 0)
-        own.memory.from_east, own.memory.from_north, own.memory.from_up = here
-        own.memory.min_distance_to_end, own.memory.leg_start_altitude = math.inf, here[2]
+            setattr(record.memory, name, 0)
+        record.memory.from_east, record.memory.from_north, record.memory.from_up = start
+        record.memory.min_distance_to_end, record.memory.leg_start_altitude = math.inf, start[2]
 
     def described(self, aircraft: str) -> str:
         """Return a description of the simulated PX4 with the parameters that matter most in a flight."""

@@ -54,16 +54,16 @@ PX4_MEMORY = record_dtype(
     "roll_setpoint",  # rad
     # Altitude and speed.
     "altitude_setpoint",  # m, on the leg
-    "altitude_reference",  # m, follows the setpoint (`TECSAltitudeReferenceModel`)
-    "altitude_rate_reference",  # m/s
+    "altitude_reference",  # m, follows the setpoint (`AltitudeReferenceState::alt`)
+    "altitude_rate_reference",  # m/s (`AltitudeReferenceState::alt_rate`)
     "tas",  # m/s, filtered true airspeed (`TECSAirspeedFilter`)
-    "tas_rate",  # m/s^2
-    "tas_setpoint",  # m/s, after the rate limit
-    "ste_rate",  # m^2/s^3, filtered
-    "pitch_integrator",  # m^2/s^3, integrator of the SEB rate error
-    "throttle_integrator",  # 0..1, integrator of the STE rate error
-    "pitch_setpoint",  # rad above the trim pitch
-    "throttle_setpoint",  # 0..1
+    "tas_rate",  # m/s^2 (`TECSAirspeedFilter`)
+    "tas_setpoint",  # m/s, after the rate limit (`Setpoint::tas_setpoint`)
+    "ste_rate",  # m^2/s^3, filtered (`_ste_rate_estimate_filter`)
+    "pitch_integrator",  # m^2/s^3, integrator of the SEB rate error (`_pitch_integ_state`)
+    "throttle_integrator",  # 0..1, integrator of the STE rate error (`_throttle_integ_state`)
+    "pitch_setpoint",  # rad above the trim pitch (`_pitch_setpoint`)
+    "throttle_setpoint",  # 0..1 (`_throttle_setpoint`)
 )
 # PX4's part of a `flight.simulation.tick.Workspace`.
 PX4 = record_dtype(("memory", PX4_MEMORY), ("parameters", PX4_PARAMETERS))

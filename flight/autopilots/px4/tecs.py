@@ -65,6 +65,9 @@ def update_tecs(
 ) -> None:
     """Update the throttle and pitch setpoints of ``memory`` for its altitude setpoint and an airspeed.
 
+    Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
+    `_calcAirspeedControlOutput`.
+
     state: a record of `flight.dynamics.state.STATE`.  estimated: a record of
     `flight.guidance.navigation_error.MOTION`.
     airspeed_setpoint: equivalent airspeed, m/s.  eas_to_tas: ratio of true to equivalent airspeed.
@@ -87,10 +90,8 @@ def update_tecs(
         tas_rate_per_ste_rate * ste_rate_max, max(tas_rate_per_ste_rate * ste_rate_min, tas_rate_setpoint)
     )
     underspeed_ratio = detect_underspeed(tas / eas_to_tas, parameters)
-    _update_pitch_setpoint(
-        estimated, parameters, memory, altitude_rate_setpoint, tas_rate_setpoint, underspeed_ratio, dt
-    )
-    _update_throttle_setpoint(
+    _calc_pitch_control(estimated, parameters, memory, altitude_rate_setpoint, tas_rate_setpoint, underspeed_ratio, dt)
+    _calc_throttle_control(
         state,
         estimated,
         parameters,
@@ -116,7 +117,7 @@ def detect_underspeed(equivalent_airspeed: float, parameters: Record) -> float:
 
 
 @inner
-def _update_pitch_setpoint(
+def _calc_pitch_control(
     estimated: Record,
     parameters: Record,
     memory: Record,
@@ -125,7 +126,11 @@ def _update_pitch_setpoint(
     underspeed_ratio: float,
     dt: float,
 ) -> None:
-    """Set the pitch setpoint from the SEB rate of an altitude rate (m/s) and an acceleration (m/s^2)."""
+    """Set the pitch setpoint from the SEB rate of an altitude rate (m/s) and an acceleration (m/s^2).
+
+    Follows `TECSControl::_updateSpeedAltitudeWeights`, `_calcPitchControlSebRate`, `_calcPitchControlUpdate` and
+    `_calcPitchControlOutput`.
+    """
     tas = memory.tas
     speed_weight = parameters.pitch_speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
     # Clip both weights at 1: a weight above 1 then lowers the other instead of raising the loop gain.
@@ -155,7 +160,7 @@ def _update_pitch_setpoint(
 
 
 @inner
-def _update_throttle_setpoint(
+def _calc_throttle_control(
     state: Record,
     estimated: Record,
     parameters: Record,
@@ -166,7 +171,10 @@ def _update_throttle_setpoint(
     eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Set the throttle setpoint from the STE rate of an altitude rate (m/s) and an acceleration (m/s^2)."""
+    """Set the throttle setpoint from the STE rate of an altitude rate (m/s) and an acceleration (m/s^2).
+
+    Follows `TECSControl::_calcThrottleControlSteRate`, `_calcThrottleControlUpdate` and `_calcThrottleControlOutput`.
+    """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * parameters.min_sink_rate
     load_factor_correction = parameters.load_factor_correction * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)
     ste_rate_setpoint = min(

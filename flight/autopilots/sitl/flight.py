@@ -215,7 +215,7 @@ class SitlFlight(ProgramFlight):
         self._mission = uploaded_mission(setup)
         if self._ways:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
-            self._from_ground.begin(self.memory, self._workspace.own)
+            self._from_ground.initialise_records(self.memory, self._workspace.own)
         # Compiled here, while no autopilot waits for it.
         tick = self._ground_tick if self._ways else autopilot_tick
         tick(self._workspace.block.copy(), self._ground.heights)

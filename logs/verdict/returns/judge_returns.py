@@ -335,7 +335,7 @@ class ReturnWorld:
     def unjudged_parts(self) -> tuple[Open, ...]:
         """Parts of the returns that cannot be judged."""
         reasons: dict[Open, bool] = {
-            "terrain": self.parameters.follows_terrain_home,
+            "terrain": self.parameters.rtl_follows_terrain,
             "law": self.has_other_law,
             "autoland": any(cause.does == "autoland" for cause in self.causes),
             "return path": int(self.parameters.rtl_autoland) == 4 and _has_return_path(self.setup),
