@@ -23,22 +23,22 @@ WAYPOINT = record_dtype(
     "airspeed",  # m/s, of the leg
     "min_ground_speed",  # m/s, on the leg to the waypoint; 0 or less for none
     "up",  # m AMSL
-    "circle",  # m, radius of the loiter of which it is a corner, positive to the right; 0 for none
+    "loiter_radius",  # m, radius of the loiter of which it is a corner, positive to the right; 0 for none
     "centre_east",  # m, of that loiter
     "centre_north",
     ("item", np.int64),  # seq of its mission item, -1 for none
-    "stays",  # s, duration of a loiter once reached: inf without end, NaN for a loiter by turns
-    "turns",  # number of turns of a loiter, 0 for any other
-    ("to_height", np.bool_),  # True if the loiter climbs or descends to an altitude
-    ("leaves_on_course", np.bool_),  # True if the item states an exit on the course to the next waypoint
-    ("leaves_on_tangent", np.bool_),  # True if the line to the next waypoint starts on the circle, not at its center
-    ("returns", np.bool_),  # True if the leg to it is an RTL; circle, center and up are then those of the RTL loiter
+    "loiter_time",  # s, duration of a loiter once reached: inf without end, NaN for a loiter by turns
+    "loiter_turns",  # number of turns of a loiter, 0 for any other
+    ("loiters_to_altitude", np.bool_),  # True if the loiter climbs or descends to an altitude
+    ("exits_on_course", np.bool_),  # True if the item states an exit on the course to the next waypoint
+    ("exits_on_tangent", np.bool_),  # True if the line to the next waypoint starts on the circle, not at its center
+    ("is_rtl", np.bool_),  # True if the leg to it is an RTL; circle, center and up are then those of the RTL loiter
     ("stop", np.int64),  # its stop of the route: a jump back leads to another stop of the same item
-    ("gate", np.bool_),  # True for a CONDITION_GATE, which is no target
-    ("ends", np.bool_),  # True if the mission ends there without a landing or an RTL
-    ("straight", np.bool_),  # True if the leg to it starts at the aircraft and follows no line
+    ("is_gate", np.bool_),  # True for a CONDITION_GATE, which is no target
+    ("is_mission_end", np.bool_),  # True if the mission ends there without a landing or an RTL
+    ("without_crosstrack", np.bool_),  # True if the leg to it starts at the aircraft and follows no line
     "slope_base",  # m, see `flight.mission.return_path.ReturnCircle`
-    ("over_ground", np.bool_),  # True if the leg to it follows the ground
+    ("follows_terrain", np.bool_),  # True if the leg to it follows the ground
     "above_ground",  # m, height above ground at the end of such a leg
     "home_up",  # m AMSL, altitude of home during the leg to it; NaN if unknown
 )

@@ -442,7 +442,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     waypoints["acceptance"] = route.acceptance
     items = {} if mission is None else {item.seq: item for item in mission.items}
     waypoints["pass_by"] = [pass_by_distance(items[seq]) if seq in items else 0.0 for seq in route.items.tolist()]
-    waypoints["over_ground"] = np.isfinite(route.above_ground)
+    waypoints["follows_terrain"] = np.isfinite(route.above_ground)
     waypoints["above_ground"] = np.nan_to_num(route.above_ground)
     waypoints["home_up"] = route.home_up
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
@@ -452,14 +452,14 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     _set_circles(waypoints[1:-1], route)
     _set_loiters(waypoints, items)
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
-    waypoints["gate"] = np.isin(route.items, gates)
-    waypoints["ends"][-1] = mission is not None and ends_at_plain_waypoint(route, mission)
+    waypoints["is_gate"] = np.isin(route.items, gates)
+    waypoints["is_mission_end"][-1] = mission is not None and ends_at_plain_waypoint(route, mission)
     if route.straight_to >= 0:
-        waypoints["straight"][route.straight_to] = True
+        waypoints["without_crosstrack"][route.straight_to] = True
     if route.return_to is not None:
         return_waypoints = waypoints[route.return_from + 1 : route.return_until]
-        return_waypoints["returns"] = True
-        names = ("centre_east", "centre_north", "up", "circle", "slope_base")
+        return_waypoints["is_rtl"] = True
+        names = ("centre_east", "centre_north", "up", "loiter_radius", "slope_base")
         for name, value in zip(names, route.return_to, strict=True):
             return_waypoints[name] = value
     last_before_return = route.return_from if route.return_to is not None else route.straight_to - 1
@@ -484,33 +484,33 @@ def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem])
 def _set_circles(corners: Records, route: Route) -> None:
     """Set radius and center of the loiter of each corner of a route."""
     turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
-    corners["circle"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
+    corners["loiter_radius"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
     # The center lies at a right angle to the course halfway through the turn.
     mid_course = courses[:-1] + 0.5 * turns
-    signed_radius = corners["circle"] / np.cos(0.5 * turns)
+    signed_radius = corners["loiter_radius"] / np.cos(0.5 * turns)
     corners["centre_east"] = corners["east"] + signed_radius * np.cos(mid_course)
     corners["centre_north"] = corners["north"] - signed_radius * np.sin(mid_course)
     # A loiter's altitude is its item's altitude, which the last of its corners has.
     stops = route.stops[1:-1]
     for i in range(len(corners) - 2, -1, -1):
-        if corners[i].circle != 0.0 and corners[i + 1].circle != 0.0 and stops[i] == stops[i + 1]:
+        if corners[i].loiter_radius != 0.0 and corners[i + 1].loiter_radius != 0.0 and stops[i] == stops[i + 1]:
             corners[i].up = corners[i + 1].up
 
 
 def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
     """Set the end condition of each corner's loiter according to its item."""
-    waypoints["stays"] = math.nan
-    for k in np.flatnonzero(waypoints["circle"]).tolist():
+    waypoints["loiter_time"] = math.nan
+    for k in np.flatnonzero(waypoints["loiter_radius"]).tolist():
         item = items.get(int(waypoints["item"][k]))
         loiter = None if item is None else loiter_of(item)
         if loiter is None:
             continue
-        waypoints["leaves_on_tangent"][k] = loiter.on_tangent
-        waypoints["turns"][k] = loiter.turns
+        waypoints["exits_on_tangent"][k] = loiter.on_tangent
+        waypoints["loiter_turns"][k] = loiter.turns
         if not loiter.turns:
-            waypoints["stays"][k] = math.inf if loiter.endless else loiter.seconds
-            waypoints["to_height"][k] = loiter.to_height
-            waypoints["leaves_on_course"][k] = loiter.on_course
+            waypoints["loiter_time"][k] = math.inf if loiter.endless else loiter.seconds
+            waypoints["loiters_to_altitude"][k] = loiter.to_height
+            waypoints["exits_on_course"][k] = loiter.on_course
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:

@@ -95,7 +95,7 @@ class Airborne(ABC):
             setup.path if follows_arcs else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swing="none")
         )
         waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
-        waypoints["ends"] &= setup.autopilot.loiter_rules.ends_in_circle
+        waypoints["is_mission_end"] &= setup.autopilot.loiter_rules.ends_in_circle
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         waypoints["min_ground_speed"] = setup.min_ground_speeds
@@ -111,15 +111,15 @@ class Airborne(ABC):
         length = self.path.length + _extra_loiter_length(setup, waypoints)
         time_limit = TIME_LIMIT_FACTOR * length / _min_ground_speed(setup, self._airspeeds) + TIME_LIMIT_BASE_S
         # A loiter for a time lasts as long as its item states, whatever circle the path has for it.
-        timed_loiters = waypoints[(waypoints["stays"] > 0.0) & (waypoints["stays"] < math.inf)]
+        timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
         time_limit += sum(
-            dict(zip(timed_loiters["item"].tolist(), timed_loiters["stays"].tolist(), strict=True)).values()
+            dict(zip(timed_loiters["item"].tolist(), timed_loiters["loiter_time"].tolist(), strict=True)).values()
         )
         if setup.route.return_to is not None:
             # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
             radius_factor = true_by_equivalent(setup.route.return_to.up) ** 2
             time_limit += longest_circling(radius_factor * setup.route.return_to.radius)
-        if waypoints["ends"][-1]:
+        if waypoints["is_mission_end"][-1]:
             time_limit += longest_circling(setup.autopilot.loiter_rules.radius)
         self.max_ticks = int(time_limit / self.dt)
 
@@ -211,12 +211,12 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
     if not setup.autopilot.loiter_rules.at_middle:
         return 0.0
     extra_lengths = dict[int, float]()
-    circles = waypoints[waypoints["circle"] != 0.0]
+    circles = waypoints[waypoints["loiter_radius"] != 0.0]
     # Process waypoints of one loiter that agree in these fields only once.
-    first_indices = np.unique(circles[["item", "circle", "airspeed", "up"]], return_index=True)[1]
+    first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
     for waypoint in circles[first_indices]:
         path_radius, speed, altitude = (
-            abs(float(waypoint["circle"])),
+            abs(float(waypoint["loiter_radius"])),
             float(waypoint["airspeed"]),
             float(waypoint["up"]),
         )
@@ -225,8 +225,10 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
         )
         # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
         flown_radius *= true_by_equivalent(altitude) ** 2
-        if path_radius < flown_radius < math.inf and not waypoint["returns"]:
-            extra_length = 2.0 * math.pi * (float(waypoint["turns"]) * (flown_radius - path_radius) + flown_radius)
+        if path_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
+            extra_length = (
+                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - path_radius) + flown_radius)
+            )
             extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
     return sum(extra_lengths.values())
 

@@ -333,7 +333,7 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
     memory.returning, memory.cross_track = True, math.nan
     offset_east, offset_north = motion.east - waypoint.centre_east, motion.north - waypoint.centre_north
     airspeed_factor = true_by_equivalent(motion.up)
-    radius = abs(waypoint.circle) * airspeed_factor * airspeed_factor
+    radius = abs(waypoint.loiter_radius) * airspeed_factor * airspeed_factor
     is_near = math.hypot(offset_east, offset_north) < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
     bearing = math.atan2(offset_east, offset_north)
     if memory.circled > 0.0:

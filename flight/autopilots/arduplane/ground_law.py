@@ -193,7 +193,7 @@ def ground_tick(block: Floats, heights: Heights) -> int:
         )
         if ground.has_landing and memory.leg >= ground.landing_leg:
             ground.stage = ON_GLIDE
-            ground.approaches_at_once = waypoints[memory.leg].to_height
+            ground.approaches_at_once = waypoints[memory.leg].loiters_to_altitude
     else:
         find_on_path(work.estimated, pieces, work.memory)
         _tick_landing(work, arduplane, waypoints[memory.leg + 1])

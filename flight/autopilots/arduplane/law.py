@@ -229,9 +229,9 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
     target: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     parameters, memory: as `flight.autopilots.arduplane.navigator.navigate_legs` takes them.
     """
-    if target.returns:
+    if target.is_rtl:
         altitude_target = _rtl_altitude(estimated, target, parameters, memory)
-    elif target.over_ground:
+    elif target.follows_terrain:
         altitude_target = _leg_altitude_above_terrain(estimated, target, parameters, memory)
     else:
         altitude_target = _leg_altitude(estimated, target, parameters, memory)
@@ -353,7 +353,7 @@ def update_terrain_lookahead(
     # Before the law's first update, the start of the first leg is not set.
     if (
         not memory.is_initialised
-        or not target.over_ground
+        or not target.follows_terrain
         or memory.time_to_update - work.timing.dt >= 0.5 * work.timing.dt
     ):
         return
@@ -758,19 +758,19 @@ def control_as_ardupilot(
     """
     find_on_path(estimated, pieces, guidance)
     target = waypoints[memory.leg + 1]
-    if target.circle != 0.0 and not target.returns:
+    if target.loiter_radius != 0.0 and not target.is_rtl:
         # ArduPlane's own logic ends a loiter; an aircraft that loiters at the mission's end has not missed the route.
         is_last = target.stop == waypoints[-1].stop
         # An altitude that ArduPlane gave up to reach is a missed altitude.
         guidance.returning = is_last and (
-            not target.to_height or abs(estimated.up - target.up) <= MISSED_ROUTE_DISTANCE_M
+            not target.loiters_to_altitude or abs(estimated.up - target.up) <= MISSED_ROUTE_DISTANCE_M
         )
-        loiters_forever = target.stays == math.inf and memory.loiter_time > UNLIMITED
+        loiters_forever = target.loiter_time == math.inf and memory.loiter_time > UNLIMITED
         guidance.done = is_last and (memory.loiter_complete or loiters_forever)
-    if memory.is_in_rtl and waypoints[waypoints.shape[0] - 1].returns:
+    if memory.is_in_rtl and waypoints[waypoints.shape[0] - 1].is_rtl:
         end_return(estimated, waypoints[memory.leg + 1], guidance, dt)
     guidance.height_error = estimated.up - profile(nodes, guidance.distance)[0]
-    if guidance.done and target.to_height:
+    if guidance.done and target.loiters_to_altitude:
         guidance.height_error = estimated.up - target.up
     eas2tas = true_by_equivalent(estimated.up)
     if not memory.is_initialised:

@@ -90,17 +90,17 @@ def navigate_legs(
     target = waypoints[memory.leg + 1]
     ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
-    if target.returns:
+    if target.is_rtl:
         # An RTL is one leg, which lasts until the flight ends or joins the mission's landing sequence.
         _navigate_rtl(estimated, target, parameters, memory, eas2tas)
         _join_landing(estimated, waypoints, target, memory)
         return
-    if target.circle != 0.0:
+    if target.loiter_radius != 0.0:
         _update_loiter(estimated, waypoints, target, parameters, memory, l1_distance, ground_speed, eas2tas, dt)
         return
     memory.reached_loiter_target = False
     end_e, end_n = _leg_end(target, memory)
-    _follow_line(estimated, end_e, end_n, parameters, memory, l1_distance, ground_speed, dt, target.straight)
+    _follow_line(estimated, end_e, end_n, parameters, memory, l1_distance, ground_speed, dt, target.without_crosstrack)
     turn_angle = _turn_angle(waypoints, target, memory)
     if memory.leg + 2 < waypoints.shape[0] and _is_leg_over(
         estimated, target, end_e, end_n, turn_angle, parameters, memory, l1_distance, eas2tas
@@ -126,7 +126,7 @@ def target_position(waypoint: Record) -> tuple[float, float]:
     """Return east and north (m) of a waypoint of the route, or of the center if it belongs to a loiter."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
-        if waypoint.circle != 0.0 and not waypoint.returns
+        if waypoint.loiter_radius != 0.0 and not waypoint.is_rtl
         else (waypoint.east, waypoint.north)
     )
 
@@ -167,7 +167,7 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
     if memory.leg + 2 >= waypoints.shape[0]:
         return turn_angle
     next_waypoint = waypoints[memory.leg + 2]
-    if next_waypoint.returns or (waypoints[memory.leg].circle == 0.0 and next_waypoint.circle == 0.0):
+    if next_waypoint.is_rtl or (waypoints[memory.leg].loiter_radius == 0.0 and next_waypoint.loiter_radius == 0.0):
         return turn_angle
     next_e, next_n = target_position(next_waypoint)
     next_course = math.atan2(next_e - target.east, next_n - target.north)
@@ -185,10 +185,10 @@ def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) 
     memory.loiter_time, memory.loiter_angle_sum, memory.exit_wait_angle, memory.next_sum_lap = 0.0, 0.0, 0.0, 0.0
     memory.from_up = start.up
     memory.from_east, memory.from_north = target_position(start)
-    if start.circle != 0.0 and start.leaves_on_tangent:
+    if start.loiter_radius != 0.0 and start.exits_on_tangent:
         memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     target_e, target_n = target_position(target)
-    if not target.returns and is_past_finish_line(estimated, memory.from_east, memory.from_north, target_e, target_n):
+    if not target.is_rtl and is_past_finish_line(estimated, memory.from_east, memory.from_north, target_e, target_n):
         memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
 
 
@@ -246,7 +246,7 @@ def _update_loiter(
     loiter: the corner of the route that stands for the loiter; its circle has the radius at its altitude.
     """
     eas2tas_ratio = eas2tas / true_by_equivalent(loiter.up)
-    radius = abs(loiter.circle) * eas2tas_ratio * eas2tas_ratio
+    radius = abs(loiter.loiter_radius) * eas2tas_ratio * eas2tas_ratio
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
     if not memory.loiter_started and distance > _APPROACH_LINE_RADII_RATIO * radius:
         memory.reached_loiter_target = False
@@ -259,7 +259,7 @@ def _update_loiter(
             l1_distance,
             ground_speed,
             dt,
-            loiter.straight,
+            loiter.without_crosstrack,
         )
         return
     memory.lateral_acceleration = _loiter_acceleration(
@@ -275,7 +275,7 @@ def _update_loiter(
         return
     if (
         memory.loiter_complete
-        and (memory.reached_loiter_target or loiter.turns == 0.0)
+        and (memory.reached_loiter_target or loiter.loiter_turns == 0.0)
         and _is_heading_lined_up(estimated, waypoints[exit_index], loiter, radius, memory)
     ):
         memory.leg_after_loiter = exit_index - 1
@@ -288,7 +288,7 @@ def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: 
     bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
     if memory.loiter_started:
         memory.loiter_time += dt
-        angle_change = wrap(bearing - memory.old_loiter_bearing) * math.copysign(1.0, loiter.circle)
+        angle_change = wrap(bearing - memory.old_loiter_bearing) * math.copysign(1.0, loiter.loiter_radius)
         memory.loiter_angle_sum += angle_change
         memory.exit_wait_angle += angle_change
     elif memory.reached_loiter_target:
@@ -307,7 +307,7 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
     """
     if not memory.loiter_started:
         return False
-    if loiter.to_height:
+    if loiter.loiters_to_altitude:
         if not memory.reached_target_altitude and memory.loiter_angle_sum >= memory.next_sum_lap:
             memory.reached_target_altitude = abs(estimated.up - memory.start_lap_altitude) < LOITER_ALTITUDE_TOLERANCE_M
             memory.next_sum_lap, memory.start_lap_altitude = (
@@ -315,9 +315,9 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
                 estimated.up,
             )
         return memory.reached_target_altitude
-    if math.isnan(loiter.stays):
-        return memory.loiter_angle_sum > loiter.turns * 2.0 * math.pi
-    return memory.loiter_time > loiter.stays
+    if math.isnan(loiter.loiter_time):
+        return memory.loiter_angle_sum > loiter.loiter_turns * 2.0 * math.pi
+    return memory.loiter_time > loiter.loiter_time
 
 
 @inner
@@ -331,7 +331,7 @@ def _is_heading_lined_up(
     """
     next_e, next_n = (
         (next_waypoint.centre_east, next_waypoint.centre_north)
-        if next_waypoint.returns
+        if next_waypoint.is_rtl
         else target_position(next_waypoint)
     )
     if math.hypot(next_e - loiter.centre_east, next_n - loiter.centre_north) < _MIN_EXIT_DISTANCE_RATIO * radius:
@@ -356,7 +356,7 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
         memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
-    radius = abs(rtl.circle) * eas2tas * eas2tas
+    radius = abs(rtl.loiter_radius) * eas2tas * eas2tas
     memory.lateral_acceleration = _loiter_acceleration(
         estimated, rtl, radius, parameters, memory, l1_distance, ground_speed
     )
@@ -382,7 +382,7 @@ def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Re
     `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins at the aircraft.
     """
     landing_index = memory.leg + 2
-    while landing_index < waypoints.shape[0] and waypoints[landing_index].returns:
+    while landing_index < waypoints.shape[0] and waypoints[landing_index].is_rtl:
         landing_index += 1
     if (
         landing_index >= waypoints.shape[0]
@@ -410,7 +410,7 @@ def _loiter_acceleration(
 
     It steers straight to the center until the circle demands the sharper turn, and then around the circle.
     """
-    direction = math.copysign(1.0, loiter.circle)
+    direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north
     distance = max(0.1, math.hypot(offset_e, offset_n))
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)

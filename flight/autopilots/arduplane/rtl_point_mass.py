@@ -248,12 +248,12 @@ def _make_stages(
     stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
     if target is not None:
         first = stages[0]
-        first.centre_east, first.centre_north, first.up, first.circle, first.slope_base = target
-        first.east, first.north, first.returns = target.east, target.north, True
+        first.centre_east, first.centre_north, first.up, first.loiter_radius, first.slope_base = target
+        first.east, first.north, first.is_rtl = target.east, target.north, True
     for stage, place in zip(stages[len(stages) - len(places) :], places, strict=True):
         fill_stage(stage, place, parameters)
         # The first leg of an RTL to the landing follows no line, as after any change of mode.
-        stage.straight = place is landing
+        stage.without_crosstrack = place is landing
     return stages
 
 
@@ -276,7 +276,7 @@ def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParame
     stage.pass_by, stage.home_up = landing.pass_by, landing.home_up
     # The turn to its next leg is unknown: use a right angle, as at a mission's end.
     stage.turn = 0.5 * math.pi
-    stage.circle = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
+    stage.loiter_radius = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
 
 
 # Length of a leg that is not flown to its end, m.
@@ -298,7 +298,7 @@ def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
     east, north, altitude, seconds = start["east"], start["north"], start["up"], 0.0
     for end in stages:
         distance = math.hypot(end["east"] - east, end["north"] - north)
-        lap_length = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["circle"])
+        lap_length = 2.0 * math.pi * RTL_ARRIVAL_LOITER_RADII * abs(end["loiter_radius"])
         seconds += (distance + lap_length) / min_ground_speed + abs(end["up"] - altitude) / 2.0
         east, north, altitude = end["east"], end["north"], end["up"]
     return float(_TIMEOUT_BASE_S + _TIMEOUT_RATIO * seconds)
@@ -350,7 +350,7 @@ def fly_stages(
         eas2tas = true_by_equivalent(estimated.up)
         is_last = stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
-        radius = RTL_ARRIVAL_LOITER_RADII * abs(target.circle) * eas2tas * eas2tas
+        radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas2tas * eas2tas
         if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):
             _record_arrival(estimated, time, engine_out, result)
         result.seconds = time
@@ -485,7 +485,7 @@ def _is_target_reached(
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
     """
-    if target.circle == 0.0:
+    if target.loiter_radius == 0.0:
         return memory.leg > 0
     altitude_error = abs(estimated.up - target.up)
     if not is_last:
@@ -533,13 +533,17 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
     for k in range(1, 3):
         target = waypoints[k]
         target.east, target.north, target.turn, target.airspeed = stage.east, stage.north, stage.turn, stage.airspeed
-        target.centre_east, target.centre_north, target.up, target.circle = (
+        target.centre_east, target.centre_north, target.up, target.loiter_radius = (
             stage.centre_east,
             stage.centre_north,
             stage.up,
-            stage.circle,
+            stage.loiter_radius,
         )
-        target.returns, target.slope_base, target.straight = stage.returns, stage.slope_base, stage.straight
+        target.is_rtl, target.slope_base, target.without_crosstrack = (
+            stage.is_rtl,
+            stage.slope_base,
+            stage.without_crosstrack,
+        )
         target.pass_by, target.min_ground_speed, target.home_up = stage.pass_by, stage.min_ground_speed, stage.home_up
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     if is_previous_reached and not is_past_finish_line(
@@ -550,7 +554,7 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
             stages[index - 1].north,
             stages[index - 1].up,
         )
-    if stage.circle == 0.0 and index + 1 < stages.shape[0]:
+    if stage.loiter_radius == 0.0 and index + 1 < stages.shape[0]:
         next_stage, course = (
             stages[index + 1],
             math.atan2(stage.east - memory.from_east, stage.north - memory.from_north),
@@ -610,8 +614,8 @@ def _update_demands(
 ) -> None:
     """Update the demands of bank, altitude, throttle and pitch on the leg to the second waypoint."""
     target = waypoints[1]
-    navigate_legs(estimated, waypoints[: 2 if target.circle != 0.0 else 3], parameters, memory, eas2tas, dt)
-    if memory.reached_loiter_target and not target.returns:
+    navigate_legs(estimated, waypoints[: 2 if target.loiter_radius != 0.0 else 3], parameters, memory, eas2tas, dt)
+    if memory.reached_loiter_target and not target.is_rtl:
         # On a loiter of the mission its altitude applies at once (`Plane::update_loiter`).
         memory.from_up = target.up
     update_height_demand(estimated, target, parameters, memory, dt)

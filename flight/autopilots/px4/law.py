@@ -202,7 +202,7 @@ def _end_mission(
     right, does not end the flight.
     """
     has_arrived = memory.time_at_mission_end > 0.0 or guidance.done or memory.is_loitering or memory.mission_finished
-    if not has_arrived or last_waypoint.circle != 0.0:
+    if not has_arrived or last_waypoint.loiter_radius != 0.0:
         return
     memory.time_at_mission_end += dt
     if memory.mission_finished:
@@ -212,7 +212,7 @@ def _end_mission(
         # An aircraft that loiters at the mission's end has not missed the route.
         guidance.returning = True
         is_over = (
-            not last_waypoint.ends
+            not last_waypoint.is_mission_end
             and guidance.done
             and abs(estimated.up - last_waypoint.up) <= parameters.altitude_acceptance_radius
         )

@@ -80,11 +80,11 @@ def navigate(
     target = waypoints[target_index]
     if target_index > memory.leg + 1 and _is_past_gate(estimated, waypoints[memory.leg + 1], target):
         memory.leg += 1
-    if target.returns:
+    if target.is_rtl:
         # An RTL is one leg, which lasts until the flight ends.
         _navigate_rtl(estimated, target, wind_east, wind_north, target_airspeed, parameters, memory)
         return
-    if target.circle != 0.0:
+    if target.loiter_radius != 0.0:
         _navigate_loiter(estimated, waypoints, target, wind_east, wind_north, target_airspeed, parameters, memory, dt)
     else:
         _navigate_waypoint(
@@ -96,7 +96,7 @@ def navigate(
 def find_target(waypoints: Records, memory: Record) -> int:
     """Return the index of the target waypoint: the next one that is not a gate."""
     target_index: int = memory.leg + 1
-    while waypoints[target_index].gate:
+    while waypoints[target_index].is_gate:
         target_index += 1
     return target_index
 
@@ -147,7 +147,7 @@ def _navigate_waypoint(
             target.east, target.north, target.up, max(turn_distance, abs(loiter_radius)), memory
         )
     is_end = target_index + 1 >= waypoints.shape[0]
-    if is_end and not target.ends:
+    if is_end and not target.is_mission_end:
         return
     is_reached = distance <= acceptance_radius_at(ground_speed, parameters) or is_past_waypoint(
         estimated, target, memory
@@ -190,15 +190,15 @@ def _navigate_loiter(
         estimated,
         loiter.centre_east,
         loiter.centre_north,
-        loiter.circle,
+        loiter.loiter_radius,
         wind_east,
         wind_north,
         target_airspeed,
         parameters,
         memory,
     )
-    is_on_rim = distance <= abs(loiter.circle) + acceptance_radius_at(ground_speed, parameters)
-    if loiter.to_height and not memory.rim_reached:
+    is_on_rim = distance <= abs(loiter.loiter_radius) + acceptance_radius_at(ground_speed, parameters)
+    if loiter.loiters_to_altitude and not memory.rim_reached:
         memory.altitude_setpoint = memory.leg_start_altitude
         memory.rim_reached = (
             is_on_rim and abs(estimated.up - memory.leg_start_altitude) <= parameters.altitude_acceptance_radius
@@ -210,16 +210,16 @@ def _navigate_loiter(
         memory.time_since_reached + dt if memory.time_since_reached > 0.0 or (is_on_rim and is_at_altitude) else 0.0
     )
     exit_index = memory.leg + 2
-    if math.isnan(loiter.stays):
+    if math.isnan(loiter.loiter_time):
         # A loiter by turns, which PX4 does not fly: it is left where the drawn route leaves it.
         if exit_index < waypoints.shape[0] and is_on_rim and is_past_corner(estimated, loiter):
             begin_leg(estimated, waypoints, memory.leg + 1, memory)
         return
     while exit_index < waypoints.shape[0] and waypoints[exit_index].stop == loiter.stop:
         exit_index += 1
-    if exit_index >= waypoints.shape[0] or memory.time_since_reached <= loiter.stays + SWITCH_DELAY:
+    if exit_index >= waypoints.shape[0] or memory.time_since_reached <= loiter.loiter_time + SWITCH_DELAY:
         return
-    if not loiter.leaves_on_course or _is_on_exit_course(estimated, waypoints[exit_index], loiter):
+    if not loiter.exits_on_course or _is_on_exit_course(estimated, waypoints[exit_index], loiter):
         begin_leg(estimated, waypoints, exit_index - 1, memory)
 
 
@@ -228,13 +228,17 @@ def is_last_target(waypoints: Records, memory: Record) -> bool:
     """Return True if only corners of the same loiter follow the target."""
     target_index = find_target(waypoints, memory)
     target = waypoints[target_index]
-    return target_index + 1 >= waypoints.shape[0] or (target.circle != 0.0 and waypoints[-1].stop == target.stop)
+    return target_index + 1 >= waypoints.shape[0] or (target.loiter_radius != 0.0 and waypoints[-1].stop == target.stop)
 
 
 @inner
 def _setpoint_position(waypoint: Record) -> tuple[float, float]:
     """Return east and north (m) of a waypoint's setpoint, which for a loiter is its center."""
-    return (waypoint.centre_east, waypoint.centre_north) if waypoint.circle != 0.0 else (waypoint.east, waypoint.north)
+    return (
+        (waypoint.centre_east, waypoint.centre_north)
+        if waypoint.loiter_radius != 0.0
+        else (waypoint.east, waypoint.north)
+    )
 
 
 @inner
@@ -247,7 +251,7 @@ def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record)
     """
     next_east, next_north = _setpoint_position(next_waypoint)
     if math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(
-        loiter.circle
+        loiter.loiter_radius
     ):
         return True
     bearing = math.atan2(next_east - estimated.east, next_north - estimated.north)
@@ -293,14 +297,14 @@ def _navigate_rtl(
         return
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(rtl.centre_east - estimated.east, rtl.centre_north - estimated.north)
-    memory.is_loitering = memory.is_loitering or distance < abs(rtl.circle) + switch_distance(speed, parameters)
+    memory.is_loitering = memory.is_loitering or distance < abs(rtl.loiter_radius) + switch_distance(speed, parameters)
     memory.altitude_setpoint = rtl.up if memory.is_loitering else return_altitude
     if memory.is_loitering:
         follow_loiter(
             estimated,
             rtl.centre_east,
             rtl.centre_north,
-            rtl.circle,
+            rtl.loiter_radius,
             wind_east,
             wind_north,
             target_airspeed,
@@ -324,16 +328,18 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
     memory.leg = leg
     memory.from_east, memory.from_north = _setpoint_position(start)
     memory.from_up = start.up
-    if start.circle != 0.0 and math.isnan(start.stays):
+    if start.loiter_radius != 0.0 and math.isnan(start.loiter_time):
         memory.from_east, memory.from_north = estimated.east, estimated.north
-    if start.circle != 0.0 and start.leaves_on_tangent and not math.isnan(start.stays):
+    if start.loiter_radius != 0.0 and start.exits_on_tangent and not math.isnan(start.loiter_time):
         end_east, end_north = _setpoint_position(end)
         bearing = math.atan2(end_east - start.centre_east, end_north - start.centre_north)
-        cosine = abs(start.circle) / max(1e-3, math.hypot(end_east - start.centre_east, end_north - start.centre_north))
-        exit_bearing = bearing - math.copysign(math.acos(min(1.0, cosine)), start.circle)
-        memory.from_east += abs(start.circle) * math.sin(exit_bearing)
-        memory.from_north += abs(start.circle) * math.cos(exit_bearing)
-    if not (start.circle != 0.0 and start.stop == end.stop):
+        cosine = abs(start.loiter_radius) / max(
+            1e-3, math.hypot(end_east - start.centre_east, end_north - start.centre_north)
+        )
+        exit_bearing = bearing - math.copysign(math.acos(min(1.0, cosine)), start.loiter_radius)
+        memory.from_east += abs(start.loiter_radius) * math.sin(exit_bearing)
+        memory.from_north += abs(start.loiter_radius) * math.cos(exit_bearing)
+    if not (start.loiter_radius != 0.0 and start.stop == end.stop):
         memory.is_loitering, memory.rim_reached, memory.leg_start_altitude = False, False, estimated.up
         memory.time_since_reached = 0.0
     memory.min_distance_to_end = math.inf
@@ -344,7 +350,7 @@ def is_past_corner(estimated: Record, corner: Record) -> bool:
     """Return True if an aircraft on a loiter has passed the route's corner for this part of the loiter."""
     corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
     bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)
-    angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, corner.circle)
+    angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, corner.loiter_radius)
     return 0.0 <= angle_past < 0.5 * math.pi
 
 

@@ -88,7 +88,7 @@ class Px4Flight(SitlFlight):
     @property
     def _is_ending(self) -> bool:
         """True once PX4 has reached a last waypoint at which it circles; otherwise as in the base class."""
-        ends_in_circle = self._workspace.path["waypoint"]["ends"][self.setup.route.legs]
+        ends_in_circle = self._workspace.path["waypoint"]["is_mission_end"][self.setup.route.legs]
         return self._link.news.reached >= self.last_item if ends_in_circle else super()._is_ending
 
     def keep_log(self, target: Path) -> bool:

@@ -70,17 +70,17 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
     memory.speed_command = path.waypoint[memory.leg].airspeed
     last = path.waypoint[settings.waypoints - 1]
     previous = path.waypoint[settings.waypoints - 2]
-    if last.returns and settings.on_last_leg:
+    if last.is_rtl and settings.on_last_leg:
         end_return(work.true, last, memory, work.timing.dt)
-    elif settings.on_last_leg and previous.circle != 0.0 and previous.stays == math.inf:
+    elif settings.on_last_leg and previous.loiter_radius != 0.0 and previous.loiter_time == math.inf:
         end_circling(work.true, previous, memory, work.timing.dt)
-    elif settings.on_last_leg and last.ends:
+    elif settings.on_last_leg and last.is_mission_end:
         end_around(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
         cross_track, distance_past = beyond_end(work.true, path.waypoint[: settings.waypoints])
         memory.done = distance_past >= 0.0
         # An aircraft that loiters at the mission's end, however wide, has not missed the route.
-        memory.returning = previous.circle != 0.0 and previous.stop == last.stop
+        memory.returning = previous.loiter_radius != 0.0 and previous.stop == last.stop
         if memory.done:
             memory.cross_track = cross_track
     return end_tick(work)
@@ -130,9 +130,9 @@ def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> Non
     distance = max(0.1, math.hypot(offset_east, offset_north))
     radial_speed = (true.velocity_east * offset_east + true.velocity_north * offset_north) / distance
     clockwise_speed = (true.velocity_east * offset_north - true.velocity_north * offset_east) / distance
-    tangential_speed = math.copysign(1.0, corner.circle) * clockwise_speed
+    tangential_speed = math.copysign(1.0, corner.loiter_radius) * clockwise_speed
     if memory.circled > 0.0 or (
-        distance < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * abs(corner.circle))
+        distance < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * abs(corner.loiter_radius))
         and tangential_speed > abs(radial_speed)
     ):
         memory.circled += dt

@@ -246,7 +246,7 @@ def test_a_return_ends_a_minute_after_it_came_to_its_circle_and_height() -> None
     # Too far away, too high, too low: it has not begun.  1.3 radii of a wide circle are near enough.
     for away, up in ((301.0, 400.0), (0.0, 420.5), (0.0, 379.5)):
         assert not ended(fresh(), away, up, 400)
-    assert ended(fresh(), 519.0, 400.0, 61, circle=-400.0)
+    assert ended(fresh(), 519.0, 400.0, 61, loiter_radius=-400.0)
 
 
 def test_a_mission_that_ends_in_a_circle_ends_once_its_course_has_turned_once_and_a_quarter() -> None:
@@ -264,14 +264,14 @@ def test_a_mission_that_ends_in_a_circle_ends_once_its_course_has_turned_once_an
 
 def test_a_return_ends_no_sooner_than_it_was_all_around_its_circle() -> None:
     # 2 degrees a second: once around after 180 s, the first of which is the one in which it comes there.
-    assert not ended(fresh(), 500.0, 400.0, 180, 2.0, circle=500.0)
-    assert ended(fresh(), 500.0, 400.0, 182, 2.0, circle=500.0)
-    assert ended(fresh(), 500.0, 400.0, 182, -2.0, circle=-500.0)
-    assert not ended(fresh(), 1500.0, 400.0, 450, 0.8, circle=1500.0)
-    assert ended(fresh(), 1500.0, 400.0, 452, 0.8, circle=1500.0)
+    assert not ended(fresh(), 500.0, 400.0, 180, 2.0, loiter_radius=500.0)
+    assert ended(fresh(), 500.0, 400.0, 182, 2.0, loiter_radius=500.0)
+    assert ended(fresh(), 500.0, 400.0, 182, -2.0, loiter_radius=-500.0)
+    assert not ended(fresh(), 1500.0, 400.0, 450, 0.8, loiter_radius=1500.0)
+    assert ended(fresh(), 1500.0, 400.0, 452, 0.8, loiter_radius=1500.0)
     # It never gets around: given up after five times 2 pi 500 m at 10 m/s, 1,571 s; 400 m up it is 4 % wider.
-    assert not ended(fresh(), 500.0, 400.0, 1571, 0.0, circle=500.0)
-    assert ended(fresh(), 500.0, 400.0, 1660, 0.0, circle=500.0)
+    assert not ended(fresh(), 500.0, 400.0, 1571, 0.0, loiter_radius=500.0)
+    assert ended(fresh(), 500.0, 400.0, 1660, 0.0, loiter_radius=500.0)
 
 
 def test_a_return_has_no_cross_track_error_because_it_follows_no_line() -> None:

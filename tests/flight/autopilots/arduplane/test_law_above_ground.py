@@ -16,7 +16,7 @@ DT = 0.1
 
 def asked(own: Record, north: float, up: float, above: float = 100.0, **values: float) -> float:
     """Return the altitude that a leg of 1,000 m to a height above ground asks for, m AMSL."""
-    (b,) = waypoints((0, 1000, 0), over_ground=True, above_ground=above)
+    (b,) = waypoints((0, 1000, 0), follows_terrain=True, above_ground=above)
     update_height_demand(flying(0.0, north, up), b, parameters(**values), own, DT)
     return float(own.altitude_demand_raw)
 
@@ -71,7 +71,7 @@ def looked(heights: np.ndarray, above: float = 100.0, **values: float) -> Record
     span = [[-2000.0, 2000.0], [-2000.0, 2000.0]]
     to_pixel = fit_polymap(lambda east, north: (1.0 + east / 1000.0, north / 10.0), span, 1e-6)
     work.pixel_map = to_pixel.record
-    way = waypoints((0, 0, 0), (0, 1000, 0), over_ground=True, above_ground=above)
+    way = waypoints((0, 0, 0), (0, 1000, 0), follows_terrain=True, above_ground=above)
     update_terrain_lookahead(work, heights.astype(np.float32), way, parameters(**values), own)
     return own
 

@@ -66,8 +66,8 @@ EAST, NORTH = 1000.0, 4000.0
 
 def back(up: float, radius: float = 60.0, base: float = 0.0) -> np.ndarray:
     """The waypoints of a return from the origin: its second is of the way back."""
-    made = waypoints((0.0, -1000.0, 500.0), (0.0, 100.0, 500.0), returns=True)
-    for name, value in (("centre_east", EAST), ("centre_north", NORTH), ("up", up), ("circle", radius)):
+    made = waypoints((0.0, -1000.0, 500.0), (0.0, 100.0, 500.0), is_rtl=True)
+    for name, value in (("centre_east", EAST), ("centre_north", NORTH), ("up", up), ("loiter_radius", radius)):
         made[name] = value
     made["slope_base"] = base
     return made
@@ -136,9 +136,13 @@ def test_the_circle_is_flown_at_the_targets_height_and_grows_with_height() -> No
 def test_after_a_loiter_the_slope_begins_at_its_top() -> None:
     # At the corner of the loiter's circle where it is left: the return has a circle of its own, 4 km away.
     way = waypoints((-60.0, -60.0, 500.0), (0.0, 0.0, 500.0), (EAST, NORTH, 100.0))
-    for name, loiter, ahead in (("centre_east", 120.0, EAST), ("centre_north", 0.0, NORTH), ("circle", 120.0, 60.0)):
+    for name, loiter, ahead in (
+        ("centre_east", 120.0, EAST),
+        ("centre_north", 0.0, NORTH),
+        ("loiter_radius", 120.0, 60.0),
+    ):
         way[name][:2], way[name][2] = loiter, ahead
-    way["returns"][2], way["stop"] = True, (1, 1, 2)
+    way["is_rtl"][2], way["stop"] = True, (1, 1, 2)
     here = flying(0.0, 1.0, course=math.atan2(EAST, NORTH))
     own = navigated(memory(loiter_started=True, loiter_complete=True), here, way)
     assert own.leg == 1
@@ -195,7 +199,7 @@ def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     records = waypoint_records(setup.route)
     # It begins as early as at a right angle, the mission's end, if no item says where.
     assert records["turn"][1] == pytest.approx(0.5 * math.pi)
-    assert records["returns"].tolist() == [False, False, *[True] * (len(records) - 2)]
+    assert records["is_rtl"].tolist() == [False, False, *[True] * (len(records) - 2)]
     assert set(records["centre_east"][2:].round()) == {9500.0}
     assert setup.route.return_from == 1
     assert (setup.route.airspeed[1:] == setup.airspeed).all()

@@ -121,7 +121,7 @@ def test_its_side_acceleration_is_l1s() -> None:
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_around_a_loiter_it_turns_with_its_radius(side: float) -> None:
     # On the circle, in its direction: V^2 / R towards the centre.
-    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=side * 120.0, centre_east=side * 120.0)
+    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), loiter_radius=side * 120.0, centre_east=side * 120.0)
     way["centre_north"], way["up"] = 900.0, 0.0
     own = memory()
     navigate_legs(flying(0.0, 900.0), way, parameters(), own, 1.0, 0.1)
@@ -130,7 +130,9 @@ def test_around_a_loiter_it_turns_with_its_radius(side: float) -> None:
 
 
 def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
-    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=120.0, centre_east=0.0, centre_north=1000.0)
+    way = waypoints(
+        (0, 0, 500), (0, 1000, 500), (100, 1100, 500), loiter_radius=120.0, centre_east=0.0, centre_north=1000.0
+    )
     own = memory()
     navigate_legs(flying(0.0, 0.0), way, parameters(), own, 1.0, 0.1)
     assert not own.reached_loiter_target
@@ -139,7 +141,7 @@ def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
 
 
 # A circle of 200 m about the origin, left for a place 5 km north of it.
-CIRCLE = {"circle": 200.0, "stop": 1, "stays": math.nan, "turns": 1.0}
+CIRCLE = {"loiter_radius": 200.0, "stop": 1, "loiter_time": math.nan, "loiter_turns": 1.0}
 
 
 def circle_route(**fields: Any) -> np.ndarray:
@@ -180,7 +182,7 @@ def test_the_line_to_a_loiters_middle_is_followed_to_three_of_its_radii() -> Non
 
 @pytest.mark.parametrize("turns", [1.0, 2.0])
 def test_a_loiter_is_left_after_its_turns_where_what_follows_lies_ahead(turns: float) -> None:
-    own, left = go_around(circle_route(turns=turns), 300.0)
+    own, left = go_around(circle_route(loiter_turns=turns), 300.0)
     # The tangent to 5 km north is 90 degrees from the south but for asin(200 / 5000); 10 degrees before it will do.
     tangent = 90.0 + math.degrees(math.asin(200.0 / 5000.0))
     assert left == pytest.approx(360.0 * turns + tangent - 10.0, abs=1.0)
@@ -191,14 +193,14 @@ def test_a_loiter_is_left_after_its_turns_where_what_follows_lies_ahead(turns: f
 def test_a_loiter_is_left_after_its_time() -> None:
     # A circle takes 50.3 s: after 60 s it has gone around 1.19 times, and heads north 0.04 of a circle later.
     for seconds, circles in ((60.0, 1), (70.0, 2)):
-        _, left = go_around(circle_route(turns=0.0, stays=seconds), 300.0)
+        _, left = go_around(circle_route(loiter_turns=0.0, loiter_time=seconds), 300.0)
         assert left == pytest.approx(360.0 * circles + 82.3, abs=1.0)
-    assert go_around(circle_route(turns=0.0, stays=math.inf), 300.0)[1] is None
+    assert go_around(circle_route(loiter_turns=0.0, loiter_time=math.inf), 300.0)[1] is None
 
 
 @pytest.mark.parametrize(("up", "circles"), [(-4.9, 0), (-5.1, 3)])
 def test_a_loiter_to_a_height_is_left_at_it_or_where_that_stays_out_of_reach(up: float, circles: int) -> None:
-    way = circle_route(turns=0.0, stays=0.0, to_height=True)
+    way = circle_route(loiter_turns=0.0, loiter_time=0.0, loiters_to_altitude=True)
     _, left = go_around(way, 300.0, up=up)
     assert left == pytest.approx(360.0 * circles + 82.3, abs=1.0)
 
@@ -206,7 +208,7 @@ def test_a_loiter_to_a_height_is_left_at_it_or_where_that_stays_out_of_reach(up:
 def test_who_waits_for_the_course_is_content_with_ten_degrees_more_each_circle() -> None:
     """After 1 s of its loiter (7 degrees) it waits, with a course that is always so far off: a circle, or two."""
     for degrees, circles in ((9.0, 0), (11.0, 1), (19.0, 1), (21.0, 2), (-21.0, 2)):
-        way = circle_route(turns=0.0, stays=1.0)
+        way = circle_route(loiter_turns=0.0, loiter_time=1.0)
         left = go_around(way, 300.0, off=math.radians(degrees))[1]
         assert left == pytest.approx(360.0 * circles + math.degrees(25.0 / 200.0), abs=2.0)
 
@@ -214,7 +216,7 @@ def test_who_waits_for_the_course_is_content_with_ten_degrees_more_each_circle()
 def test_no_course_is_asked_for_to_a_place_within_the_circle() -> None:
     """Within 1.05 radii of the middle: there the course from the circle is off by up to 90 degrees on all of it."""
     for north, waits in ((209.0, False), (211.0, True)):
-        way = circle_route(turns=0.0, stays=1.0)
+        way = circle_route(loiter_turns=0.0, loiter_time=1.0)
         way["north"][2] = north
         left = go_around(way, 300.0)[1]
         assert left is not None
@@ -222,7 +224,7 @@ def test_no_course_is_asked_for_to_a_place_within_the_circle() -> None:
 
 
 def test_the_next_legs_line_begins_where_the_loiter_is_left_if_its_item_asks_for_that() -> None:
-    own, left = go_around(circle_route(leaves_on_tangent=True), 300.0)
+    own, left = go_around(circle_route(exits_on_tangent=True), 300.0)
     assert left is not None
     assert math.hypot(own.from_east, own.from_north) == pytest.approx(199.9)
 
@@ -241,7 +243,12 @@ def test_beside_a_loiter_the_turn_is_that_from_or_to_its_middle() -> None:
     """A right angle to the middle, though the route goes on by the tangent with half of that: it turns 90 m before."""
     for north, leg in ((-1091.0, 0), (-1089.0, 1)):
         way = waypoints((0, -3000, 500), (0, -1000, 500), (200, -800, 500), (5000, -1000, 500), turn=RIGHT_ANGLE / 2)
-        way["circle"][2], way["centre_east"][2], way["centre_north"][2], way["stop"] = 200.0, 900.0, -1000.0, range(4)
+        way["loiter_radius"][2], way["centre_east"][2], way["centre_north"][2], way["stop"] = (
+            200.0,
+            900.0,
+            -1000.0,
+            range(4),
+        )
         own = memory(from_north=-3000.0)
         navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
         assert own.leg == leg
@@ -252,7 +259,7 @@ def test_a_return_goes_on_to_the_landing_sequence_within_10_m_of_its_circles_hei
     """On its circle; the leg to the sequence's first place begins where it is."""
     way = waypoints((0, 0, 500), (0, 900, 500), (60, 1000, 500), (3000, 2000, 400), (3000, 3000, 400))
     back = way[1:3]
-    back["returns"], back["circle"], back["centre_east"], back["centre_north"] = True, 120.0, 120.0, 900.0
+    back["is_rtl"], back["loiter_radius"], back["centre_east"], back["centre_north"] = True, 120.0, 120.0, 900.0
     own = memory()
     navigate_legs(flying(0.0, 900.0, up), way, parameters(), own, 1.0, 0.1)
     assert (own.leg, bool(own.is_in_rtl)) == ((2, False) if joins else (0, True))

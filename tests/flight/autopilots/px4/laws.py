@@ -47,7 +47,7 @@ def waypoints(*points: tuple[float, float, float], **fields: Any) -> np.ndarray:
     made = waypoint_column(len(points))
     made["east"], made["north"], made["up"] = np.array(points).T
     made["airspeed"] = 25.0
-    made["stop"], made["stays"] = np.arange(len(points)), math.nan
+    made["stop"], made["loiter_time"] = np.arange(len(points)), math.nan
     for name, value in fields.items():
         made[name] = value
     return made

@@ -122,7 +122,7 @@ def test_a_circle_at_the_gate_is_not_left_for_being_wider_than_the_switch_distan
     assert (next_one.leg, bool(next_one.is_loitering)) == (1, False)
 
 
-CIRCLE = {"circle": 100.0, "centre_east": 0.0, "centre_north": 1000.0, "stop": 1}
+CIRCLE = {"loiter_radius": 100.0, "centre_east": 0.0, "centre_north": 1000.0, "stop": 1}
 
 
 def to_a_loiter(**fields: Any) -> np.ndarray:
@@ -142,7 +142,7 @@ def fly_on(at: Record, route: np.ndarray, own: Record, seconds: float, **values:
 
 def test_a_loiter_of_turns_is_flown_until_its_corner_is_passed() -> None:
     route = waypoints((0.0, 0.0, 500.0), (100.0, 1000.0, 500.0), (1000.0, 1000.0, 500.0))
-    route["circle"][1], route["centre_east"][1], route["centre_north"][1] = 100.0, 0.0, 1000.0
+    route["loiter_radius"][1], route["centre_east"][1], route["centre_north"][1] = 100.0, 0.0, 1000.0
     own, made = memory(), parameters()
     # The corner is east of the middle; a circle to the right comes to it from the north.
     assert not is_past_corner(flying(70.0, 1070.0), route[1])
@@ -154,17 +154,17 @@ def test_a_loiter_of_turns_is_flown_until_its_corner_is_passed() -> None:
 
 def test_a_loiter_is_flown_to_at_its_own_height_straight_at_its_middle() -> None:
     own = memory()
-    fly_on(flying(300.0, 0.0), to_a_loiter(stays=60.0), own, DT)
+    fly_on(flying(300.0, 0.0), to_a_loiter(loiter_time=60.0), own, DT)
     assert own.altitude_setpoint == 600.0
     # The middle lies to the left of a course north from 300 m east of the leg.
     assert own.lateral_acceleration < -1.0
     own = memory()
-    fly_on(flying(300.0, 0.0, course=math.atan2(-300.0, 1000.0)), to_a_loiter(stays=60.0), own, DT)
+    fly_on(flying(300.0, 0.0, course=math.atan2(-300.0, 1000.0)), to_a_loiter(loiter_time=60.0), own, DT)
     assert own.lateral_acceleration == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_loiter_to_a_height_holds_that_of_its_legs_begin_until_its_rim() -> None:
-    own, route = memory(), to_a_loiter(to_height=True, stays=0.0)
+    own, route = memory(), to_a_loiter(loiters_to_altitude=True, loiter_time=0.0)
     fly_on(flying(0.0, 889.0), route, own, 1.0)
     assert own.altitude_setpoint == 500.0
     # Within 10 m of a circle of 100 m, but not at the height that it holds.
@@ -179,7 +179,7 @@ def test_a_loiter_to_a_height_holds_that_of_its_legs_begin_until_its_rim() -> No
 
 
 def test_a_loiter_once_reached_counts_its_time_wherever_the_aircraft_is() -> None:
-    own, route = memory(), to_a_loiter(stays=60.0)
+    own, route = memory(), to_a_loiter(loiter_time=60.0)
     fly_on(flying(0.0, 891.0, 589.0), route, own, 100.0)
     fly_on(flying(0.0, 885.0, 600.0), route, own, 100.0)
     assert (own.leg, own.time_since_reached) == (0, 0.0)
@@ -194,13 +194,13 @@ def test_a_loiter_once_reached_counts_its_time_wherever_the_aircraft_is() -> Non
 
 def test_a_loiter_without_end_is_not_left() -> None:
     own = memory()
-    fly_on(flying(0.0, 900.0, 600.0), to_a_loiter(stays=math.inf), own, 200.0)
+    fly_on(flying(0.0, 900.0, 600.0), to_a_loiter(loiter_time=math.inf), own, 200.0)
     assert own.leg == 0
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_the_line_after_a_loiter_begins_on_its_rim_where_the_item_asks_for_it(side: float) -> None:
-    own, route = memory(), to_a_loiter(stays=0.0, leaves_on_tangent=True, circle=100.0 * side)
+    own, route = memory(), to_a_loiter(loiter_time=0.0, exits_on_tangent=True, loiter_radius=100.0 * side)
     fly_on(flying(0.0, 900.0, 600.0), route, own, 1.0)
     # 1 km from the middle the tangent touches at cos^-1(0.1) from the way there: 10 m on it and 99.5 m beside it.
     assert (own.leg, own.from_east) == (2, pytest.approx(10.0))
@@ -208,7 +208,7 @@ def test_the_line_after_a_loiter_begins_on_its_rim_where_the_item_asks_for_it(si
 
 
 def test_a_loiter_is_left_on_the_course_to_what_follows_where_the_item_asks_for_it() -> None:
-    route = to_a_loiter(stays=0.0, leaves_on_course=True)
+    route = to_a_loiter(loiter_time=0.0, exits_on_course=True)
     own = memory()
     # From above the middle the next waypoint lies 95.7 degrees east of north; the course is to be within 5 degrees.
     fly_on(flying(0.0, 1100.0, 600.0, course=math.radians(90.6)), route, own, 5.0)
@@ -222,7 +222,7 @@ def test_a_loiter_is_left_on_the_course_to_what_follows_where_the_item_asks_for_
 
 
 def test_a_return_climbs_on_the_spot_flies_straight_and_comes_down_at_its_target() -> None:
-    route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 600.0), returns=True, circle=80.0, centre_north=5000.0)
+    route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 600.0), is_rtl=True, loiter_radius=80.0, centre_north=5000.0)
     own, made = memory(), parameters()
 
     def seen(north: float, up: float) -> None:
@@ -250,7 +250,7 @@ def test_a_return_climbs_on_the_spot_flies_straight_and_comes_down_at_its_target
 
 @pytest.mark.parametrize(("loiters", "returns"), [(150.0, 60.0), (60.0, 150.0)])
 def test_a_return_climbs_with_the_radius_of_loiters(loiters: float, returns: float) -> None:
-    route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 600.0), returns=True, circle=returns, centre_north=5000.0)
+    route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 600.0), is_rtl=True, loiter_radius=returns, centre_north=5000.0)
     made = parameters("1.17", NAV_LOITER_RAD=loiters, RTL_LOITER_RAD=returns)
     own = memory(is_in_rtl=True, from_up=500.0)
     # Around the place where it began, to the right: on the circle's east it flies south, with V^2 / r to the west.
