@@ -11,7 +11,7 @@ _FIELD = (
     "world.terrain._ground_heights",
 )
 # Kernel of the tracking error.
-_TRACKING_KERNELS = ("flight.autopilots.arduplane.tracking_error._fill_corners",)
+_TRACKING_KERNELS = ("flight.autopilots.arduplane.tracking_error._measure_corners",)
 # Kernels of a scenario.
 _WORLD_KERNELS = (*_FIELD, *_TRACKING_KERNELS)
 # Kernel of the ranking of candidates.

@@ -163,12 +163,12 @@ class ArduPlane(Autopilot):
 
     @property
     def tick(self) -> Tick:
-        """Compiled function for one tick of the law."""
+        """Compiled function for one tick of ArduPlane's controllers."""
         return arduplane_tick
 
     @property
     def loop(self) -> Loop:
-        """Compiled simulation loop of the control law and the aircraft model."""
+        """Compiled simulation loop of ArduPlane's controllers and the aircraft model."""
         return arduplane_loop
 
     def initialise_records(self, guidance: Record, record: Record) -> None:
@@ -183,7 +183,7 @@ class ArduPlane(Autopilot):
         record.memory.from_east, record.memory.from_north, record.memory.from_up = start
 
     def described(self, aircraft: str) -> str:
-        """Return a description of the law with the parameters that matter most in a flight."""
+        """Return a description of the simulated ArduPlane with the parameters that matter most in a flight."""
         parameters = self.parameters
         source_text = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
         return (
@@ -193,7 +193,7 @@ class ArduPlane(Autopilot):
 
     @property
     def version(self) -> str:
-        """ArduPlane release of the law."""
+        """Simulated ArduPlane release."""
         return self.parameters.version
 
     @property
@@ -358,7 +358,7 @@ class ArduPlane(Autopilot):
         return self.parameters.ground_speed_min
 
     def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the last accepted speed for each leg."""
+        """Return the last airspeed that ArduPlane accepted, for each leg."""
         return speeds_flown(commanded, cruise, self.parameters)
 
     @property
@@ -374,7 +374,7 @@ class ArduPlane(Autopilot):
     def tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return the deviations of its law with these parameters."""
+        """Return ArduPlane's deviations with these parameters."""
         return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
 
     def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
@@ -382,7 +382,7 @@ class ArduPlane(Autopilot):
         return height_in_updrafts(sink, turbulence)
 
     def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
-        """Return the same law with its take-off and its landing."""
+        """Return the same controllers with take-off and landing."""
         return ArduPlaneFromGround(self.parameters, ways=ways, aircraft=aircraft, contacts=tuple(contacts))
 
     def with_parameters(self, **values: float) -> "ArduPlane":
@@ -405,12 +405,12 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 
     @property
     def tick(self) -> Tick:
-        """Compiled function for one tick of the law."""
+        """Compiled function for one tick of ArduPlane's controllers."""
         return ground_tick
 
     @property
     def loop(self) -> Loop:
-        """Compiled simulation loop of the control law and the aircraft model."""
+        """Compiled simulation loop of ArduPlane's controllers and the aircraft model."""
         return ground_loop
 
     @property
@@ -460,7 +460,7 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
         )
         ground.home_up, ground.takeoff_end_altitude, ground.launch_up = take_off.base, take_off.top, take_off.home[2]
         ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
-        # Start when it moved at 5 m/s, at which its course over the ground is known.
+        # Start when the aircraft moved at 5 m/s, at which its course over the ground is known.
         acceleration = take_off.acceleration
         ground.time_at_course_speed = (
             max(0.0, take_off.speed - _COURSE_SPEED_MPS) / acceleration if acceleration else 0.0

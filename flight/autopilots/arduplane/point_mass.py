@@ -73,8 +73,8 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     has_power = bool(envelope.power_level.size)
     power = np.full((3, len(speeds), len(_ALTITUDES_M)), np.nan)
     if has_power:
-        named = (envelope.power_idle, envelope.power_level, envelope.power_full)
-        power = np.stack([_resample(envelope, table, speeds) for table in named])
+        power_tables = (envelope.power_idle, envelope.power_level, envelope.power_full)
+        power = np.stack([_resample(envelope, table, speeds) for table in power_tables])
     record: Record = np.zeros(1, POINT_MASS)[0]
     record.airspeed, record.slowest, record.has_power = airspeed, speeds[0], has_power
     record.speed_step, record.height_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
@@ -122,15 +122,17 @@ def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
     alphas = np.full(_AIRSPEED_COUNT, np.nan)
     for h, amsl in enumerate(_ALTITUDES_M):
         for v, speed in enumerate(speeds):
-            near = None
+            previous_trim = None
             for t in reversed(range(_THROTTLE_COUNT)):
-                found = trim(simulator, amsl, {"airspeed": float(speed), "throttle": t / (_THROTTLE_COUNT - 1.0)}, near)
-                if found is None:
+                solution = trim(
+                    simulator, amsl, {"airspeed": float(speed), "throttle": t / (_THROTTLE_COUNT - 1.0)}, previous_trim
+                )
+                if solution is None:
                     continue
-                near = found
-                excess[t, v, h] = speed * math.sin(found.climb)
+                previous_trim = solution
+                excess[t, v, h] = speed * math.sin(solution.climb)
                 if h == 0:
-                    alphas[v] = found.alpha
+                    alphas[v] = solution.alpha
     return {"excess": excess, "alpha": alphas}
 
 
@@ -138,7 +140,7 @@ def filled_excess(trims: Floats) -> Floats:
     """Return specific excess power (t, v, h) in m/s, with values for grid points without a trim (NaN).
 
     Such a point takes the value of the nearest throttle, then of the nearest airspeed, then of the nearest
-    altitude.  But a closed throttle is filled from closed throttles alone, as long as there are any: a more open
+    altitude.  But a closed throttle is filled only from closed throttles, as long as there are any: a more open
     throttle has thrust, and would not be a glide.
 
     >>> trims = np.array([[[-2.0], [np.nan]], [[1.0], [0.5]]])
@@ -158,15 +160,15 @@ def filled_excess(trims: Floats) -> Floats:
 def _fill_along(table: Floats, axis: int) -> None:
     """Fill the missing values in each line along an axis."""
     lines = np.moveaxis(table, axis, -1)
-    for at in np.ndindex(lines.shape[:-1]):
-        _fill(lines[at])
+    for index in np.ndindex(lines.shape[:-1]):
+        _fill(lines[index])
 
 
 def _fill(values: Floats) -> None:
     """Fill NaN by interpolation between known values, and by the nearest known value beyond them."""
-    good = ~np.isnan(values)
-    if good.any():
-        values[:] = np.interp(np.arange(len(values)), np.flatnonzero(good), values[good])
+    is_known = ~np.isnan(values)
+    if is_known.any():
+        values[:] = np.interp(np.arange(len(values)), np.flatnonzero(is_known), values[is_known])
 
 
 def _resample(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Compute ArduPlane's deviation from the legs of a plan by flying corners with its own guidance in the plane.
+"""Compute ArduPlane's deviation from the legs of a plan by simulating corners with its own guidance in the plane.
 
 Each corner is flown in still air, at a constant ground speed, by `flight.autopilots.arduplane.law` and the lag of its
 bank, to find the acceptance radius with the least deviation.  For wind, the excursion in still air at the highest
@@ -73,7 +73,7 @@ def tracking_error(
     """Return the margins that a plan needs for ArduPlane's deviations at an equivalent airspeed (m/s).
 
     nav: accuracy of navigation.
-    fly_over: True if it flies on to each waypoint before it turns.
+    fly_over: True if ArduPlane flies on to each waypoint before it turns.
     turbulence: turbulence of the wind; gusts leave less of the throttle for a climb.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -111,7 +111,7 @@ def _corner_tables(
     """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
     corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
-    _fill_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
+    _measure_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
     factor, right_angle_margin = WIND_SPREAD
     corners["excursion"] *= (factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.
@@ -122,68 +122,74 @@ def _corner_tables(
 
 
 @compiled
-def _fill_corners(
+def _measure_corners(
     parameters: Record,
     airspeed: float,
-    turns: Floats,
-    speeds: Floats,
+    turn_angles: Floats,
+    ground_speeds: Floats,
     fly_over: bool,
     corners: Records,
     waypoints: Records,
 ) -> None:
-    """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
-    for i in range(turns.size):
-        for j in range(speeds.size):
+    """Simulate a turn for each turn angle and ground speed, and store its tracking in `CORNER_TRACKING` records."""
+    for i in range(turn_angles.size):
+        for j in range(ground_speeds.size):
             corner = corners[i, j]
-            if turns[i] == 0.0:
+            if turn_angles[i] == 0.0:
                 corner.acceptance = MIN_ACCEPTANCE
                 continue
             min_acceptance, max_acceptance = MIN_ACCEPTANCE, MAX_ACCEPTANCE_M
-            best, min_excursion = min_acceptance, math.inf
+            best_acceptance, min_excursion = min_acceptance, math.inf
             for _ in range(1 if fly_over else _SEARCH_ROUNDS):
                 step = (max_acceptance - min_acceptance) / (_ACCEPTANCES_PER_ROUND - 1)
                 for k in range(1 if fly_over else _ACCEPTANCES_PER_ROUND):
                     acceptance = math.floor(min_acceptance + k * step)
                     corner_flight = _fly_corner(
-                        parameters, airspeed, turns[i], speeds[j], acceptance, fly_over, waypoints
+                        parameters, airspeed, turn_angles[i], ground_speeds[j], acceptance, fly_over, waypoints
                     )
                     if corner_flight[0] < min_excursion:
-                        best, min_excursion = acceptance, corner_flight[0]
+                        best_acceptance, min_excursion = acceptance, corner_flight[0]
                         corner.excursion, corner.after = corner_flight
-                min_acceptance, max_acceptance = max(MIN_ACCEPTANCE, best - step), min(MAX_ACCEPTANCE_M, best + step)
-            corner.acceptance = best
-            corner.before = 0.0 if fly_over else best
+                min_acceptance, max_acceptance = (
+                    max(MIN_ACCEPTANCE, best_acceptance - step),
+                    min(MAX_ACCEPTANCE_M, best_acceptance + step),
+                )
+            corner.acceptance = best_acceptance
+            corner.before = 0.0 if fly_over else best_acceptance
 
 
 @inner
 def _fly_corner(
     parameters: Record,
     airspeed: float,
-    turn: float,
-    speed: float,
+    turn_angle: float,
+    ground_speed: float,
     acceptance: float,
     fly_over: bool,
     waypoints: Records,
 ) -> tuple[float, float]:
     """Return the maximum distance from the two legs, and the length of the second leg until the flight settles, m.
 
-    The first leg leads north to the origin.  turn: rad, to the right.  speed: over the ground, m/s.
+    The first leg leads north to the origin.  turn_angle: rad, to the right.  ground_speed: m/s.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, memory = motions[0], memories[0]
-    east, north = math.sin(turn), math.cos(turn)
+    east, north = math.sin(turn_angle), math.cos(turn_angle)
     waypoints[0].north = -_LEG_LENGTH_M
-    waypoints[1].turn, waypoints[1].acceptance, waypoints[1].fly_over = turn, acceptance, fly_over
+    waypoints[1].turn, waypoints[1].acceptance, waypoints[1].fly_over = turn_angle, acceptance, fly_over
     waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
     memory.from_north = -_LEG_LENGTH_M
     # The waypoint comes within the acceptance radius in the middle between two updates, which is the average case.
-    tick_length = speed * NAVIGATION_TICK
+    tick_length = ground_speed * NAVIGATION_TICK
     estimated.north = -acceptance - (math.floor(_RUN_IN_M / tick_length) + 0.5) * tick_length
     lag = ROLL_LAG * parameters.roll_time
     decay = math.exp(-NAVIGATION_TICK / lag)
-    course, lateral_acceleration, time, excursion, settled_distance, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < 0.75 * _LEG_LENGTH_M and time < 120.0:
-        estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
+    course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
+        estimated.velocity_east, estimated.velocity_north = (
+            ground_speed * math.sin(course),
+            ground_speed * math.cos(course),
+        )
         navigate_legs(estimated, waypoints, parameters, memory, 1.0, NAVIGATION_TICK)
         acceleration_demand = GRAVITY * math.tan(
             limited_nav_roll(memory.lateral_acceleration, 0.0, airspeed, parameters)
@@ -191,20 +197,22 @@ def _fly_corner(
         # The exact solution of the lag, and the displacement on the mean course.
         course_change = (
             acceleration_demand * NAVIGATION_TICK + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
-        ) / speed
+        ) / ground_speed
         lateral_acceleration = acceleration_demand + (lateral_acceleration - acceleration_demand) * decay
         estimated.east += tick_length * math.sin(course + 0.5 * course_change)
         estimated.north += tick_length * math.cos(course + 0.5 * course_change)
         course += course_change
         time += NAVIGATION_TICK
-        along = estimated.east * east + estimated.north * north
+        distance_along = estimated.east * east + estimated.north * north
         corner_distance = math.hypot(estimated.east, estimated.north)
         first_leg_distance = abs(estimated.east) if estimated.north < 0.0 else corner_distance
-        second_leg_distance = abs(estimated.east * north - estimated.north * east) if along > 0.0 else corner_distance
+        second_leg_distance = (
+            abs(estimated.east * north - estimated.north * east) if distance_along > 0.0 else corner_distance
+        )
         excursion = max(excursion, min(first_leg_distance, second_leg_distance))
         if memory.leg == 1 and second_leg_distance > _SETTLED_CROSS_TRACK_M:
-            settled_distance = max(0.0, along)
-        if memory.leg == 1 and along > settled_distance + _SETTLED_TIME_S * speed:
+            settled_distance = max(0.0, distance_along)
+        if memory.leg == 1 and distance_along > settled_distance + _SETTLED_TIME_S * ground_speed:
             break
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     if motions.size + memories.size != 2:
