@@ -32,7 +32,7 @@ WAYPOINT = record_dtype(
     ("loiters_to_altitude", np.bool_),  # True if the loiter climbs or descends to an altitude
     ("exits_on_course", np.bool_),  # True if the item states an exit on the course to the next waypoint
     ("exits_on_tangent", np.bool_),  # True if the line to the next waypoint starts on the circle, not at its center
-    ("is_rtl", np.bool_),  # True if the leg to it is an RTL; circle, center and up are then those of the RTL loiter
+    ("is_rtl", np.bool_),  # True if the leg to it is an RTL; radius, center and up are then those of the RTL loiter
     ("stop", np.int64),  # its stop of the route: a jump back leads to another stop of the same item
     ("is_gate", np.bool_),  # True for a CONDITION_GATE, which is no target
     ("is_mission_end", np.bool_),  # True if the mission ends there without a landing or an RTL
