@@ -188,12 +188,12 @@ def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     [0.0, 0.0, nan, 1.0, nan]
     """
     gap = np.full((1, 2), np.nan)
-    together = np.vstack([piece for part in parts if len(part) for piece in (part, gap)] or [np.zeros((0, 2))])
-    return together[:, 0], together[:, 1]
+    points = np.vstack([lines for part in parts if len(part) for lines in (part, gap)] or [np.zeros((0, 2))])
+    return points[:, 0], points[:, 1]
 
 
 def held_band(is_held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
-    """Return a layer that shades, over the full height, where a control is held at its limit on a long axis (t,)."""
+    """Return a layer that shades the parts of a long axis (t,) in which a control is at its limit."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_held, [False]]).astype(np.int8)))
     starts, band_ends = along[edges[::2]], along[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
@@ -227,12 +227,12 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     return np.unique(np.concatenate([[0, column.size - 1], lowest, highest]))
 
 
-def nice_step(span: float, parts: int) -> float:
-    """Return the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `parts` pieces."""
-    raw = max(span, 1e-9) / parts
-    power = 10.0 ** np.floor(np.log10(raw))
+def nice_step(span: float, max_count: int) -> float:
+    """Return the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `max_count` pieces."""
+    min_step = max(span, 1e-9) / max_count
+    power = 10.0 ** np.floor(np.log10(min_step))
     for factor in (1.0, 2.0, 5.0, 10.0):
-        if factor * power >= raw * (1 - 1e-9):
+        if factor * power >= min_step * (1 - 1e-9):
             return float(factor * power)
     return float(10.0 * power)
 
@@ -308,14 +308,14 @@ def _layer_json(layer: Layer) -> Json:
         document |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
     if layer.low is not None:
         document["low"] = numbers(layer.low, telling_digits(layer.low))
-    rarer: Json = {
+    optional_keys: Json = {
         "dashed": layer.dashed,
         "quiet": layer.quiet,
         "legend": layer.legend,
         "words": list(layer.hover_texts),
     }
-    rarer = {word: value for word, value in rarer.items() if value}
-    return document | rarer | ({} if layer.flight is None else {"flight": layer.flight})
+    optional_keys = {key: value for key, value in optional_keys.items() if value}
+    return document | optional_keys | ({} if layer.flight is None else {"flight": layer.flight})
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,6 +336,6 @@ def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
     for panel in panels:
         for label, _ in panel.limits:
             if label:
-                none = np.zeros(0)
-                layers_by_name.setdefault(label, []).append(Layer("line", label, "limit", none, none))
+                empty = np.zeros(0)
+                layers_by_name.setdefault(label, []).append(Layer("line", label, "limit", empty, empty))
     return tuple(LegendEntry(text, tuple(layers)) for text, layers in layers_by_name.items())

@@ -29,10 +29,10 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
     layers += path_layers(
         drawn.segments_by_reach, _LOOKS, lambda glide: glide.start[:2], lambda glide: _glide_text(glide, drawn)
     )
-    down = np.array([glide.own.impact for glide in glides.each if glide.own.end == "ground"])
-    if len(down):
+    impacts = np.array([glide.own.impact for glide in glides.each if glide.own.end == "ground"])
+    if len(impacts):
         name = "where ArduPlane's own return comes down"
-        layers.append(Layer("dots", name, "comes-down", down[:, 0], down[:, 1], quiet=True))
+        layers.append(Layer("dots", name, "comes-down", impacts[:, 0], impacts[:, 1], quiet=True))
     names = tuple(site_text(site) for site in glides.sites)
     layers.append(
         Layer("dots", "home, rally point or landing", "waypoint", sites[:, 0], sites[:, 1], hover_texts=names)
@@ -52,8 +52,8 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
 
 
 def _glide_text(glide: Glide, drawn: DrawnReturns) -> str:
-    spare = drawn.glides.altitude_left(glide)
-    left_text = f", {spare:.0f} m left over" if spare >= 0.0 else ""
+    spare_altitude = drawn.glides.altitude_left(glide)
+    left_text = f", {spare_altitude:.0f} m left over" if spare_altitude >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 
@@ -69,11 +69,13 @@ def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
     for band in footprint.bands(*extent):
         name = f"{place} in reach from {band.up_to:.0f} m above ground"
         layers.append(_area_layer(name, BAND_ROLES[band.up_to], band.parts))
-    flat = footprint.landings(*extent)
-    return layers + ([_area_layer("flat ground according to the elevation file", "landable", flat)] if flat else [])
+    flat_parts = footprint.landings(*extent)
+    return layers + (
+        [_area_layer("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []
+    )
 
 
 def _area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
     gap = np.full((1, 2), np.nan)
-    x, y = np.vstack([piece for part in parts for ring in part for piece in (ring, gap)])[:-1].T
+    x, y = np.vstack([points for part in parts for ring in part for points in (ring, gap)])[:-1].T
     return Layer("area", name, role, x, y, hover_texts=(name,))

@@ -166,18 +166,18 @@ def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tu
 def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> Chart | None:
     """Chart flown altitudes by outcome of a return, minimum safe altitudes, and margins of glides, over time.
 
-    None if no returns were judged.
+    Return None if no returns were judged.
     """
     if not drawn.returns.each:
         return None
     scenario, limit = setup.scenario, drawn.returns.limit
     time, positions = _path_positions(drawn, track)
-    ground, least_altitudes = terrain_altitudes(scenario, positions), drawn.min_safe_altitudes
-    altitudes = np.concatenate([positions[:, 2], least_altitudes.altitude, np.zeros(0) if ground is None else ground])
+    ground, safe_altitudes = terrain_altitudes(scenario, positions), drawn.min_safe_altitudes
+    altitudes = np.concatenate([positions[:, 2], safe_altitudes.altitude, np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
     margin = 0.06 * max(max_altitude - min_altitude, _MIN_SPAN)
     span = (min_altitude - margin, max_altitude + margin)
-    name = f"lowest height for a safe return (no line: none up to {least_altitudes.search_range:.0f} m more)"
+    name = f"lowest height for a safe return (no line: none up to {safe_altitudes.search_range:.0f} m more)"
     layers = [
         *ground_bands(scenario, PathPlane(time, positions, ground, *span)),
         *path_layers(
@@ -186,7 +186,7 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
             lambda ret: (ret.time, ret.start[2]),
             lambda ret: outcome_text(ret, limit),
         ),
-        Layer("line", name, "limit", least_altitudes.time, least_altitudes.altitude),
+        Layer("line", name, "limit", safe_altitudes.time, safe_altitudes.altitude),
     ]
     panels = [Panel("height", "m AMSL", tuple(layers), span=span)]
     if drawn.glides.each:
