@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import complete_aircraft, files, with_completer
+from planfly.terminal.arguments import complete_aircraft, file_completer, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call_api, result_options
@@ -37,9 +37,9 @@ _INTERVAL_SIGMAS = 1.96
 _WIND_MPS = 10.0
 
 
-def aircraft_options(line: LineParser) -> None:
+def aircraft_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly aircraft``."""
-    parser = line.command(
+    parser = command_line.command(
         "aircraft",
         "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list the aircraft",
         "planfly aircraft aerosonde --out aerosonde",
@@ -70,7 +70,7 @@ def aircraft_options(line: LineParser) -> None:
             nargs="+",
             help=".BIN or .tlog of ArduPlane, .ulg of PX4, or a table of columns; needs planfly[identification]",
         ),
-        files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
+        file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     with_completer(
         log_group.add_argument(
@@ -82,7 +82,7 @@ def aircraft_options(line: LineParser) -> None:
     )
     with_completer(
         log_group.add_argument("--check", metavar="LOG", help="with --identify: another log to predict"),
-        files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
+        file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     result_options(
         parser,
