@@ -384,8 +384,8 @@ def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | N
 
 def _recorded_loss(recovery: bytes) -> str:
     """Return the loss that the log's recovery note states."""
-    lost = _parse_object(recovery).get("lost")
-    return lost if isinstance(lost, str) and lost else "the extent of the loss is unknown"
+    loss = _parse_object(recovery).get("lost")
+    return loss if isinstance(loss, str) and loss else "the extent of the loss is unknown"
 
 
 def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
@@ -406,7 +406,7 @@ def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | N
 
 def _parse_object(data: bytes) -> dict[str, Any]:
     try:
-        found = json.loads(data)
+        document = json.loads(data)
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return document if isinstance(document, dict) else {}

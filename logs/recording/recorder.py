@@ -219,7 +219,7 @@ class Recorder:
             self._skipped = None
         self._write_pending(None)
         end = max(self._last_ns, EPOCH_NS)
-        self._write_messages([*self._poses.whole(end)])
+        self._write_messages([*self._poses.whole_track_records(end)])
         if returns is not None:
             self._add_scene(RETURNS_TOPIC, scene.returns_scene(EPOCH_NS, returns, self._terrain))
         if reference is not None:

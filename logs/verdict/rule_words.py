@@ -23,13 +23,13 @@ from logs.verdict.headline_phrases import (
 class Margin:
     """The quantity whose distance to the limit is a rule's margin, and the scale that ranks flights by it.
 
-    of: name of the quantity that is compared with the limit.
+    quantity: name of the quantity that is compared with the limit.
     unit: unit of quantity, limit and margin.
     scale: a difference that a person would call noticeable, in that unit.  It ranks flights and marks a narrow pass,
     but decides no verdict.  None for a count, a time or a limit of geometry, which do not say how close a flight was.
     """
 
-    of: str
+    quantity: str
     unit: str
     scale: float | None = None
 

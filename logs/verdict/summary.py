@@ -10,7 +10,7 @@ from logs.verdict.findings import (
     APART_FROM_FLIGHT,
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
-    UNKNOWN_WAY,
+    UNKNOWN_PATH,
     Finding,
     undecided_findings,
 )
@@ -65,7 +65,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     paths = [
         f"{'the turn-around on' if finding.place.kind == 'leg' else 'the circle at'} {place_text(finding.place)}"
         for finding in open_findings
-        if finding.check == UNKNOWN_WAY
+        if finding.check == UNKNOWN_PATH
     ]
     path_text = (
         f"only a simulated flight shows how {' and '.join(paths[:_MAX_NAMED_FINDINGS])} is flown" if paths else ""

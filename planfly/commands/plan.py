@@ -104,7 +104,7 @@ def plan(args: argparse.Namespace) -> int:
     name = "plan.json" if args.old is None else "replan.json"
     out = f"{RUN_FOLDER}/{name}" if args.out is None else args.out
     evaluations, seconds = args.budget or (None, None)
-    with _stop_on_interrupt() as stop:
+    with _stop_on_interrupt() as should_stop:
         new_plan = call_api(
             planfly.plan if args.old is None else planfly.replan,
             args,
@@ -112,7 +112,7 @@ def plan(args: argparse.Namespace) -> int:
             seconds=seconds,
             out=out,
             overwrite=args.overwrite or args.out is None,
-            stop=stop,
+            stop=should_stop,
         )
     target = expand_path_pattern(out, new_plan.scenario.name, new_plan.seed)
     print_warnings(new_plan.scenario.notes)
@@ -136,7 +136,7 @@ def _plan_front(args: argparse.Namespace) -> int:
         allowed = "with `front` N: expected a number of seconds, as in 10s"
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
-    with _stop_on_interrupt() as stop:
+    with _stop_on_interrupt() as should_stop:
         front = call_api(
             planfly.plan_front,
             args,
@@ -144,7 +144,7 @@ def _plan_front(args: argparse.Namespace) -> int:
             seconds=seconds,
             out=out,
             overwrite=args.overwrite or args.out is None,
-            stop=stop,
+            stop=should_stop,
         )
     default_plan = front.default.plan
     folder = expand_path_pattern(out, default_plan.scenario.name, default_plan.seed)

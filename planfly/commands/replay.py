@@ -113,9 +113,9 @@ def replay(args: argparse.Namespace) -> int:
     if not to_station:
         args.end = args.to
     if to_station or args.foxglove:
-        play = planfly.play_to_stations if to_station else planfly.play_to_foxglove
-        with watch_stop_signals() as stop:
-            call_api(play, args, log=log, stop=stop, on_message=print_and_flush)
+        play_log = planfly.play_to_stations if to_station else planfly.play_to_foxglove
+        with watch_stop_signals() as should_stop:
+            call_api(play_log, args, log=log, stop=should_stop, on_message=print_and_flush)
     elif args.movie:
         for file in call_api(planfly.movie, args, log=log, out=args.movie)[:3]:
             print(f"movie     {file}")

@@ -60,6 +60,6 @@ def serve_options(command_line: LineParser) -> None:
 
 def serve(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    with watch_stop_signals() as stop:
-        call_api(planfly.serve, args, stop=stop, on_message=print_and_flush)
+    with watch_stop_signals() as should_stop:
+        call_api(planfly.serve, args, stop=should_stop, on_message=print_and_flush)
     return FLYABLE

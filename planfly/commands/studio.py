@@ -81,6 +81,6 @@ def studio_options(command_line: LineParser) -> None:
 
 def studio(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    with watch_stop_signals() as stop:
-        call_api(planfly.open_studio, args, stop=stop, on_message=print_and_flush)
+    with watch_stop_signals() as should_stop:
+        call_api(planfly.open_studio, args, stop=should_stop, on_message=print_and_flush)
     return FLYABLE

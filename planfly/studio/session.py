@@ -15,7 +15,7 @@ from flight.mission.items import LANDINGS, Mission
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
-from planfly.studio.documents import Document, Saved, open_document, planned_mission, save_document
+from planfly.studio.documents import Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
@@ -81,9 +81,11 @@ class Session:
     undone_states: list[_OpenedState] = field(default_factory=list)
 
     @classmethod
-    def of(cls, document: Document, options: MissionOptions) -> "Session":
+    def from_document(cls, document: Document, options: MissionOptions) -> "Session":
         """Make a session of an opened document."""
-        context = EditContext.of(document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ()))
+        context = EditContext.from_setup(
+            document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ())
+        )
         judged = context.judge(document.setup.mission)
         history = History(document.setup.mission)
         named_path = None if document.path is None else document.path.resolve()
@@ -92,7 +94,7 @@ class Session:
     def open(self, document: Document) -> None:
         """Open another document; an undo before its first edit restores the previous document."""
         is_named_file = document.path is not None and document.path.resolve() == self.named_file
-        new_session = Session.of(document if is_named_file else replace(document, path=None), self.options)
+        new_session = Session.from_document(document if is_named_file else replace(document, path=None), self.options)
         self.earlier_states, self.undone_states = (
             [*self.earlier_states, self._opened_state()][-_MAX_EARLIER_DOCUMENTS:],
             [],
@@ -395,14 +397,14 @@ class Session:
             "settings": self.settings_json(),
         }
 
-    def save(self, form: str) -> Saved:
+    def save(self, form: str) -> SavedFile:
         """Return the mission as a file.  Raises PlanflyError if the format cannot store it."""
         saved = save_document(self.document, self.context, self.judged, form)
         if form != "kml":
             self.saved_mission = self.mission
         return saved
 
-    def save_over(self) -> Saved:
+    def save_over(self) -> SavedFile:
         """Overwrite the file that the command named.  Raises PlanflyError if there is none."""
         path = self.document.path
         if path is None or not self.document.kind:
@@ -463,5 +465,5 @@ class Session:
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:
     """Open a target of the command; also return True if an autosave was restored.  Raises PlanflyError."""
-    session = Session.of(open_document(target, options), options)
+    session = Session.from_document(open_document(target, options), options)
     return session, autosave_file is not None and session.restore(autosave_file)

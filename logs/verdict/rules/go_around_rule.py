@@ -22,7 +22,7 @@ from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
 from flight.mission.placing import home_place, landing_sequence, landing_starts
 from flight.mission.return_path import LandingStart
-from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Fact, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -172,7 +172,7 @@ def go_around_findings(
         "a go-around is not judged",
         ": this requires the simulated ArduPlane, a home, terrain data and a glide to the landing point",
     )
-    return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
+    return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_PATH)]
 
 
 def _find_landing(
@@ -267,7 +267,7 @@ def _go_around_finding(
     if worst is None or (unknown_text and worst.is_free):
         unknown_text = unknown_text or "its glide is below the ground, or the terrain below it is unknown"
         unjudged = message("a go-around is not judged", f": {climb_text}; {unknown_text}")
-        check = GROUND_WAY if is_required else ""
+        check = GROUND_PATH if is_required else ""
         return make_finding(
             "go_around", place, ok=None, reason=unjudged.text, faults=[unjudged], unit="m", check=check, facts=[climb]
         )

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.itinerary import loiter_of
-from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, finding_reason, make_finding, message
+from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, badness, finding_reason, make_finding, message
 from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
@@ -146,7 +146,7 @@ def end_findings(
             ok=None if descriptions else True,
             reason=reason,
             method="the area that its circles may reach, at the height of the last waypoint",
-            check=UNKNOWN_WAY if descriptions else "",
+            check=UNKNOWN_PATH if descriptions else "",
         )
     ]
 
@@ -213,7 +213,7 @@ def _loiter_finding(
         margin=circle.radius - min_radius,
         unit="m",
         method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
-        check=UNKNOWN_WAY if ok is None and open_text else "",
+        check=UNKNOWN_PATH if ok is None and open_text else "",
     )
 
 

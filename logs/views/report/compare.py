@@ -137,7 +137,7 @@ def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], f
             ("all radars", threats.detection_radius, threats.detection_scale),
         ):
             visits = path_spheres(position, time, threats.position, radii, scales)
-            values[f"time within reach, sum over {name}", "s"] = float(visits.inside.sum())
+            values[f"time within reach, sum over {name}", "s"] = float(visits.time_inside.sum())
             values[f"exposure, sum over {name}", "s"] = float(visits.exposure.sum())
     durations = np.append(np.diff(track.time), 0.0)
     for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
