@@ -231,7 +231,7 @@ class _MessageCollector:
             if end > len(data):
                 raise ValueError("a record reaches beyond its chunk")
             if opcode == 0:
-                raise ValueError("a record of no kind")
+                raise ValueError("a record without a type")
             if opcode == Opcode.MESSAGE:
                 position = self._add_message(data, position, start, end)
                 continue
@@ -376,9 +376,9 @@ def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | N
     data = _parse_object(attachments[RESULT_FILE])
     end_reason = data.get("ended")
     if not isinstance(end_reason, str):
-        return None, f"{RESULT_FILE} does not say how the flight ended"
+        return None, f"{RESULT_FILE} does not state how the flight ended"
     if data.get("rows") != row_count:
-        return end_reason, f"{row_count} of {data.get('rows')} rows are there"
+        return end_reason, f"the log contains {row_count} of {data.get('rows')} rows"
     return end_reason, ""
 
 

@@ -13,7 +13,7 @@ from world.arrays import Floats
 from world.geometry import segment_exposure
 from world.kernels import compiled
 
-_SEEN = "as guidance saw it"
+_GUIDANCE_SERIES = "according to guidance"
 # Window for power from battery energy, s: a shorter one would show the float32 steps of the energy.
 _POWER_WINDOW_S = 2.0
 
@@ -44,7 +44,7 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
         series("commanded", "commanded", time, track.speed_command),
         series("flown", "flown", time, track.airspeed),
     )
-    turn_limits = (("limit of planned turns; corrections may pass it", bank_limit), ("", -bank_limit))
+    turn_limits = (("limit of planned turns; corrections may bank beyond it", bank_limit), ("", -bank_limit))
 
     def one(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
         return Panel(title, unit, (series(name, "flown", time, values),), min_span=min_span)
@@ -55,8 +55,8 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
         one("climb rate", "m/s", doubles(climb), 1.0),
         one("load factor", "g", doubles(track.load_factor), 0.2),
         one("wind, with gusts", "m/s", np.hypot(east, north), 1.0),
-        one("cross-track, right +", "m", doubles(track.cross_track), 0.1, _SEEN),
-        one("height error, high +", "m", doubles(track.height_error), 0.1, _SEEN),
+        one("cross-track, right +", "m", doubles(track.cross_track), 0.1, _GUIDANCE_SERIES),
+        one("height error, high +", "m", doubles(track.height_error), 0.1, _GUIDANCE_SERIES),
     ]
     terrain = setup.scenario.terrain
     if terrain is not None:
@@ -85,7 +85,7 @@ def control_chart(setup: FlightSetup, track: Track) -> Chart:
         min_value, max_value = (0.0, 1.0) if name == "throttle" else (-limit, limit)
         layers = (
             series("commanded", "commanded", track.time, scale * doubles(command)),
-            series("as it stood", "flown", track.time, scale * doubles(position)),
+            series("actual", "flown", track.time, scale * doubles(position)),
         )
         has_limits = np.isfinite([min_value, max_value]).all()
         panel = Panel(
@@ -118,7 +118,7 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
     kinetic_height = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
     energy_heights = (
         series("height and speed", "second", time, height + kinetic_height),
-        series("height alone", "flown", time, height),
+        series("height only", "flown", time, height),
     )
     panels = [
         Panel(f"{store_name} used", unit, (filled_series("used", "difference", time, scale * used_energy),)),

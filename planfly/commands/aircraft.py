@@ -318,11 +318,11 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
         f" {_degrees(aircraft.max_rudder):.0f} deg either way; {braking}"
     )
     if envelope.source:
-        climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
+        climb_sd, descent_sd = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
         print(
-            f"  known    from {envelope.source}: climbs to {climb:.1f} deg, descents to {descent:.1f}, the fastest"
-            f" level flight to {envelope.fastest_sd:.1f} m/s, power to a factor of {math.exp(envelope.power_sd):.2f}"
-            " (one deviation)"
+            f"  accuracy from {envelope.source}: climb ± {climb_sd:.1f} deg, descent ± {descent_sd:.1f}, fastest level"
+            f" flight ± {envelope.fastest_sd:.1f} m/s, power within a factor of {math.exp(envelope.power_sd):.2f}"
+            " (one standard deviation)"
         )
 
 

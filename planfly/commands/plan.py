@@ -220,7 +220,10 @@ def _print_plan(plan: "Plan") -> None:
         reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
         print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")
     if plan.flown_legs:
-        print(f"  note    legs 0..{plan.flown_legs - 1} are flown and kept; judged is what follows them")
+        print(
+            f"  note    legs 0..{plan.flown_legs - 1} are already flown and unchanged;"
+            " only the legs after them are judged"
+        )
     for problem in plan.certificate.problems:
         print(f"  failed  {problem}")
     for obstacle in planfly.what_blocks(plan):

@@ -52,7 +52,7 @@ def replay_options(command_line: LineParser) -> None:
     )
     parser.alias_keyword("end", "--to")
     log_argument(parser)
-    part_group = parser.group("which part, how fast")
+    part_group = parser.group("part and speed")
     part_group.add_argument(
         "--from", dest="start", metavar="S", type=number_parser("start"), help="start at this time of the flight, s"
     )
@@ -71,7 +71,7 @@ def replay_options(command_line: LineParser) -> None:
         "otherwise at once)",
     )
     part_group.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
-    output_group = parser.group("other ways to see it")
+    output_group = parser.group("other outputs")
     output_group.add_argument(
         "--movie",
         metavar="FILE|DIR",

@@ -301,7 +301,7 @@ def _saved_plan(name: str, context: EditContext, judged: JudgedMission) -> Saved
     )
     if not new_plan.feasible:
         problem = (new_plan.certificate.problems or ("violations are counted",))[0]
-        losses.append(f"it is a plan that is not feasible: {problem}")
+        losses.append(f"the plan is not feasible: {problem}")
     return SavedFile(name, plan_json(new_plan).encode(), (*losses, *_lost_parameters(context)))
 
 

@@ -125,7 +125,7 @@ class Server:
                 await self._run_judging(lambda: self.session.autosave(self._autosave_file or Path()))
             except (OSError, PlanflyError) as error:
                 if not self._autosave_error:
-                    self._broadcast({"kind": "fault", "job": "keep", "text": f"edits are not being kept: {error}"})
+                    self._broadcast({"kind": "fault", "job": "keep", "text": f"edits are not being saved: {error}"})
                 self._autosave_error = str(error)
             else:
                 self._autosave_error = ""
@@ -375,7 +375,7 @@ class Server:
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
-            raise MissionError(f"{message.name[:60]}: it did not arrive completely", field="data") from error
+            raise MissionError(f"{message.name[:60]}: the file did not arrive completely", field="data") from error
         return open_dropped(message.name, data, self.session.options)
 
     def _read_parameter_file(self, name: str) -> messages.Settings:

@@ -459,7 +459,7 @@ class Session:
             self.unreadable.append(file)
             return False
         if autosave[0] is not self.history.first:
-            self._add_to_history(autosave[0], "what was done before the studio ended")
+            self._add_to_history(autosave[0], "the edits of the previous session")
         return True
 
 

@@ -94,7 +94,7 @@ def _reach_text(glide_range: GlideRange, glides: Glides) -> str:
             position_text = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
             return f"only flat ground, {position_text}, {spare:.0f} m left over{time_text}"
         case "nothing":
-            shortfall_text = "no path leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at most"
+            shortfall_text = "no glide path exists" if math.isinf(spare) else f"{-spare:.0f} m are missing at most"
             return f"nothing, {shortfall_text}"
         case "unknown":
             return "unknown, because it lies outside the elevation data"
@@ -108,7 +108,7 @@ def _own_return_text(glide: Glide) -> str:
         case "low":
             min_height = min(glide.own.arrival_height, glide.own.clearance)
             return (
-                f"; ArduPlane's own return comes down to {min_height:.0f} m above ground, below the required"
+                f"; ArduPlane's own return descends to {min_height:.0f} m above ground, below the required"
                 f" {MARGIN:.0f} m"
             )
         case "ground":

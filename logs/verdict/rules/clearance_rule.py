@@ -272,7 +272,7 @@ def _flown_clearance(
         terrain = requirements.setup.scenario.terrain
         reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)
     if is_planned_short:
-        reason += f"; the planned path comes down to {planned_height:.1f} m"
+        reason += f"; the planned path descends to {planned_height:.1f} m"
     return make_finding(
         "clearance",
         requirements.leg(leg),

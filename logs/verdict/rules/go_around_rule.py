@@ -499,7 +499,7 @@ def _outcome_text(worst: _GoAround) -> str:
     elif worst.is_lost:
         outcome = "does not return to the line-up"
     else:
-        outcome = f"comes down to {worst.lowest_height:.0f} m above ground on the way back"
+        outcome = f"descends to {worst.lowest_height:.0f} m above ground on the way back"
     return f"{abort_text}{turn_text} and {outcome}" if turn_text else f"{abort_text} {outcome}"
 
 

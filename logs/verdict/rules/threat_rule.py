@@ -128,8 +128,8 @@ def _no_entry_finding(
         if navigation_error > 0.0:
             facts.append(Fact("navigation error", navigation_error, "m"))
             reason += (
-                f", {nearest_distance - navigation_error:.1f} m less the {navigation_error:.1f} m that"
-                " navigation may be off"
+                f", or {nearest_distance - navigation_error:.1f} m after the navigation error of"
+                f" {navigation_error:.1f} m is subtracted"
             )
     return make_finding(
         "threat",

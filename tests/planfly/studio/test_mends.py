@@ -375,7 +375,7 @@ def test_a_full_disk_is_said_once(tmp_path: Path) -> None:
         return sent(page)
 
     (fault,) = asyncio.run(run())
-    assert "edits are not being kept: " in fault["text"]
+    assert "edits are not being saved: " in fault["text"]
 
 
 def test_a_page_that_missed_a_frame_is_closed() -> None:
