@@ -29,7 +29,7 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
     layers += path_layers(
         drawn.segments_by_reach, _LOOKS, lambda glide: glide.start[:2], lambda glide: _glide_text(glide, drawn)
     )
-    impacts = np.array([glide.own.impact for glide in glides.each if glide.own.end == "ground"])
+    impacts = np.array([glide.own_return.impact for glide in glides.each if glide.own_return.end == "ground"])
     if len(impacts):
         name = "where ArduPlane's own return comes down"
         layers.append(Layer("dots", name, "comes-down", impacts[:, 0], impacts[:, 1], quiet=True))
@@ -52,8 +52,8 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
 
 
 def _glide_text(glide: Glide, drawn: DrawnReturns) -> str:
-    spare_altitude = drawn.glides.altitude_left(glide)
-    left_text = f", {spare_altitude:.0f} m left over" if spare_altitude >= 0.0 else ""
+    altitude_left = drawn.glides.altitude_left(glide)
+    left_text = f", {altitude_left:.0f} m left over" if altitude_left >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 

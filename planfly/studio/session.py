@@ -171,9 +171,9 @@ class Session:
             self.earlier_states, self.undone_states = [*self.earlier_states, current_state], self.undone_states[:-1]
             return
         previous_position = self.history.position
-        done = self.history.undo() if kind == "undo" else self.history.redo()
+        has_moved = self.history.undo() if kind == "undo" else self.history.redo()
         try:
-            if done:
+            if has_moved:
                 self._judge_and_set(self.mission)
         except Exception:
             self.history.position = previous_position
@@ -193,14 +193,14 @@ class Session:
         """Replace the whole mission, or the items between two items, by a planned path.  Raises StaleEdit."""
         if message.rev != self.rev:
             raise StaleEdit
-        plans, between = self.plans
+        plans, item_range = self.plans
         if not 0 <= message.which < len(plans):
             raise PlanflyError("that path no longer exists: plan again", field="which")
         plan = plans[message.which]
-        if between is None:
+        if item_range is None:
             self._show_plan(plan)
             return
-        mission = self._replace_part(plan, *between)
+        mission = self._replace_part(plan, *item_range)
         self._judge_and_set(mission)
         self._add_to_history(mission, "plan a part")
 

@@ -91,7 +91,7 @@ class Glide:
     """Destinations in reach from one place.
 
     time: s of the flight.  start: (3,) m.
-    own: outcome of ArduPlane's return.
+    own_return: outcome of ArduPlane's return.
     altitudes_left: for each of `Glides.sites`, the altitude left on arrival, m; negative if the altitude is too low,
         -inf without a path.
     flat_altitude_left: the same for flat ground.
@@ -101,7 +101,7 @@ class Glide:
 
     time: float
     start: tuple[float, float, float]
-    own: EngineOutReturn
+    own_return: EngineOutReturn
     altitudes_left: tuple[float, ...]
     flat_altitude_left: float
     flat_position: tuple[float, float, float]
@@ -151,7 +151,7 @@ class Glides:
     @property
     def arrivals(self) -> int:
         """Number of ArduPlane's own returns that arrive."""
-        return sum(glide.own.end == "arrives" for glide in self.each)
+        return sum(glide.own_return.end == "arrives" for glide in self.each)
 
     @property
     def always_reaches_ground(self) -> bool | None:
@@ -170,7 +170,9 @@ class Glides:
     def ranges(self) -> tuple[GlideRange, ...]:
         """All glides in time ranges, by time."""
         ranges = []
-        for (site, *_), group in groupby(self.each, lambda glide: (self.best_site(glide), glide.reach, glide.own.end)):
+        for (site, *_), group in groupby(
+            self.each, lambda glide: (self.best_site(glide), glide.reach, glide.own_return.end)
+        ):
             group_glides = list(group)
             ranges.append(
                 GlideRange(
