@@ -224,7 +224,8 @@ def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
         change_lines.append(
             (
                 relative_change,
-                f"closest to its limit: {RULE_WORDS[rule].word} {old_result.text} \u2192 {result.text} ({place_description})",
+                f"closest to its limit: {RULE_WORDS[rule].word} {old_result.text} \u2192 {result.text}"
+                f" ({place_description})",
             )
         )
     return failure_lines[:_MAX_VALUE_CHANGES] + [
