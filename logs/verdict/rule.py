@@ -71,8 +71,9 @@ class Rule:
     judge: planned path and flown track.  judge_items, judge_end, judge_imported_end, merge: see their types.
     An imported flight is judged by `judge`, stretch by stretch, as far as the log meets ``log``.
     suggest: suggests changes that make a failed finding pass.
-    whole: True if it judges the flight as a whole, not a leg, a corner, a threat or a zone.
-    of_route: True if it gives the same result for a flight as for its planned path, so that it runs once for both.
+    judges_whole_flight: True if it judges the flight as a whole, not a leg, a corner, a threat or a zone.
+    is_same_for_plan: True if it gives the same result for a flight as for its planned path, so that it runs once for
+        both.
     """
 
     name: str
@@ -84,5 +85,5 @@ class Rule:
     merge: Merge | None = None
     suggest: Suggest | None = None
     log: LogNeeds = LogNeeds()
-    whole: bool = False
-    of_route: bool = False
+    judges_whole_flight: bool = False
+    is_same_for_plan: bool = False

@@ -27,12 +27,12 @@ BLOCKS = 600
 class Layer:
     """One graphical layer of a panel.
 
-    kind: "band" is filled from `low` up to `y`, "area" is the inside of closed outlines, "dashes" are short horizontal
-    strokes, "rings" mark failures.
+    kind: "band" is filled from `lower_edge` up to `y`, "area" is the inside of closed outlines, "dashes" are short
+        horizontal strokes, "rings" mark failures.
     name: name in legend and read-out; "" leaves the layer out of both.
     role: meaning of the layer; `logs.theme` assigns its look.
     x, y: (n,) in the panel's units; NaN separates parts of a line or an outline.
-    low: (n,) lower edge of a band.
+    lower_edge: (n,) lower edge of a band.
     dashed: True for the second of two lines of one role.
     quiet: True for a layer in the legend but not in the read-out of the page.
     legend: common legend text of several layers; "" for the name.
@@ -45,7 +45,7 @@ class Layer:
     role: str
     x: Floats
     y: Floats
-    low: Floats | None = None
+    lower_edge: Floats | None = None
     dashed: bool = False
     quiet: bool = False
     legend: str = ""
@@ -110,7 +110,7 @@ class Panel:
             return self.span
         values = [value for _, value in self.limits if math.isfinite(value)]
         for layer in self.layers:
-            for edge in (layer.y, layer.low):
+            for edge in (layer.y, layer.lower_edge):
                 finite = edge[np.isfinite(edge)] if edge is not None else np.zeros(0)
                 values += [float(finite.min()), float(finite.max())] if finite.size else []
         min_value, max_value = (min(values), max(values)) if values else (0.0, 1.0)
@@ -125,12 +125,12 @@ class Chart:
 
     title: title of a picture; a page has its own headings.
     along, unit: quantity and unit of a shared horizontal axis.
-    reach: range of that axis; None for the range that the layers need.
+    axis_range: range of that axis; None for the range that the layers need.
     shared: True if the panels share the horizontal axis: they are zoomed and read out together.
     marks: starts of legs, as value along the axis and text.
     timed: True if the horizontal axis is the time of flight, so that a click on it can move the aircraft there.
-    tall: height of a panel on a page, pixels.
-    inches: height of a panel in print, inches.
+    page_height: height of a panel on a page, pixels.
+    print_height: height of a panel in print, inches.
     widths: widths of panels side by side in print, as fractions of its width; empty for stacked panels.
     legend: position in print: right of each panel (once above all if the panels share it), or below all.
     scaled: True if print states the factor by which heights are stretched against distances.
@@ -140,12 +140,12 @@ class Chart:
     along: str
     unit: str
     panels: tuple[Panel, ...]
-    reach: tuple[float, float] | None = None
+    axis_range: tuple[float, float] | None = None
     shared: bool = True
     marks: tuple[tuple[float, str], ...] = ()
     timed: bool = False
-    tall: int = 120
-    inches: float = 1.12
+    page_height: int = 120
+    print_height: float = 1.12
     widths: tuple[float, ...] = ()
     legend: Literal["beside", "below"] = "beside"
     scaled: bool = False
@@ -154,10 +154,10 @@ class Chart:
         """Return the panels that have a value, or the first panel if none has any."""
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
-    def shown_reach(self) -> tuple[float, float]:
-        """`reach`, or from the first to the last value along the axis."""
-        if self.reach is not None:
-            return self.reach
+    def shown_axis_range(self) -> tuple[float, float]:
+        """`axis_range`, or from the first to the last value along the axis."""
+        if self.axis_range is not None:
+            return self.axis_range
         finite = [layer.x[np.isfinite(layer.x)] for panel in self.panels for layer in panel.layers]
         values = np.concatenate([*finite, np.zeros(0)])
         return (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -281,7 +281,7 @@ def chart_json(chart: Chart) -> Json:
         "unit": chart.unit,
         "shared": chart.shared,
         "timed": chart.timed,
-        "tall": chart.tall,
+        "tall": chart.page_height,
         "marks": [[round(value, 3), text] for value, text in chart.marks],
         "panels": [panel_json(panel) for panel in chart.shown_panels()],
     }
@@ -306,8 +306,8 @@ def _layer_json(layer: Layer) -> Json:
     document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
     if layer.flight is None:
         document |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
-    if layer.low is not None:
-        document["low"] = numbers(layer.low, telling_digits(layer.low))
+    if layer.lower_edge is not None:
+        document["low"] = numbers(layer.lower_edge, telling_digits(layer.lower_edge))
     optional_keys: Json = {
         "dashed": layer.dashed,
         "quiet": layer.quiet,

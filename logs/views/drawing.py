@@ -208,14 +208,14 @@ def draw_chart(chart: Chart) -> Figure:
     legend_height = _legend_height(entries, columns)
     rows = 1 if chart.widths else len(panels)
     gap = _GAP if chart.shared else _OWN_AXIS_GAP
-    total = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.inches + max(0, rows - 1) * gap
+    total = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.print_height + max(0, rows - 1) * gap
     with clean_style():
         figure = new_figure(total)
         for k, panel in enumerate(panels):
             row = 0 if chart.widths else k
-            base = _BOTTOM + legend_height + (rows - 1 - row) * (chart.inches + gap)
+            base = _BOTTOM + legend_height + (rows - 1 - row) * (chart.print_height + gap)
             left, width = _panel_extent(chart, k, right_margin)
-            axes = figure.add_axes((left, base / total, width, chart.inches / total))
+            axes = figure.add_axes((left, base / total, width, chart.print_height / total))
             _draw_panel(axes, chart, panel, has_leg_numbers=k == 0)
             if chart.legend == "beside" and not has_shared_legend:
                 _add_legend_beside(axes)
@@ -280,7 +280,7 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
 
 
 def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool) -> None:
-    min_x, max_x = chart.shown_reach()
+    min_x, max_x = chart.shown_axis_range()
     if chart.shared:
         axes.set_xlim(min_x, max(max_x, min_x + 1e-3))
         axes.xaxis.set_major_locator(MultipleLocator(nice_step(float(np.ptp(axes.get_xlim())), 14)))
@@ -300,7 +300,7 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
             "fontsize": 7,
         }
         axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **text_options)
-    axes.set_ylabel(panel.label if chart.inches > 2.0 else "\n".join(_title_lines(panel)))
+    axes.set_ylabel(panel.label if chart.print_height > 2.0 else "\n".join(_title_lines(panel)))
     axes.yaxis.set_label_coords(-_LABEL / (WIDTH * axes.get_position().width), 0.5)
     axes.grid(visible=True, axis="both" if chart.shared else "y")
     axes.set_axisbelow(True)
@@ -408,7 +408,7 @@ def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 
 def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
-    lower_edge = layer.low if layer.low is not None else np.zeros(len(layer.y))
+    lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
     is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))
     polygons = [

@@ -102,5 +102,5 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
     )
     aircraft_name = shorten(setup.aircraft, 20)
     title = f"{shorten(setup.scenario.name, 60)}: the {aircraft_name}'s envelope and this flight"
-    layout: dict[str, Any] = {"tall": 260, "inches": 3.08, "widths": (0.6, 0.4), "legend": "below"}
-    return Chart(title, "true airspeed", "m/s", panels, reach=speed_range, **layout)
+    layout: dict[str, Any] = {"page_height": 260, "print_height": 3.08, "widths": (0.6, 0.4), "legend": "below"}
+    return Chart(title, "true airspeed", "m/s", panels, axis_range=speed_range, **layout)

@@ -49,7 +49,7 @@ class Subject:
     returns: DrawnReturns | None = None
 
     @property
-    def things(self) -> str:
+    def contents_text(self) -> str:
         """Text that lists ground, threats and paths."""
         legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
         ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
@@ -66,7 +66,7 @@ class FigureEntry:
 
     name: name of its section in the page and of its file.
     title: its heading.
-    view: function that builds its description; None if there is nothing to draw.
+    make_view: function that builds its description; None if there is nothing to draw.
     alternative: text for readers who cannot see it.
     caption: explanation of the figure.
     still: True if the page embeds the figure as a picture too, for readers without scripts.
@@ -74,7 +74,7 @@ class FigureEntry:
 
     name: str
     title: str
-    view: Callable[[Subject], View | None]
+    make_view: Callable[[Subject], View | None]
     alternative: Callable[[Subject], str]
     caption: Callable[[Subject], str]
     still: bool = False
@@ -151,7 +151,7 @@ FIGURES = (
         "map",
         "Map",
         _make_map,
-        alternative=lambda subject: f"Map, north up: {subject.things}",
+        alternative=lambda subject: f"Map, north up: {subject.contents_text}",
         caption=_map_caption,
         still=True,
     ),
@@ -178,7 +178,7 @@ FIGURES = (
         "scene",
         "3-D view",
         _make_scene,
-        alternative=lambda subject: f"View from the side: {subject.things}",
+        alternative=lambda subject: f"View from the side: {subject.contents_text}",
         caption=_fixed_caption(
             "Domes are the missiles' reach, dashed domes the radars' reach; thin poles join the "
             "ground and the waypoints. Parts behind a ridge are faint."
@@ -324,7 +324,7 @@ FIGURES = (
 )
 
 
-def subject_of(
+def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
     """Return the data for figures; a track without rows is left out."""
@@ -339,10 +339,10 @@ def figure_views(subject: Subject) -> dict[str, View]:
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry
     >>> setup = example_log().setup
-    >>> list(figure_views(subject_of(setup, None, judge_geometry(setup))))
+    >>> list(figure_views(make_subject(setup, None, judge_geometry(setup))))
     ['map', 'profile', 'scene', 'turns', 'envelope']
     """
-    views = ((entry.name, entry.view(subject)) for entry in FIGURES)
+    views = ((entry.name, entry.make_view(subject)) for entry in FIGURES)
     return {name: view for name, view in views if view is not None}
 
 
@@ -366,7 +366,7 @@ def view_json(view: View) -> dict[str, Any]:
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
     """Draw all figures by name; figures without data are left out."""
-    return {name: draw(view) for name, view in figure_views(subject_of(setup, track, verdict)).items()}
+    return {name: draw(view) for name, view in figure_views(make_subject(setup, track, verdict)).items()}
 
 
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:

@@ -109,7 +109,7 @@ def front_chart(front: Front) -> Chart:
         "length",
         "km",
         tuple(panels),
-        reach=length_range,
-        tall=220,
-        inches=1.9,
+        axis_range=length_range,
+        page_height=220,
+        print_height=1.9,
     )

@@ -121,14 +121,14 @@ def _make_chart(
         f"distance along {path}",
         "km",
         (panel,),
-        reach=(0.0, max(float(waypoint_distances[-1]), 1.0) / 1000.0),
+        axis_range=(0.0, max(float(waypoint_distances[-1]), 1.0) / 1000.0),
         # The leg to a loiter includes the loiter.
         marks=tuple(
             (float(waypoint_distances[end]) / 1000.0, f"leg {n}")
             for n, end in enumerate(_leg_start_waypoints(stop_starts, len(waypoint_distances)))
         ),
-        tall=420,
-        inches=4.05,
+        page_height=420,
+        print_height=4.05,
         legend="below",
         scaled=True,
     )
@@ -208,7 +208,7 @@ def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
                 "band", f"required clearance, {min_clearance:g} m", "clearance", along, ground + min_clearance, ground
             )
         )
-    layers.append(Layer("band", "terrain", "terrain", along, ground, np.full(len(ground), plane.low)))
+    layers.append(Layer("band", "terrain", "terrain", along, ground, np.full(len(ground), plane.min_altitude)))
     if max_height is not None:
         name = f"greatest height, {max_height:g} m above ground"
         layers.append(Layer("line", name, "limit", along, ground + max_height))
@@ -228,7 +228,7 @@ def _flown_layers(
         return [line], {}
     ground = terrain_altitudes(scenario, track.position)
     layers, label_positions = entered_cuts(
-        scenario.threats, failed, PathPlane(progress, track.position, ground, plane.low, plane.high)
+        scenario.threats, failed, PathPlane(progress, track.position, ground, plane.min_altitude, plane.max_altitude)
     )
     altitudes_inside = np.where(inside_threats(failed, scenario.threats, track), heights, np.nan)
     return [

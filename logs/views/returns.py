@@ -125,8 +125,8 @@ def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None
         "distance since it turned back",
         "km",
         panels,
-        tall=240,
-        inches=2.3,
+        page_height=240,
+        print_height=2.3,
         legend="below",
         scaled=True,
     )
@@ -197,8 +197,8 @@ def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track |
         "s",
         tuple(panels),
         timed=True,
-        tall=300,
-        inches=2.8,
+        page_height=300,
+        print_height=2.8,
         legend="below",
     )
 

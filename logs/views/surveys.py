@@ -39,8 +39,8 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
         "along the first line",
         "m",
         tuple(panels),
-        tall=360,
-        inches=4.6,
+        page_height=360,
+        print_height=4.6,
         legend="below",
     )
 

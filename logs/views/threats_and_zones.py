@@ -149,19 +149,19 @@ class PathPlane:
     """Vertical plane through a path, for its profile.
 
     kilometres: (s,) along the path.  points: (s, 3) m.  ground: (s,) m AMSL under the points, or None if unknown.
-    low, high: altitude range of the profile, m AMSL.
+    min_altitude, max_altitude: altitude range of the profile, m AMSL.
     """
 
     kilometres: Floats
     points: Floats
     ground: Floats | None
-    low: float
-    high: float
+    min_altitude: float
+    max_altitude: float
 
-    def visible_low(self) -> Floats:
+    def min_visible_altitudes(self) -> Floats:
         """Return the lowest visible altitude at each sample, (s,) m AMSL: the ground, if it is in the picture."""
-        base = np.full(len(self.points), self.low)
-        return base if self.ground is None else np.fmax(self.ground, self.low)
+        base = np.full(len(self.points), self.min_altitude)
+        return base if self.ground is None else np.fmax(self.ground, self.min_altitude)
 
 
 def threat_cuts(
@@ -187,7 +187,7 @@ def threat_cuts(
             rows = slice(max(0, int(rows_inside[0]) - 1), int(rows_inside[-1]) + 2)
             name, legend = f"{threats.names[k][:40]} ({kind})", f"{kind}'s sphere over the path"
             layers.append(Layer("band", name, kind, plane.kilometres[rows], upper[rows], lower[rows], legend=legend))
-            anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
+            anchor = outline_anchor(plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude)
             if anchor is not None and k not in labelled_elsewhere:
                 role = "radar" if kind == "radar" else "ink"
                 labels[int(k)] = Label(shorten(threats.names[k], 20), anchor[0], anchor[1], "name", role, anchor[2])
@@ -206,7 +206,7 @@ def entered_cuts(
             continue
         legend = "threat that is entered"
         layers.append(Layer("band", legend, "entered", plane.kilometres, upper, lower, quiet=True))
-        anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
+        anchor = outline_anchor(plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude)
         if anchor is not None:
             label_positions[k] = anchor[:2]
     return layers, label_positions
@@ -282,7 +282,7 @@ class ZoneCut:
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
     """Return the sections of zones in the plane, without zones away from the path."""
-    min_altitude, max_altitude, points = plane.low, plane.high, plane.points
+    min_altitude, max_altitude, points = plane.min_altitude, plane.max_altitude, plane.points
     terrain = np.full(len(points), min_altitude)
     if plane.ground is not None:
         terrain = np.where(np.isfinite(plane.ground), plane.ground, min_altitude)

@@ -64,7 +64,7 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
         if (values := place_values(verdict.findings, rule))
     )
     title = f"{shorten(name, 60)}: turn by turn, leg by leg"
-    return Chart(title, "", "", panels, shared=False, tall=170, inches=1.55, legend="below")
+    return Chart(title, "", "", panels, shared=False, page_height=170, print_height=1.55, legend="below")
 
 
 def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:

@@ -91,7 +91,10 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
     Raises PlanflyError.
     """
     suffix = Path(name).suffix.lower()
-    shown_name = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
+    shown_name = (
+        "".join(character if character.isprintable() and character not in "/\\" else "_" for character in name)[-60:]
+        or "dropped"
+    )
     if suffix not in DROPPED:
         raise MissionError.at(shown_name, "suffix", suffix, f"allowed {', '.join(DROPPED)}", shown=repr(suffix))
     if suffix == ".json":

@@ -37,7 +37,7 @@ from planfly.studio.view_model import Json
 from world.errors import MissionError, PlanflyError
 from world.files import read_small_file, utf8_text
 
-Given = TypeVar("Given")
+Result = TypeVar("Result")
 
 # Maximum number of pages.
 MAX_PAGES = 4
@@ -137,7 +137,7 @@ class Server:
         self._judge_thread.shutdown(wait=False, cancel_futures=True)
         self._draw_thread.shutdown(wait=False, cancel_futures=True)
 
-    async def _run_judging(self, function: Callable[[], Given]) -> Given:
+    async def _run_judging(self, function: Callable[[], Result]) -> Result:
         return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
     def _pack_work(self, work: Work | None) -> bytes:
@@ -156,13 +156,13 @@ class Server:
         self._pages.add(page)
         self.first_page_served.set()
         tasks = [asyncio.create_task(self._write_frames(page)), asyncio.create_task(self._judge_drags(page))]
-        messages_task, full_task = (
+        messages_task, overflow_task = (
             asyncio.create_task(self._handle_messages(page)),
             asyncio.create_task(page.has_overflowed.wait()),
         )
         try:
-            await asyncio.wait((messages_task, full_task), return_when=asyncio.FIRST_COMPLETED)
-            if full_task.done():
+            await asyncio.wait((messages_task, overflow_task), return_when=asyncio.FIRST_COMPLETED)
+            if overflow_task.done():
                 with contextlib.suppress(RuntimeError, WebSocketDisconnect, asyncio.TimeoutError):
                     await asyncio.wait_for(socket.close(TOO_SLOW), TOKEN_TIMEOUT_S)
             else:
@@ -174,9 +174,9 @@ class Server:
                 await socket.close(NOT_UNDERSTOOD)
         finally:
             self._pages.discard(page)
-            for task in (*tasks, messages_task, full_task):
+            for task in (*tasks, messages_task, overflow_task):
                 task.cancel()
-            await asyncio.gather(*tasks, messages_task, full_task, return_exceptions=True)
+            await asyncio.gather(*tasks, messages_task, overflow_task, return_exceptions=True)
 
     async def _handle_messages(self, page: Page) -> None:
         await self._send_initial_messages(page)

@@ -275,14 +275,14 @@ class FlownGround:
     """Ground phases of a flight: its take-off and its landing.
 
     procedures: the planned ground phases.
-    whole: requirements of the whole route, with take-off and landing.
+    whole_route: requirements of the whole route, with take-off and landing.
     track: track of the whole flight.
     takeoff_end_row: row of the track at which the take-off ended; 0 without a take-off.
     landing_start_row: row of the track at which the landing began; the last row without a landing.
     """
 
     procedures: GroundWays
-    whole: "RouteRequirements"
+    whole_route: "RouteRequirements"
     track: Track
     takeoff_end_row: int
     landing_start_row: int

@@ -154,7 +154,7 @@ def go_around_findings(
     A go-around that is too low is a warning.  If the scenario requires go-arounds, it fails, and an unjudged go-around
     leaves the verdict undecided.
     """
-    requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole
+    requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
     setup = requirements.setup
     returns, terrain, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
     is_required = returns is not None and "go_around" in returns.require
@@ -513,5 +513,5 @@ RULE = Rule(
         "MIN_LEG_LENGTH_M",
     ),
     judge=go_around_findings,
-    of_route=True,
+    is_same_for_plan=True,
 )

@@ -160,7 +160,7 @@ RULE = Rule(
     name="stall",
     tolerances=("STALL_AVERAGING_TIME_S", "STALL_TOLERANCE_MPS", "GUST_SPEED_FRACTION"),
     judge=stall_findings,
-    whole=True,
+    judges_whole_flight=True,
     suggest=suggest_flying_faster,
     log=LogNeeds(("airspeed", "attitude"), aircraft=True, listed=True),
 )

@@ -74,7 +74,7 @@ def touchdown_findings(
             else _planned_findings(requirements.waypoint(planned_approach.leg + 1), planned_approach)
         )
     approach = ground_phases.procedures.approach
-    place = ground_phases.whole.waypoint(approach.leg + 1)
+    place = ground_phases.whole_route.waypoint(approach.leg + 1)
     track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
     if ground_phases.landing_start_row >= len(ground_phases.track) - 1:
         reason = "the flight did not reach its landing"

@@ -28,7 +28,7 @@ from logs.verdict.verdict import Verdict
 from logs.views import figures
 from logs.views.charts import Chart
 from logs.views.failures import failures
-from logs.views.figures import FIGURES, Subject, View, figure_views, subject_of, view_json
+from logs.views.figures import FIGURES, Subject, View, figure_views, make_subject, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
 from logs.views.report.text import (
@@ -243,7 +243,7 @@ def write_report(
     ['map.png', 'profile.png', 'report.html']
     """
     track = None if track is None or not len(track) else with_legs(track, verdict.leg_ends)
-    subject = subject_of(setup, track, verdict, returns)
+    subject = make_subject(setup, track, verdict, returns)
     views = figure_views(subject)
     drawn = {entry.name for entry in FIGURES if every_picture or entry.still}
     pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn}, svg=svg)
