@@ -204,7 +204,7 @@ def make_finding(
     """Make a finding with numbers rounded to 1e-6, and None for non-finite numbers.
 
     faults: faults with which the reason begins.
-    facts: further measured numbers; non-finite numbers are left out.
+    facts: further measured numbers; non-finite numbers are omitted.
     at_least: True if values of at least the limit pass.
     A finding that fails by other evidence while its number is within the limit and its tolerance has no margin: the
     reason says what failed.

@@ -57,7 +57,7 @@ class Layer:
 class Label:
     """A text at a position of a panel, moved away from other labels.
 
-    A "name" without free space is left out.
+    A "name" without free space is omitted.
 
     rank: "fail" is framed, "end" and "number" are bold; the page writes these two and shows the others on hover.
     prefer: direction tried first; (0, 0) centers the text on the position.
@@ -211,7 +211,7 @@ def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...
 def outline_rows(values: ArrayLike, count: int) -> Indices:
     """Return the rows of the lowest and highest value of each of `count` blocks, to keep the outline of a long series.
 
-    values: (t,); NaN rows are left out unless a block has no other rows.  All rows of a short series are returned.
+    values: (t,); NaN rows are omitted unless a block has no other rows.  All rows of a short series are returned.
     """
     column = np.asarray(values, dtype=np.float64)
     if column.size <= 2 * count:
@@ -288,7 +288,7 @@ def chart_json(chart: Chart) -> Json:
 
 
 def panel_json(panel: Panel) -> Json:
-    """Return a panel as JSON data; layers without a value and NaN limits are left out."""
+    """Return a panel as JSON data; layers without a value and NaN limits are omitted."""
     labels = [label for label in panel.labels if label.rank in ("end", "number")]
     return {
         "title": panel.title,

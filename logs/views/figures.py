@@ -114,7 +114,7 @@ RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], Vi
 
 
 def return_views(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> dict[str, View]:
-    """Build the descriptions of figures on returns, by name; figures without data are left out."""
+    """Build the descriptions of figures on returns, by name; figures without data are omitted."""
     setup = with_fence_zones(setup)
     views = ((name, make_view(setup, drawn, track)) for name, make_view in RETURN_FIGURES.items())
     return {name: view for name, view in views if view is not None and drawn.returns.each}
@@ -327,14 +327,14 @@ FIGURES = (
 def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
-    """Return the data for figures; a track without rows is left out."""
+    """Return the data for figures; a track without rows is omitted."""
     return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict, returns)
 
 
 def figure_views(subject: Subject) -> dict[str, View]:
     """Build the descriptions of all figures of a flight or of a plan, by name.
 
-    Figures without data are left out.
+    Figures without data are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry
@@ -365,7 +365,7 @@ def view_json(view: View) -> dict[str, Any]:
 
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
-    """Draw all figures by name; figures without data are left out."""
+    """Draw all figures by name; figures without data are omitted."""
     return {name: draw(view) for name, view in figure_views(make_subject(setup, track, verdict)).items()}
 
 

@@ -13,7 +13,7 @@ from world.arrays import Floats
 
 # Margin of a panel above and below its values, as a fraction of their span.
 _MARGIN = 0.12
-# A limit above the largest value times this ratio is left out.
+# A limit above the largest value times this ratio is omitted.
 _MAX_LIMIT_RATIO = 4.0
 # Rule, kind of place, title and unit.
 PLACE_PANELS = (

@@ -71,7 +71,7 @@ def touchdown_findings(
         return (
             []
             if planned_approach is None
-            else _planned_findings(requirements.waypoint(planned_approach.leg + 1), planned_approach)
+            else _short_strip_findings(requirements.waypoint(planned_approach.leg + 1), planned_approach)
         )
     approach = ground_phases.procedures.approach
     place = ground_phases.whole_route.waypoint(approach.leg + 1)
@@ -99,7 +99,7 @@ def touchdown_findings(
     return [_landing_finding(place, approach, landing, faults, has_gusts=has_gusts)]
 
 
-def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
+def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
     """Before a flight, return a finding if the strip is too short to judge the touch-down."""
     messages = _short_strip_messages(approach)
     reason = finding_reason(messages)

@@ -131,7 +131,7 @@ class _Topic(NamedTuple):
 
 
 def px4_log_bytes(log: FlightLog) -> bytes:
-    r"""Return the bytes of the `.ulg`; rows without a position are left out.
+    r"""Return the bytes of the `.ulg`; rows without a position are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> px4_log_bytes(example_log())[:7]

@@ -287,7 +287,7 @@ _PICTURES = {
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
     """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, created if missing.
 
-    svg: True to write the pictures as SVG, too.  The map is left out if the map origins of the flights differ.
+    svg: True to write the pictures as SVG, too.  The map is omitted if the map origins of the flights differ.
     Returns the paths written.  Raises OSError.
 
     >>> import tempfile

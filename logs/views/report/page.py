@@ -324,7 +324,7 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Return the charts that the scripts draw, by name of the figure; charts without panels are left out."""
+    """Return the charts that the scripts draw, by name of the figure; charts without panels are omitted."""
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 

@@ -284,7 +284,7 @@ def _sentence(finding: Finding) -> str:
 
 
 def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
-    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is left out."""
+    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is omitted."""
     return [_rule_row(rule) for rule in findings_by_rule(findings)]
 
 
