@@ -318,11 +318,11 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
     ]
 
 
-def _agreement_text(other: LevelAnswer) -> str:
+def _agreement_text(other_level: LevelAnswer) -> str:
     """Describe where the verdict and another level agree or differ."""
-    disagreements = other.disagreements
+    disagreements = other_level.disagreements
     if not disagreements:
-        is_geometry = other.name == "geometry"
+        is_geometry = other_level.name == "geometry"
         return "flight and geometry agree on every finding that both have" if is_geometry else "both flights agree"
     rest_text = (
         f", +{len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""

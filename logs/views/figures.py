@@ -113,11 +113,11 @@ RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], Vi
 }
 
 
-def return_views(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> dict[str, View]:
+def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> dict[str, View]:
     """Build the descriptions of figures on returns, by name; figures without data are omitted."""
     setup = with_fence_zones(setup)
-    views = ((name, make_view(setup, drawn, track)) for name, make_view in RETURN_FIGURES.items())
-    return {name: view for name, view in views if view is not None and drawn.returns.each}
+    views = ((name, make_view(setup, drawn_returns, track)) for name, make_view in RETURN_FIGURES.items())
+    return {name: view for name, view in views if view is not None and drawn_returns.returns.each}
 
 
 def _returns_view(name: str) -> Callable[[Subject], View | None]:

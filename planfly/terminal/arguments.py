@@ -55,9 +55,9 @@ def parse_camera(text: str) -> tuple[float, ...]:
     >>> parse_camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
     """
-    sensor, *others = text.split(",")
+    sensor, *other_parts = text.split(",")
     try:
-        numbers = tuple(float(part) for part in (*sensor.lower().split("x"), *others))
+        numbers = tuple(float(part) for part in (*sensor.lower().split("x"), *other_parts))
     except ValueError:
         numbers = ()
     if not is_camera(numbers) or sensor.lower().count("x") != 1:

@@ -144,10 +144,10 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
     min_square = 0.0
     max_square = 0.0
     for axis in range(3):
-        below, above = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
-        outside = max(0.0, below, above)
-        min_square += outside * outside
-        max_offset = max(abs(below), abs(above))
+        lower_offset, upper_offset = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
+        outside_distance = max(0.0, lower_offset, upper_offset)
+        min_square += outside_distance * outside_distance
+        max_offset = max(abs(lower_offset), abs(upper_offset))
         max_square += max_offset * max_offset
     return math.sqrt(min_square), math.sqrt(max_square)
 

@@ -84,12 +84,12 @@ class _ReturnLimits:
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
     """Return the limits plus a margin, or each start's own values less the turn's height loss if they are smaller."""
     rows = starts.rows
-    outside = np.full(len(starts), math.inf)
+    sphere_distances = np.full(len(starts), math.inf)
     start_heights = np.nan_to_num(heights_above_ground(world, starts), nan=math.inf)
     positions = np.stack([rows["east"], rows["north"], rows["up"]], axis=1)
     for center, radius in zip(world.environment.spheres, world.environment.radii, strict=True):
         if radius > 0.0:
-            outside = np.minimum(outside, np.linalg.norm(positions - center, axis=1) - radius)
+            sphere_distances = np.minimum(sphere_distances, np.linalg.norm(positions - center, axis=1) - radius)
     min_heights = required_heights(world, starts)
     return _ReturnLimits(
         np.where(
@@ -97,13 +97,13 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
             min_heights,
             np.minimum(world.limit + margin, np.maximum(min_heights, start_heights - TURN_HEIGHT_LOSS_M)),
         ),
-        np.minimum(margin, np.maximum(0.0, outside - TURN_HEIGHT_LOSS_M)),
+        np.minimum(margin, np.maximum(0.0, sphere_distances - TURN_HEIGHT_LOSS_M)),
     )
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
     """Flag each RTL return that keeps within the limits, without margin, by only the point-mass simulation, (n,)."""
-    return _returns_meeting(world, starts, _return_limits(world, starts, 0.0), _meets_all)
+    return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all)
 
 
 def _clears_ground(_world: ReturnWorld, results: Records, needs: _ReturnLimits) -> Flags:
@@ -114,7 +114,7 @@ def _clears_ground(_world: ReturnWorld, results: Records, needs: _ReturnLimits) 
 def _meets_all(world: ReturnWorld, results: Records, needs: _ReturnLimits) -> Flags:
     """Flag each return that stays above its required height, arrives, and stays outside spheres, (n,).
 
-    `_targets_meeting` checks zones and energy.
+    `_meets_criterion` checks zones and energy.
     """
     return np.asarray(_clears_ground(world, results, needs) & (results["outside"] >= needs.sphere_distance))
 
@@ -122,20 +122,20 @@ def _meets_all(world: ReturnWorld, results: Records, needs: _ReturnLimits) -> Fl
 Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 
 
-def _returns_meeting(world: ReturnWorld, starts: ReturnStarts, needs: _ReturnLimits, criterion: Criterion) -> Flags:
+def _rtls_meet_criterion(world: ReturnWorld, starts: ReturnStarts, needs: _ReturnLimits, criterion: Criterion) -> Flags:
     """Flag each return that meets the requirements, (n,); with `_meets_all`, check zones and energy too."""
-    return _targets_meeting(world, starts, [world.target(row) for row in starts.rows], needs, criterion)
+    return _meets_criterion(world, starts, [world.target(row) for row in starts.rows], needs, criterion)
 
 
-def _targets_meeting(
+def _meets_criterion(
     world: ReturnWorld,
     starts: ReturnStarts,
     targets: Sequence[ReturnTarget],
     needs: _ReturnLimits,
     criterion: Criterion,
 ) -> Flags:
-    outside = needs.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
-    results, paths = fly_home(world, starts, targets, (needs.clearance, outside))
+    sphere_distances = needs.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
+    results, paths = fly_home(world, starts, targets, (needs.clearance, sphere_distances))
     is_met = criterion(world, results, needs)
     if criterion is not _meets_all:
         return is_met
@@ -158,7 +158,7 @@ class _ReturnTrial:
         """Return True if every return meets the requirements."""
         for position, k in enumerate(self._order):
             index = np.array([k])
-            if not _returns_meeting(world, self._starts.subset(index), self._needs.subset(index), criterion)[0]:
+            if not _rtls_meet_criterion(world, self._starts.subset(index), self._needs.subset(index), criterion)[0]:
                 self._order.insert(0, self._order.pop(position))
                 return False
         return True
@@ -252,7 +252,7 @@ def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | N
     """
     needs, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
-    home_is_good = _returns_meeting(world.with_rally(()), starts, needs, _meets_all)
+    home_is_good = _rtls_meet_criterion(world.with_rally(()), starts, needs, _meets_all)
     if home_is_good.all() or not start_count or world.ending == "straight to land":
         return None
     searched_starts = np.unique(np.linspace(0, start_count - 1, min(start_count, _MAX_STARTS)).round().astype(int))
@@ -296,7 +296,7 @@ def _search_in_rounds(
         points = tuple(
             search.places[candidate] for candidate in search.find(searched_starts, list(range(initial_count)))
         )
-        is_good = _returns_meeting(world.with_rally(points), starts, needs, _meets_all)
+        is_good = _rtls_meet_criterion(world.with_rally(points), starts, needs, _meets_all)
         unsafe_starts = np.flatnonzero(~is_good)
         if int(is_good.sum()) > best_result[0]:
             best_result = int(is_good.sum()), points, unsafe_starts
@@ -420,7 +420,7 @@ class _RallySearch:
             self._world.with_landing(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in candidate_places
         ]
         starts, needs = self._starts.subset(start_indices), self._needs.subset(start_indices)
-        self._is_good[start_indices, candidate_indices] = _targets_meeting(
+        self._is_good[start_indices, candidate_indices] = _meets_criterion(
             self._world, starts, targets, needs, _meets_all
         )
 

@@ -417,9 +417,11 @@ def _judge_go_around(
     return_heights = np.where(np.isnan(heights[rows:]), math.inf, heights[rows:])
     if not return_heights.size:
         return go_around._replace(min_climb_height=climb)
-    lowest = int(np.argmin(return_heights - required))
+    lowest_row = int(np.argmin(return_heights - required))
     return go_around._replace(
-        min_climb_height=climb, lowest_height=float(return_heights[lowest]), required_height=float(required[lowest])
+        min_climb_height=climb,
+        lowest_height=float(return_heights[lowest_row]),
+        required_height=float(required[lowest_row]),
     )
 
 

@@ -149,7 +149,7 @@ def _no_entry_finding(
 
 
 def _sphere_finding(
-    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, where: str
+    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, place_text: str
 ) -> Finding:
     judged_visit = planned_visit if flown_visit is None else flown_visit
     is_missing = math.isnan(judged_visit.closest)
@@ -159,7 +159,7 @@ def _sphere_finding(
             f"; flown {flown_visit.time_inside:.1f} s, exposure {flown_visit.exposure:.3g} s, nearest"
             f" {flown_visit.closest:.0f} m"
         )
-        facts += f" at {flown_visit.closest_time:.1f} s{where}"
+        facts += f" at {flown_visit.closest_time:.1f} s{place_text}"
     flown_time = None if flown_visit is None else flown_visit.time_inside
     if place.kind == "radar":
         return make_finding(

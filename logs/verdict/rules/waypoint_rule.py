@@ -154,9 +154,13 @@ def _closest_approach(
         offset = aligned.track.position[-1] - requirements.points[i]
         return math.hypot(offset[0], offset[1]), float(offset[2])
     # Among equally close rows take the one nearest in altitude.
-    near = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
-    up = position[near, 2] + fraction[near] * (position[near + 1, 2] - position[near, 2]) - level
-    return float(distance.min()), float(up[np.argmin(np.abs(up))])
+    nearest_rows = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
+    heights = (
+        position[nearest_rows, 2]
+        + fraction[nearest_rows] * (position[nearest_rows + 1, 2] - position[nearest_rows, 2])
+        - level
+    )
+    return float(distance.min()), float(heights[np.argmin(np.abs(heights))])
 
 
 RULE = Rule(

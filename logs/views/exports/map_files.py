@@ -124,17 +124,17 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 # Returns and glides, in colours.
 
 
-def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
+def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapLine]:
     """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
-    limit, lines = drawn.returns.limit, []
-    for kind, segment in drawn.segments_by_outcome:
+    limit, lines = drawn_returns.returns.limit, []
+    for kind, segment in drawn_returns.segments_by_outcome:
         name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {segment_text(kind)}"
         lines.append(_make_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
-    for number, worst in enumerate(drawn.worst, 1):
+    for number, worst in enumerate(drawn_returns.worst, 1):
         ret = worst.simulated
         name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
         lines.append(_make_line(setup, name, worst.path, "the worst returns", "return-way"))
-    for reach, glides in drawn.segments_by_reach:
+    for reach, glides in drawn_returns.segments_by_reach:
         name = f"{glides[0].time:.0f} to {glides[-1].time:.0f} s: {reached_text(reach)}"
         lines.append(_make_line(setup, name, [ret.start for ret in glides], "without its engine", f"reach-{reach}"))
     return lines
@@ -146,9 +146,9 @@ def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str,
     return MapLine(name, np.asarray(lat), np.asarray(lon), points[:, 2], folder=folder, role=role)
 
 
-def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
+def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZone]:
     """Return the glide footprint: minimum heights above ground to reach a chosen place, and flat ground."""
-    footprint = drawn.glides.footprint
+    footprint = drawn_returns.glides.footprint
     if footprint is None:
         return []
 

@@ -242,19 +242,23 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
     """Summarize the energy that the flight drew from the battery, beyond the amount in `flight_sentence`."""
     if track is None or len(track) == 0:
         return []
-    used = float(track.energy[-1])
-    if not math.isfinite(used):
+    used_energy = float(track.energy[-1])
+    if not math.isfinite(used_energy):
         return []
     seconds = float(track.time[-1] - track.time[0])
     distance = float(path_length(track.position)) / 1000.0
     facts: Facts = [
-        ("Left", f"{quantity(setup.battery - used, 'Wh')}, {quantity(100.0 * (1.0 - used / setup.battery), '%')}"),
+        (
+            "Left",
+            f"{quantity(setup.battery - used_energy, 'Wh')},"
+            f" {quantity(100.0 * (1.0 - used_energy / setup.battery), '%')}",
+        ),
         ("Peak current", quantity(_max_magnitude(track.current), "A")),
     ]
     if seconds > 0.0:
-        facts.append(("Mean power", quantity(used * 3600.0 / seconds, "W")))
+        facts.append(("Mean power", quantity(used_energy * 3600.0 / seconds, "W")))
     if distance > 0.0:
-        facts.append(("Per kilometre", quantity(used / distance, "Wh")))
+        facts.append(("Per kilometre", quantity(used_energy / distance, "Wh")))
     return facts
 
 

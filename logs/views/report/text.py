@@ -211,7 +211,7 @@ def count_sentence(rows: list[FindingRow]) -> str:
 
 def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
     state = finding_state(finding.ok, is_open=bool(undecided_findings([finding])))
-    planned, flown, margin = (
+    planned_value, flown_value, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
     margin_with_tolerance = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
@@ -224,8 +224,8 @@ def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) ->
         sign=f"{_SIGNS[state]} {_WORDS[state]}",
         rule=rule_word(finding.rule),
         where=finding.where,
-        planned=number(planned, digits=digits),
-        flown=number(flown, digits=digits),
+        planned=number(planned_value, digits=digits),
+        flown=number(flown_value, digits=digits),
         limit=_limit_text(finding, digits),
         limit_source=finding.limit_source,
         margin=number(margin_with_tolerance, signed=True),
