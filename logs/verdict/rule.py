@@ -45,19 +45,19 @@ class LogNeeds:
     """Data that an imported log needs for a rule to judge it, in addition to times and positions.
 
     quantities: quantities without which the rule is not judged.
-    planned_heights: the plan states altitudes.
-    aircraft: the aircraft is known, unless the scenario sets the limit.
-    full_leg: the leg was flown to its end; otherwise only failures are reported.
-    no_gap: the log has no gap at the waypoint; a leg with a gap is never passed.
-    listed: reported as not judged if the rule finds nothing because `quantities` are missing.
+    needs_planned_heights: the plan states altitudes.
+    needs_aircraft: the aircraft is known, unless the scenario sets the limit.
+    needs_full_leg: the leg was flown to its end; otherwise only failures are reported.
+    needs_no_gap: the log has no gap at the waypoint; a leg with a gap is never passed.
+    reports_missing: reported as not judged if the rule finds nothing because `quantities` are missing.
     """
 
     quantities: tuple[Quantity, ...] = ()
-    planned_heights: bool = False
-    aircraft: bool = False
-    full_leg: bool = False
-    no_gap: bool = False
-    listed: bool = False
+    needs_planned_heights: bool = False
+    needs_aircraft: bool = False
+    needs_full_leg: bool = False
+    needs_no_gap: bool = False
+    reports_missing: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

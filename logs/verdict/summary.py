@@ -136,7 +136,7 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
     if not unjudged_count:
         return ""
     return f"{rule.unjudged} not judged" + (
-        "" if unjudged_count == len(rule_findings) else f" on {unjudged_count} {rule.unjudged_of}"
+        "" if unjudged_count == len(rule_findings) else f" on {unjudged_count} {rule.unjudged_unit}"
     )
 
 
@@ -204,7 +204,7 @@ def summary_lines(
     lines += _ignored_settings_lines(setup)
     reasons: dict[str, str] = {}
     for finding in findings:
-        if finding.ok is None and RULE_WORDS[finding.rule].explained:
+        if finding.ok is None and RULE_WORDS[finding.rule].explains_unjudged:
             reasons.setdefault(finding.rule, finding.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
     # These are the autopilot's own limits, which say nothing about the aircraft.
@@ -219,7 +219,7 @@ def summary_lines(
     lines += [
         f"{RULE_WORDS[finding.rule].title.capitalize()}: {finding.reason}"
         for finding in findings
-        if RULE_WORDS[finding.rule].warns and finding.ok is None
+        if RULE_WORDS[finding.rule].is_warning and finding.ok is None
     ]
     lines += _terrain_error_lines(findings, setup)
     if setup.notes:

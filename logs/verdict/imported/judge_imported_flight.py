@@ -326,7 +326,7 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
 
 
 def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[Finding]:
-    """Return findings for rules with `LogNeeds.listed` that found nothing because the log lacks their data."""
+    """Return findings for rules with `LogNeeds.reports_missing` that found nothing because the log lacks their data."""
     findings = []
     for rule in RULES.values():
         missing_quantities = [
@@ -335,7 +335,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
             if setup.source is not None and quantity not in setup.source.holds
         ]
         margin = RULE_WORDS[rule.name].margin
-        if rule.log.listed and margin is not None and missing_quantities and rule.name not in judged_rules:
+        if rule.log.reports_missing and margin is not None and missing_quantities and rule.name not in judged_rules:
             reason = f"the log contains no {_QUANTITY_LABELS[missing_quantities[0]]}"
             findings.append(
                 make_finding(rule.name, FLIGHT, ok=None, reason=reason, source="aircraft", unit=margin.unit)
@@ -348,13 +348,13 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
     source = setup.source
     if source is None:
         return finding
-    reason, needs = "", RULES[finding.rule].log
-    for quantity in needs.quantities:
+    reason, log_needs = "", RULES[finding.rule].log
+    for quantity in log_needs.quantities:
         if quantity not in source.holds:
             reason = f"the log contains no {_QUANTITY_LABELS[quantity]}"
             break
         if quantity == "heights":
-            has_plan_heights = source.plan_heights or not needs.planned_heights
+            has_plan_heights = source.plan_heights or not log_needs.needs_planned_heights
             reason = _DATUM_REASONS.get(source.heights.datum, "") if has_plan_heights else "the plan states no heights"
         else:
             reason = _missing_values_text(legs, quantity)
@@ -362,7 +362,7 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
             break
     if reason:
         return _mark_unjudged(finding, reason)
-    if not source.aircraft_known and needs.aircraft and finding.limit_source != "scenario":
+    if not source.aircraft_known and log_needs.needs_aircraft and finding.limit_source != "scenario":
         return _mark_unjudged(finding, _UNNAMED_TEXT, keep_measurements=bool(finding.ok))
     return finding
 
@@ -396,7 +396,7 @@ def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
     last = min(len(rows) - 1, finding.place.index + 1)
     start, end = float(track.time[rows[first]]), float(track.time[rows[last]])
     for gap in gaps_between(legs, start, end):
-        if finding.place.kind == "leg" or RULES[finding.rule].log.no_gap:
+        if finding.place.kind == "leg" or RULES[finding.rule].log.needs_no_gap:
             reason = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
             return _mark_unjudged(finding, reason, keep_measurements=True)
     return finding
@@ -409,7 +409,7 @@ def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
     is_last_leg = finding.place.kind == "leg" and finding.place.index == leg
     if is_unreached:
         return _mark_unjudged(finding, stretch_end_text(legs.stretch))
-    if is_last_leg and RULES[finding.rule].log.full_leg:
+    if is_last_leg and RULES[finding.rule].log.needs_full_leg:
         return (
             _mark_unjudged(finding, f"flown in part: {stretch_end_text(legs.stretch)}")
             if finding.ok is not False

@@ -144,5 +144,5 @@ RULE = Rule(
     judge=energy_findings,
     judges_whole_flight=True,
     suggest=suggest_using_less_energy,
-    log=LogNeeds(("battery",), aircraft=True),
+    log=LogNeeds(("battery",), needs_aircraft=True),
 )

@@ -172,5 +172,5 @@ RULE = Rule(
     tolerances=("HEIGHT_TOLERANCE_M",),
     judge=height_findings,
     suggest=suggest_flying_lower,
-    log=LogNeeds(("heights",), planned_heights=True),
+    log=LogNeeds(("heights",), needs_planned_heights=True),
 )

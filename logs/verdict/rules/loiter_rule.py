@@ -322,5 +322,5 @@ RULE = Rule(
     ),
     judge=end_findings,
     merge=merge_loiter_findings,
-    log=LogNeeds(aircraft=True),
+    log=LogNeeds(needs_aircraft=True),
 )

@@ -342,5 +342,5 @@ RULE = Rule(
     ),
     judge=slope_findings,
     suggest=suggest_gentler_slope,
-    log=LogNeeds(("heights",), planned_heights=True, aircraft=True, full_leg=True),
+    log=LogNeeds(("heights",), needs_planned_heights=True, needs_aircraft=True, needs_full_leg=True),
 )

@@ -332,5 +332,5 @@ RULE = Rule(
     ),
     judge=speed_findings,
     suggest=suggest_level_flight_speed,
-    log=LogNeeds(("airspeed",), aircraft=True, full_leg=True),
+    log=LogNeeds(("airspeed",), needs_aircraft=True, needs_full_leg=True),
 )

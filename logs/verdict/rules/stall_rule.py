@@ -162,5 +162,5 @@ RULE = Rule(
     judge=stall_findings,
     judges_whole_flight=True,
     suggest=suggest_flying_faster,
-    log=LogNeeds(("airspeed", "attitude"), aircraft=True, listed=True),
+    log=LogNeeds(("airspeed", "attitude"), needs_aircraft=True, reports_missing=True),
 )

@@ -279,5 +279,5 @@ RULE = Rule(
         *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII"),
     ),
     judge=survey_findings,
-    log=LogNeeds(("attitude",), planned_heights=True, full_leg=True),
+    log=LogNeeds(("attitude",), needs_planned_heights=True, needs_full_leg=True),
 )

@@ -293,5 +293,5 @@ RULE = Rule(
     ),
     judge=turn_findings,
     suggest=suggest_gentler_turn,
-    log=LogNeeds(aircraft=True, no_gap=True),
+    log=LogNeeds(needs_aircraft=True, needs_no_gap=True),
 )
