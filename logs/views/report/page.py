@@ -245,8 +245,8 @@ def write_report(
     track = None if track is None or not len(track) else with_legs(track, verdict.leg_ends)
     subject = make_subject(setup, track, verdict, returns)
     views = figure_views(subject)
-    drawn = {entry.name for entry in FIGURES if every_picture or entry.still}
-    pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn}, svg=svg)
+    drawn_names = {entry.name for entry in FIGURES if every_picture or entry.still}
+    pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn_names}, svg=svg)
     page = _page_html(
         setup, subject, views, pictures, end_reason=ended, versions=versions, command=command, events=events
     )
