@@ -278,21 +278,21 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
     return _encode_update(entity)
 
 
-def returns_scene(time_ns: int, drawn: DrawnReturns, terrain: Terrain | None) -> bytes:
+def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | None) -> bytes:
     """Draw the path coloured by outcome of returns, the worst returns, and the glide's footprint.
 
     The coloured line lies below the path, so that plan and track stay visible.
     """
     entity = _entity(time_ns, "returns")
-    for kind, segment in drawn.segments_by_outcome:
+    for kind, segment in drawn_returns.segments_by_outcome:
         points = np.array([ret.start for ret in segment]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
         _add_line(entity, f"return-{kind}", points, 6.0)
-    for number, worst in enumerate(drawn.worst, 1):
+    for number, worst in enumerate(drawn_returns.worst, 1):
         _add_line(entity, "return-way", worst.path)
         entity.texts.append(
             _make_label(worst.marked_position + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}")
         )
-    footprint = drawn.glides.footprint
+    footprint = drawn_returns.glides.footprint
     if footprint is not None and terrain is not None:
         for band in footprint.bands():
             _add_parts(entity, BAND_ROLES[band.up_to], band.parts, terrain)

@@ -357,33 +357,33 @@ class Poses:
         """
         good_rows = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
         slots = log_times[good_rows] // _SLOT_NS
-        chosen_rows = good_rows[_change_indices(slots, self._slot)]
+        slot_rows = good_rows[_change_indices(slots, self._slot)]
         if good_rows.size:
             self._tail = position[good_rows[-1:]]
-        if not chosen_rows.size:
+        if not slot_rows.size:
             return
         self._slot = int(slots[-1])
-        chosen_times = log_times[chosen_rows]
-        yield transform_messages(self._channels[TF_TOPIC], chosen_times, position[chosen_rows], attitude[chosen_rows])
-        seconds = chosen_times // SECOND_NS
-        starts = chosen_rows[_change_indices(seconds, self._second)]
-        if not starts.size:
+        slot_times = log_times[slot_rows]
+        yield transform_messages(self._channels[TF_TOPIC], slot_times, position[slot_rows], attitude[slot_rows])
+        seconds = slot_times // SECOND_NS
+        second_rows = slot_rows[_change_indices(seconds, self._second)]
+        if not second_rows.size:
             return
         self._second = int(seconds[-1])
-        firsts = position[starts]
-        yield fix_messages(self._channels[FIX_TOPIC], log_times[starts], self._origin, firsts)
-        self._path.append(firsts)
-        for k in np.flatnonzero((log_times[starts] - EPOCH_NS) // SECOND_NS % TRACK_INTERVAL_S == 0).tolist():
-            log_time = int(log_times[starts[k]])
+        start_positions = position[second_rows]
+        yield fix_messages(self._channels[FIX_TOPIC], log_times[second_rows], self._origin, start_positions)
+        self._path.append(start_positions)
+        for k in np.flatnonzero((log_times[second_rows] - EPOCH_NS) // SECOND_NS % TRACK_INTERVAL_S == 0).tolist():
+            log_time = int(log_times[second_rows[k]])
             with np.errstate(over="ignore", invalid="ignore"):
-                line = np.round(self._so_far.add(firsts[k]) * 16.0) / 16.0
+                line = np.round(self._so_far.add(start_positions[k]) * 16.0) / 16.0
             yield single_record(self._channels[TRACK_TOPIC], log_time, scene.track_scene(log_time, line))
             time = (log_time - EPOCH_NS) / SECOND_NS
             if time >= self._next_cloud:
                 self._next_cloud = max(time + _MIN_CLOUD_INTERVAL_S, time * _CLOUD_RATIO)
-                yield self._track_cloud_record(log_time, [*self._path[:-1], firsts[: k + 1]])
+                yield self._track_cloud_record(log_time, [*self._path[:-1], start_positions[: k + 1]])
 
-    def whole(self, log_time: int) -> Iterator[MessageRecords]:
+    def whole_track_records(self, log_time: int) -> Iterator[MessageRecords]:
         """Yield the track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
         parts = [*self._path, self._tail]
         path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))

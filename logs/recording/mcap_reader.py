@@ -103,7 +103,7 @@ def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
         elif opcode == Opcode.FOOTER:
             break
         elif opcode == 0:
-            raise _Damage(f"the record at byte {position:,} is of no kind")
+            raise _Damage(f"the record at byte {position:,} has no type")
         crc = zlib.crc32(content, zlib.crc32(frame, crc))
     if not has_end:
         raise _Damage("the data section has no end record")

@@ -142,9 +142,9 @@ class ContainerWriter:
 
     def take_new_records(self) -> bytes:
         """Take the records of the schemas and channels that are not in any chunk yet, for the next chunk."""
-        front = b"".join(_bytes(record) for record in self._unwritten)
+        new_records = b"".join(_bytes(record) for record in self._unwritten)
         self._unwritten.clear()
-        return front
+        return new_records
 
     def copy_chunk(self, data: bytes) -> None:
         """Write the records of another file's chunk as a chunk.

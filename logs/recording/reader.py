@@ -231,7 +231,7 @@ class _MessageCollector:
             if end > len(data):
                 raise ValueError("a record reaches beyond its chunk")
             if opcode == 0:
-                raise ValueError("a record of no kind")
+                raise ValueError("a record without a type")
             if opcode == Opcode.MESSAGE:
                 position = self._add_message(data, position, start, end)
                 continue
@@ -376,16 +376,16 @@ def _read_result(attachments: dict[str, bytes], row_count: int) -> tuple[str | N
     data = _parse_object(attachments[RESULT_FILE])
     end_reason = data.get("ended")
     if not isinstance(end_reason, str):
-        return None, f"{RESULT_FILE} does not say how the flight ended"
+        return None, f"{RESULT_FILE} does not state how the flight ended"
     if data.get("rows") != row_count:
-        return end_reason, f"{row_count} of {data.get('rows')} rows are there"
+        return end_reason, f"the log contains {row_count} of {data.get('rows')} rows"
     return end_reason, ""
 
 
 def _recorded_loss(recovery: bytes) -> str:
     """Return the loss that the log's recovery note states."""
-    lost = _parse_object(recovery).get("lost")
-    return lost if isinstance(lost, str) and lost else "the extent of the loss is unknown"
+    loss = _parse_object(recovery).get("lost")
+    return loss if isinstance(loss, str) and loss else "the extent of the loss is unknown"
 
 
 def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
@@ -406,7 +406,7 @@ def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | N
 
 def _parse_object(data: bytes) -> dict[str, Any]:
     try:
-        found = json.loads(data)
+        document = json.loads(data)
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return document if isinstance(document, dict) else {}

@@ -219,7 +219,7 @@ class Recorder:
             self._skipped = None
         self._write_pending(None)
         end = max(self._last_ns, EPOCH_NS)
-        self._write_messages([*self._poses.whole(end)])
+        self._write_messages([*self._poses.whole_track_records(end)])
         if returns is not None:
             self._add_scene(RETURNS_TOPIC, scene.returns_scene(EPOCH_NS, returns, self._terrain))
         if reference is not None:
@@ -254,10 +254,10 @@ class Recorder:
             "/points/plan": clouds.plan_cloud(EPOCH_NS, setup.shown_waypoints),
             "/points/aircraft": clouds.aircraft_cloud(EPOCH_NS),
         }
-        zoned = with_fence_zones(setup).scenario
-        if zoned.zones:
+        scenario_with_fence = with_fence_zones(setup).scenario
+        if scenario_with_fence.zones:
             self._scene_channel(ZONES_TOPIC)
-            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, zoned, setup.route.waypoints)
+            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, scenario_with_fence, setup.route.waypoints)
         self._write_messages([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 
@@ -288,11 +288,11 @@ class Recorder:
         """Write the pending rows and events before ``end_ns``, or all if it is None, in chunks of at most a second."""
         rows = join_rows(self._pending)
         log_times = times_ns(rows["time"])
-        stop = len(rows) if end_ns is None else int(np.searchsorted(log_times, end_ns))
-        self._pending = [rows[stop:]] if stop < len(rows) else []
+        end_row = len(rows) if end_ns is None else int(np.searchsorted(log_times, end_ns))
+        self._pending = [rows[end_row:]] if end_row < len(rows) else []
         events = [event for event in self._events if end_ns is None or event.log_times[0] < end_ns]
         self._events = [event for event in self._events if end_ns is not None and event.log_times[0] >= end_ns]
-        rows, log_times = rows[:stop], log_times[:stop]
+        rows, log_times = rows[:end_row], log_times[:end_row]
         pose_records = self._poses.pose_records(log_times, rows["position"], rows["attitude"])
         event_records = self._flight_events.event_records(log_times, rows["position"], rows["leg"])
         self._write_messages([*pose_records, *event_records, *events], rows, log_times)

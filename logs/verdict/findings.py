@@ -12,16 +12,16 @@ from world.json_schema import DocumentConfig
 # The aircraft is not known well enough.
 UNKNOWN_AIRCRAFT = "unknown aircraft"
 # Only a flight shows the flown path.
-UNKNOWN_WAY = "unknown way"
+UNKNOWN_PATH = "unknown way"
 # The path from the ground or to it may not be free.
-GROUND_WAY = "ground way"
+GROUND_PATH = "ground way"
 # An item that changes the flight path is not flown as the autopilot would fly it, or parameters contradict one another.
 NOT_FLOWN = "not flown"
 # Returns or glides that a scenario requires are not known well enough.
 UNKNOWN_RETURN = "unknown return"
 # Checks on which a flight gives no evidence, so that a flight may pass without them.
-APART_FROM_FLIGHT = (GROUND_WAY, UNKNOWN_RETURN)
-_UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_WAY, NOT_FLOWN, *APART_FROM_FLIGHT)
+APART_FROM_FLIGHT = (GROUND_PATH, UNKNOWN_RETURN)
+_UNDECIDED = (UNKNOWN_AIRCRAFT, UNKNOWN_PATH, NOT_FLOWN, *APART_FROM_FLIGHT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,8 +49,8 @@ class Finding:
     suggestions: for a failed finding, the smallest changes of the plan with which it passes, the least change first.
     brief: the reason in a few words, for a headline.
     placed: True if the reason begins with the place.
-    check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_WAY`, `NOT_FLOWN`,
-        `GROUND_WAY` or `UNKNOWN_RETURN` if the finding is undecided for that reason; "" otherwise.
+    check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_PATH`, `NOT_FLOWN`,
+        `GROUND_PATH` or `UNKNOWN_RETURN` if the finding is undecided for that reason; "" otherwise.
     facts: other measured numbers, which are not faults.
     at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """
@@ -204,7 +204,7 @@ def make_finding(
     """Make a finding with numbers rounded to 1e-6, and None for non-finite numbers.
 
     faults: faults with which the reason begins.
-    facts: further measured numbers; non-finite numbers are left out.
+    facts: further measured numbers; non-finite numbers are omitted.
     at_least: True if values of at least the limit pass.
     A finding that fails by other evidence while its number is within the limit and its tolerance has no margin: the
     reason says what failed.

@@ -51,14 +51,15 @@ def geometric_findings(
 ) -> tuple[Finding, ...]:
     """Return findings on a route's geometry, judged by the aircraft's envelope.
 
-    flight_findings: findings on the route's flight, from which the findings of rules with `Rule.of_route` are copied.
+    flight_findings: findings on the route's flight, from which the findings of rules with `Rule.is_same_for_plan` are
+        copied.
     """
     return _run_rules(requirements, None, (), geometric=True, flight_findings=flight_findings)
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
     """Return the findings of `geometric_findings` on legs, corners, threats and zones, not on the route as a whole."""
-    return _run_rules(requirements, None, (), geometric=True, whole=False)
+    return _run_rules(requirements, None, (), geometric=True, includes_whole_flight=False)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
@@ -90,32 +91,32 @@ def _run_rules(
     end_findings: Sequence[Finding],
     *,
     geometric: bool,
-    whole: bool = True,
+    includes_whole_flight: bool = True,
     flight_findings: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
     """Run all rules and return their findings, followed by `end_findings`, merged.
 
     end_findings: findings on how the flight ended.
-    whole: True to include rules that judge the flight as a whole.
+    includes_whole_flight: True to include rules that judge the flight as a whole.
     flight_findings: as in `geometric_findings`.
     """
 
     def rule_findings(rule: Rule, judge: Judge) -> Sequence[Finding]:
-        if rule.of_route and flight_findings is not None:
+        if rule.is_same_for_plan and flight_findings is not None:
             return [finding for finding in flight_findings if finding.rule == rule.name]
         return judge(requirements, aligned, geometric=geometric)
 
     findings: tuple[Finding, ...] = tuple(
         finding
         for rule in RULES.values()
-        if rule.judge is not None and (whole or not rule.whole)
+        if rule.judge is not None and (includes_whole_flight or not rule.judges_whole_flight)
         for finding in rule_findings(rule, rule.judge)
     )
     findings = (*findings, *end_findings)
     for rule in RULES.values():
         if rule.merge is not None:
             findings = rule.merge(requirements, aligned, findings)
-    if whole:
+    if includes_whole_flight:
         findings = (*worst_finding_per_stop(findings), *_other_side_findings(requirements, findings))
     return findings
 

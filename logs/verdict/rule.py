@@ -45,19 +45,19 @@ class LogNeeds:
     """Data that an imported log needs for a rule to judge it, in addition to times and positions.
 
     quantities: quantities without which the rule is not judged.
-    planned_heights: the plan states altitudes.
-    aircraft: the aircraft is known, unless the scenario sets the limit.
-    full_leg: the leg was flown to its end; otherwise only failures are reported.
-    no_gap: the log has no gap at the waypoint; a leg with a gap is never passed.
-    listed: reported as not judged if the rule finds nothing because `quantities` are missing.
+    needs_planned_heights: the plan states altitudes.
+    needs_aircraft: the aircraft is known, unless the scenario sets the limit.
+    needs_full_leg: the leg was flown to its end; otherwise only failures are reported.
+    needs_no_gap: the log has no gap at the waypoint; a leg with a gap is never passed.
+    reports_missing: reported as not judged if the rule finds nothing because `quantities` are missing.
     """
 
     quantities: tuple[Quantity, ...] = ()
-    planned_heights: bool = False
-    aircraft: bool = False
-    full_leg: bool = False
-    no_gap: bool = False
-    listed: bool = False
+    needs_planned_heights: bool = False
+    needs_aircraft: bool = False
+    needs_full_leg: bool = False
+    needs_no_gap: bool = False
+    reports_missing: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,8 +71,9 @@ class Rule:
     judge: planned path and flown track.  judge_items, judge_end, judge_imported_end, merge: see their types.
     An imported flight is judged by `judge`, stretch by stretch, as far as the log meets ``log``.
     suggest: suggests changes that make a failed finding pass.
-    whole: True if it judges the flight as a whole, not a leg, a corner, a threat or a zone.
-    of_route: True if it gives the same result for a flight as for its planned path, so that it runs once for both.
+    judges_whole_flight: True if it judges the flight as a whole, not a leg, a corner, a threat or a zone.
+    is_same_for_plan: True if it gives the same result for a flight as for its planned path, so that it runs once for
+        both.
     """
 
     name: str
@@ -84,5 +85,5 @@ class Rule:
     merge: Merge | None = None
     suggest: Suggest | None = None
     log: LogNeeds = LogNeeds()
-    whole: bool = False
-    of_route: bool = False
+    judges_whole_flight: bool = False
+    is_same_for_plan: bool = False

@@ -23,13 +23,13 @@ from logs.verdict.headline_phrases import (
 class Margin:
     """The quantity whose distance to the limit is a rule's margin, and the scale that ranks flights by it.
 
-    of: name of the quantity that is compared with the limit.
+    quantity: name of the quantity that is compared with the limit.
     unit: unit of quantity, limit and margin.
     scale: a difference that a person would call noticeable, in that unit.  It ranks flights and marks a narrow pass,
     but decides no verdict.  None for a count, a time or a limit of geometry, which do not say how close a flight was.
     """
 
-    of: str
+    quantity: str
     unit: str
     scale: float | None = None
 
@@ -40,27 +40,27 @@ class RuleWords:
 
     name: name in findings, in file formats, and in the columns of a campaign's table.
     title: heading of the rule's findings in tables.  noun: name of the rule within a sentence; "" to use `name`.
-    asks: the question that the rule answers, one sentence.
+    question: the question that the rule answers, one sentence.
     margin: None for a rule without a number of its own.
     urgency: a headline names failures of a greater urgency first.
     phrase: makes the phrase of a failed finding in a headline.
     unjudged: names what was not judged in the headline of a flyable verdict; "" to omit it.
-    unjudged_of: the unit in which the headline numbers findings that were not judged.
-    explained: True if the summary states why the rule was not judged.
-    warns: True if the rule's findings are warnings, which decide no verdict.
+    unjudged_unit: the unit in which the headline numbers findings that were not judged.
+    explains_unjudged: True if the summary states why the rule was not judged.
+    is_warning: True if the rule's findings are warnings, which decide no verdict.
     """
 
     name: str
     title: str
     noun: str = ""
-    asks: str
+    question: str
     margin: Margin | None
     urgency: int = 0
     phrase: HeadlinePhrase = name_excess
     unjudged: str = ""
-    unjudged_of: str = "legs"
-    explained: bool = False
-    warns: bool = False
+    unjudged_unit: str = "legs"
+    explains_unjudged: bool = False
+    is_warning: bool = False
 
     @property
     def word(self) -> str:
@@ -90,98 +90,99 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="mission",
             title="mission",
-            asks="Would the autopilot accept the mission, and does the route stay inside the mission's fence?",
+            question="Would the autopilot accept the mission, and does the route stay inside the mission's fence?",
             margin=None,
             urgency=2,
         ),
         RuleWords(
             name="turn",
             title="turns",
-            asks="Can the aircraft turn at each corner, and did it?",
+            question="Can the aircraft turn at each corner, and did it?",
             margin=Margin("course change", "deg"),
         ),
         RuleWords(
             name="loiter",
             title="loiters",
-            asks="Can each loiter circle be held within the bank limit in this wind, and was it completed?",
+            question="Can each loiter circle be held within the bank limit in this wind, and was it completed?",
             margin=Margin("radius", "m", 10.0),
             phrase=name_circle,
         ),
         RuleWords(
             name="slope",
             title="slopes",
-            asks="Can each leg be climbed or descended at its airspeed in this wind, and was it?",
+            question="Can each leg be climbed or descended at its airspeed in this wind, and was it?",
             margin=Margin("slope", "deg", 1.0),
             urgency=1,
         ),
         RuleWords(
             name="clearance",
             title="clearance",
-            asks="Does each leg stay the required height above the ground?",
+            question="Does each leg stay the required height above the ground?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=name_shortfall,
             unjudged="terrain",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="height",
             title="heights",
-            asks="Does each leg stay below the maximum height above ground and the ceiling?",
+            question="Does each leg stay below the maximum height above ground and the ceiling?",
             margin=Margin("height above ground", "m", 10.0),
             unjudged="heights above ground",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="fence",
             title="zones",
-            asks="Do the path and the flight stay outside exclusion zones and inside inclusion zones?",
+            question="Do the path and the flight stay outside exclusion zones and inside inclusion zones?",
             margin=Margin("depth", "m", 10.0),
             phrase=name_zone,
             unjudged="airspace",
-            unjudged_of="zones",
-            explained=True,
+            unjudged_unit="zones",
+            explains_unjudged=True,
         ),
         RuleWords(
             name="threat",
             title="threats",
-            asks="Do the path and the flight stay outside each missile's sphere?",
+            question="Do the path and the flight stay outside each missile's sphere?",
             margin=Margin("time inside", "s"),
             phrase=name_missile,
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="bounds",
             title="bounds",
-            asks="Does the flight stay inside the area's box, above its floor and below its ceiling?",
+            question="Does the flight stay inside the area's box, above its floor and below its ceiling?",
             margin=Margin("distance inside", "m", 10.0),
             phrase=name_shortfall,
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="waypoint",
             title="waypoints",
-            asks="Was each waypoint reached, within the radius that the mission or the autopilot sets for it?",
+            question="Was each waypoint reached, within the radius that the mission or the autopilot sets for it?",
             margin=Margin("closest approach", "m", 10.0),
             phrase=name_missed_waypoint,
         ),
         RuleWords(
             name="corridor",
             title="corridor",
-            asks="How far did the flight deviate from the legs, including its turns?",
+            question="How far did the flight deviate from the legs, including its turns?",
             margin=Margin("distance from the legs", "m", 10.0),
         ),
         RuleWords(
             name="survey",
             title="photo lines",
             noun="photo line",
-            asks="How much of each photo line of a survey is flown so that its photos can be used?",
+            question="How much of each photo line of a survey is flown so that its photos can be used?",
             margin=Margin("share of the photo line", "%", 5.0),
             phrase=name_photo_line,
         ),
         RuleWords(
             name="speed",
             title="airspeed",
-            asks="Can the aircraft fly level at each leg's commanded airspeed, and hold the leg's course in this wind?",
+            question="Can the aircraft fly level at each leg's commanded airspeed, and hold the leg's course in this"
+            " wind?",
             margin=Margin("airspeed", "m/s", 1.0),
             phrase=name_reason,
             unjudged="airspeed",
@@ -189,92 +190,92 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="stall",
             title="stall",
-            asks="Is the airspeed above the stall speed at the bank angle that is flown?",
+            question="Is the airspeed above the stall speed at the bank angle that is flown?",
             margin=Margin("airspeed", "m/s", 1.0),
         ),
         RuleWords(
             name="takeoff",
             title="take-off",
             noun="take-off",
-            asks="Can the aircraft climb from the ground at home to the position of the take-off item?",
+            question="Can the aircraft climb from the ground at home to the position of the take-off item?",
             margin=Margin("slope", "deg"),
             unjudged="take-off",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="climbout",
             title="climb-out",
             noun="climb-out",
-            asks="Is the climb from home to the mission's first waypoint clear of ground, missiles and zones?",
+            question="Is the climb from home to the mission's first waypoint clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=name_reason,
             unjudged="climb-out",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="launch",
             title="launch",
-            asks="Does the launch start the motor, leave its runway in time, lose no height, and climb out free of"
+            question="Does the launch start the motor, leave its runway in time, lose no height, and climb out free of"
             " obstacles?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=name_reason,
             unjudged="launch",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="landing",
             title="landing",
-            asks="Can the aircraft descend from the last waypoint to the landing point?",
+            question="Can the aircraft descend from the last waypoint to the landing point?",
             margin=Margin("slope", "deg"),
             unjudged="landing",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="approach",
             title="approach",
-            asks="Is the glide to the landing point clear of ground, missiles and zones?",
+            question="Is the glide to the landing point clear of ground, missiles and zones?",
             margin=Margin("height above ground", "m", 10.0),
             phrase=name_reason,
             unjudged="approach",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="touchdown",
             title="touchdown",
-            asks="Does the aircraft touch down and come to rest on the strip, on a final clear of ground, missiles and"
-            " zones?",
+            question="Does the aircraft touch down and come to rest on the strip, on a final clear of ground, missiles"
+            " and zones?",
             margin=Margin("strip", "m", 20.0),
             phrase=name_reason,
             unjudged="touchdown",
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="go_around",
             title="go-around",
             noun="go-around",
-            asks="Would a go-around from anywhere on the glide stay clear of ground, missiles and zones?",
+            question="Would a go-around from anywhere on the glide stay clear of ground, missiles and zones?",
             margin=None,
             phrase=name_reason,
-            warns=True,
+            is_warning=True,
         ),
         RuleWords(
             name="return",
             title="return",
-            asks="Where does the return to launch lead, by which path, and did the flight arrive there?",
+            question="Where does the return to launch lead, by which path, and did the flight arrive there?",
             margin=None,
         ),
         RuleWords(
             name="energy",
             title="energy",
-            asks="Does the flight leave the required reserve in the battery or the tank?",
+            question="Does the flight leave the required reserve in the battery or the tank?",
             margin=Margin("energy", "Wh", 50.0),
-            explained=True,
+            explains_unjudged=True,
         ),
         RuleWords(
             name="departure",
             title="loss of control",
             noun="loss of control",
-            asks="Are all values finite, are bank and airspeed plausible, and is the ground never touched?",
+            question="Are all values finite, are bank and airspeed plausible, and is the ground never touched?",
             margin=Margin("largest bank", "deg", 10.0),
             urgency=4,
             phrase=name_event,
@@ -282,7 +283,7 @@ RULE_WORDS: dict[str, RuleWords] = {
         RuleWords(
             name="completion",
             title="completion",
-            asks="Was the plan feasible, flown to its last waypoint, and recorded completely and consistently?",
+            question="Was the plan feasible, flown to its last waypoint, and recorded completely and consistently?",
             margin=Margin("flown", "legs"),
             urgency=3,
             phrase=name_event,

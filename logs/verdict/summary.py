@@ -10,7 +10,7 @@ from logs.verdict.findings import (
     APART_FROM_FLIGHT,
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
-    UNKNOWN_WAY,
+    UNKNOWN_PATH,
     Finding,
     undecided_findings,
 )
@@ -65,7 +65,7 @@ def undecided_text(findings: Sequence[Finding]) -> str:
     paths = [
         f"{'the turn-around on' if finding.place.kind == 'leg' else 'the circle at'} {place_text(finding.place)}"
         for finding in open_findings
-        if finding.check == UNKNOWN_WAY
+        if finding.check == UNKNOWN_PATH
     ]
     path_text = (
         f"only a simulated flight shows how {' and '.join(paths[:_MAX_NAMED_FINDINGS])} is flown" if paths else ""
@@ -136,7 +136,7 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
     if not unjudged_count:
         return ""
     return f"{rule.unjudged} not judged" + (
-        "" if unjudged_count == len(rule_findings) else f" on {unjudged_count} {rule.unjudged_of}"
+        "" if unjudged_count == len(rule_findings) else f" on {unjudged_count} {rule.unjudged_unit}"
     )
 
 
@@ -204,7 +204,7 @@ def summary_lines(
     lines += _ignored_settings_lines(setup)
     reasons: dict[str, str] = {}
     for finding in findings:
-        if finding.ok is None and RULE_WORDS[finding.rule].explained:
+        if finding.ok is None and RULE_WORDS[finding.rule].explains_unjudged:
             reasons.setdefault(finding.rule, finding.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
     # These are the autopilot's own limits, which say nothing about the aircraft.
@@ -219,7 +219,7 @@ def summary_lines(
     lines += [
         f"{RULE_WORDS[finding.rule].title.capitalize()}: {finding.reason}"
         for finding in findings
-        if RULE_WORDS[finding.rule].warns and finding.ok is None
+        if RULE_WORDS[finding.rule].is_warning and finding.ok is None
     ]
     lines += _terrain_error_lines(findings, setup)
     if setup.notes:
@@ -318,11 +318,11 @@ def _terrain_error_lines(findings: Sequence[Finding], setup: FlightSetup) -> lis
     ]
 
 
-def _agreement_text(other: LevelAnswer) -> str:
+def _agreement_text(other_level: LevelAnswer) -> str:
     """Describe where the verdict and another level agree or differ."""
-    disagreements = other.disagreements
+    disagreements = other_level.disagreements
     if not disagreements:
-        is_geometry = other.name == "geometry"
+        is_geometry = other_level.name == "geometry"
         return "flight and geometry agree on every finding that both have" if is_geometry else "both flights agree"
     rest_text = (
         f", +{len(disagreements) - _MAX_NAMED_FINDINGS} more" if len(disagreements) > _MAX_NAMED_FINDINGS else ""

@@ -94,9 +94,9 @@ class Verdict:
         """True if the flight is flyable, except that departure, approach or returns may be undecided.
 
         >>> from dataclasses import replace
-        >>> from logs.verdict.findings import GROUND_WAY, make_finding
+        >>> from logs.verdict.findings import GROUND_PATH, make_finding
         >>> from logs.verdict.places import Place
-        >>> open_way = make_finding("climbout", Place("waypoint", 0), ok=None, reason="", check=GROUND_WAY)
+        >>> open_way = make_finding("climbout", Place("waypoint", 0), ok=None, reason="", check=GROUND_PATH)
         >>> verdict = Verdict((open_way,), flyable=False, complete=True, lines=(), level="flown", unjudged="a way")
         >>> verdict.flies, replace(verdict, complete=False).flies
         (True, False)

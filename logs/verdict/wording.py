@@ -217,8 +217,8 @@ def quantity_text(value: float, unit: str) -> str:
     return _significant_digits(value, 3) + UNITS.get(unit, f" {unit}" if unit else "")
 
 
-# Most significant digits of two numbers that are compared.
-_MOST_DIGITS = 9
+# Largest number of significant digits of two numbers that are compared.
+_MAX_DIGITS = 9
 
 
 def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
@@ -231,7 +231,7 @@ def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
     """
     digits = 3
     while (
-        digits < _MOST_DIGITS
+        digits < _MAX_DIGITS
         and value != limit
         and _significant_digits(value, digits) == _significant_digits(limit, digits)
     ):

@@ -24,7 +24,7 @@ _DASHES: tuple[Any, ...] = ("-", (0, (7, 2)), (0, (4, 2)), (0, (2, 2)), (0, (1, 
 # Marker of each mode.
 _MARKS = {"short period": "o", "phugoid": "s", "Dutch roll": "D", "roll-spiral": "P", "roll": "^", "spiral": "v"}
 _MODE_COLORS = dict(zip(_MARKS, theme.MODES, strict=True))
-_ROWS = {
+_QUANTITIES = {
     "pitch": ("pitch", "°", 180.0 / math.pi),
     "roll": ("roll", "°", 180.0 / math.pi),
     "yaw": ("heading", "°", 180.0 / math.pi),
@@ -52,31 +52,37 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
         axes = figure.subplots(2, 2)
         figure.subplots_adjust(left=0.075, right=0.975, top=0.87, bottom=0.065, wspace=0.2, hspace=0.32)
         if aircraft.battery_voltage == 0.0:
-            idle = "throttle closed"
+            descent_text = "throttle closed"
         else:
-            idle = "the motor brakes" if envelope.motor_braking else "without current (the motor does not brake)"
-        subtitle = f"JSBSim trims; climbs at full throttle, descents: {idle}; shaded: the speeds that guidance uses"
+            descent_text = (
+                "the motor brakes" if envelope.motor_braking else "without current (the motor does not brake)"
+            )
+        subtitle = (
+            f"JSBSim trims; climbs at full throttle, descents: {descent_text}; shaded: the speeds that guidance uses"
+        )
         _write_title(figure, f"{aircraft.title}: steady flight envelope", subtitle)
         _draw_slopes(axes[0, 0], aircraft, envelope)
-        _level_speeds(axes[0, 1], aircraft, envelope)
+        _draw_level_speeds(axes[0, 1], aircraft, envelope)
         _draw_slopes_in_wind(axes[1, 0], aircraft, envelope)
         _draw_turns(axes[1, 1], aircraft)
     return figure
 
 
 def _draw_slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
-    heights = np.linspace(0, envelope.amsl.size - 1, len(theme.SHADES)).round().astype(int)
-    for k, j in enumerate(heights):
-        look = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
-        axes.plot(envelope.airspeed, np.degrees(envelope.climb[:, j]), label=f"{envelope.amsl[j]:.0f} m", **look)
-        axes.plot(envelope.airspeed, -np.degrees(envelope.descent[:, j]), **look)
+    altitude_columns = np.linspace(0, envelope.amsl.size - 1, len(theme.SHADES)).round().astype(int)
+    for k, column in enumerate(altitude_columns):
+        style = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
+        axes.plot(
+            envelope.airspeed, np.degrees(envelope.climb[:, column]), label=f"{envelope.amsl[column]:.0f} m", **style
+        )
+        axes.plot(envelope.airspeed, -np.degrees(envelope.descent[:, column]), **style)
     axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
     _shade_guidance_speeds(axes, aircraft)
     _set_up_axes(axes, "steepest climb and descent relative to the air", "airspeed (m/s)", "flight path (°)")
-    _legend_above(axes, "height AMSL", 3)
+    _add_legend_above(axes, "height AMSL", 3)
 
 
-def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
+def _draw_level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     min_speeds, max_speeds = envelope.level_speed_min, envelope.level_speed_max
     axes.fill_betweenx(envelope.amsl, min_speeds, max_speeds, color=theme.colour("planned"), alpha=0.2, linewidth=0)
     axes.plot(
@@ -92,33 +98,33 @@ def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     span = float(np.nanmax(max_speeds) - np.nanmin(min_speeds))
     axes.set_xlim(float(np.nanmin(min_speeds)) - 0.08 * span, float(np.nanmax(max_speeds)) + 0.08 * span)
     _set_up_axes(axes, "level flight", "airspeed (m/s)", "height AMSL (m)")
-    _legend_above(axes, "", 2)
+    _add_legend_above(axes, "", 2)
 
 
 def _draw_slopes_in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 60)
     for k, wind in enumerate(_WINDS):
-        climb, dive = np.degrees([envelope.slope_limits(float(v), TRIM_AMSL, wind) for v in speeds]).T
+        climb, dive = np.degrees([envelope.slope_limits(float(speed), TRIM_AMSL, wind) for speed in speeds]).T
         name = "calm" if wind == 0.0 else f"{abs(wind):.0f} m/s {'tail' if wind > 0.0 else 'head'}wind"
-        look = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
-        axes.plot(speeds, climb, label=name, **look)
-        axes.plot(speeds, -dive, **look)
+        style = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
+        axes.plot(speeds, climb, label=name, **style)
+        axes.plot(speeds, -dive, **style)
     axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
     _set_up_axes(
         axes, f"steepest climb and descent over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)"
     )
-    _legend_above(axes, "", 3)
+    _add_legend_above(axes, "", 3)
 
 
 def _draw_turns(axes: Any, aircraft: Aircraft) -> None:
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max + 10.0, 80)
     for k, bank in enumerate(_BANKS_DEG):
-        radii = [turn_radius(float(v), math.radians(bank)) for v in speeds]
+        radii = [turn_radius(float(speed), math.radians(bank)) for speed in speeds]
         axes.plot(speeds, radii, color=theme.SHADES[k], linestyle=_DASHES[k], linewidth=1.3, label=f"{bank}° of bank")
     _shade_guidance_speeds(axes, aircraft)
     _set_up_axes(axes, "turn radius", "ground speed (m/s)", "radius (m)")
     axes.set_ylim(0.0, None)
-    _legend_above(axes, "", 2)
+    _add_legend_above(axes, "", 2)
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
@@ -158,7 +164,7 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
             )
         axes[0, 0].axhline(0.0, color=theme.colour("area"), linewidth=0.8)
         _set_up_axes(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
-        _legend_above(axes[0, 0], "", 2)
+        _add_legend_above(axes[0, 0], "", 2)
         _draw_power(axes[0, 1], aircraft, speeds, trims)
         _draw_roots(axes[1, 0], modes, all_modes=True)
         _draw_roots(axes[1, 1], modes, all_modes=False)
@@ -174,26 +180,28 @@ def _draw_power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[T
         markersize=3,
         label="throttle",
     )
-    kind = "battery power" if aircraft.battery_voltage > 0.0 else "heat of the fuel"
-    other = axes.twinx()
+    power_name = "battery power" if aircraft.battery_voltage > 0.0 else "heat of the fuel"
+    power_axes = axes.twinx()
     power = np.array([row.power for row in trims]) / 1000.0
-    other.plot(speeds, power, "s", linestyle="--", color=theme.colour("second"), markersize=3, label=f"{kind} (right)")
-    other.set_ylabel("power (kW)")
-    other.set_ylim(0.0, 1.15 * float(power.max(initial=0.1)))
+    power_axes.plot(
+        speeds, power, "s", linestyle="--", color=theme.colour("second"), markersize=3, label=f"{power_name} (right)"
+    )
+    power_axes.set_ylabel("power (kW)")
+    power_axes.set_ylim(0.0, 1.15 * float(power.max(initial=0.1)))
     axes.set_ylim(0.0, 105.0)
     _set_up_axes(axes, "throttle and power", "airspeed (m/s)", "throttle (%)")
-    lines = [*axes.get_lines(), *other.get_lines()]
+    lines = [*axes.get_lines(), *power_axes.get_lines()]
     axes.legend(lines, [line.get_label() for line in lines], loc="lower right")
 
 
 def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: bool) -> None:
     """Draw the upper half of the root plane: all modes, or only the slow ones near the origin."""
-    slow = {"phugoid", "spiral", "roll-spiral"}
-    labelled: set[str] = set()
+    slow_modes = {"phugoid", "spiral", "roll-spiral"}
+    labelled_modes: set[str] = set()
     for speed, speed_modes in modes.items():
-        fastest = speed == max(modes)
+        is_max_speed = speed == max(modes)
         for mode in speed_modes:
-            if not all_modes and mode.name not in slow:
+            if not all_modes and mode.name not in slow_modes:
                 continue
             # Markers are filled at the highest airspeed, to show the direction of the root locus.
             axes.plot(
@@ -202,13 +210,13 @@ def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: 
                 _MARKS[mode.name],
                 color=_MODE_COLORS[mode.name],
                 markersize=5,
-                markerfacecolor=_MODE_COLORS[mode.name] if fastest else theme.colour("paper"),
-                label=None if mode.name in labelled else mode.name,
+                markerfacecolor=_MODE_COLORS[mode.name] if is_max_speed else theme.colour("paper"),
+                label=None if mode.name in labelled_modes else mode.name,
             )
-            labelled.add(mode.name)
+            labelled_modes.add(mode.name)
     axes.axvline(0.0, color=theme.colour("area"), linewidth=0.8)
-    slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
-    title = f"modes {slow_or_fast}" if all_modes else "the slow modes, enlarged"
+    speed_range_text = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
+    title = f"modes {speed_range_text}" if all_modes else "the slow modes, enlarged"
     _set_up_axes(axes, title, "real part (1/s): right of 0 is unstable", "imaginary part (rad/s)")
     min_x, max_x = axes.get_xlim()
     axes.set_xlim(min_x - 0.05 * (max_x - min_x), max_x + 0.05 * (max_x - min_x))
@@ -229,30 +237,30 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
     >>> [axes.get_title(loc="left") for axes in figure.axes[:4]]
     ['change of pitch (°)', 'change of pitch (°)', 'change of roll (°)', 'change of roll (°)']
     """
-    deep = max(len(step.quantities) for step in steps)
+    panel_count = max(len(step.quantities) for step in steps)
     with clean_style():
-        figure = new_figure(1.3 + 1.7 * deep)
-        axes = figure.subplots(deep, len(steps), squeeze=False, sharex="col")
+        figure = new_figure(1.3 + 1.7 * panel_count)
+        axes = figure.subplots(panel_count, len(steps), squeeze=False, sharex="col")
         figure.subplots_adjust(left=0.05, right=0.985, top=0.865, bottom=0.065, wspace=0.24, hspace=0.28)
-        level = f"level flight at {aircraft.airspeed:g} m/s and {TRIM_AMSL:.0f} m"
+        start_text = f"level flight at {aircraft.airspeed:g} m/s and {TRIM_AMSL:.0f} m"
         _write_title(
-            figure, f"{aircraft.title}: step responses", f"from {level}, one control moved at 1 s, no guidance"
+            figure, f"{aircraft.title}: step responses", f"from {start_text}, one control moved at 1 s, no guidance"
         )
         for column, step in enumerate(steps):
-            for row in range(deep):
+            for row in range(panel_count):
                 panel = axes[row, column]
                 if row >= len(step.quantities):
                     panel.axis("off")
                     continue
                 _draw_step_response(panel, step, row)
-            top = axes[0, column].get_position()
-            figure.text(top.x0, top.y1 + 0.035, _step_title(step), fontsize=9.0, fontweight="bold")
+            column_box = axes[0, column].get_position()
+            figure.text(column_box.x0, column_box.y1 + 0.035, _step_title(step), fontsize=9.0, fontweight="bold")
             axes[-1, column].set_xlabel("time (s)")
     return figure
 
 
 def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
-    name, unit, factor = _ROWS[step.quantities[row]]
+    name, unit, factor = _QUANTITIES[step.quantities[row]]
     values = factor * step.change[:, row]
     axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
     hold_time = min(step.held, float(step.time[-1]) - 1.0)
@@ -267,14 +275,18 @@ def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
 def _step_title(step: StepResponse) -> str:
     name = step.control
     if step.control == "throttle":
-        size = f"{100.0 * step.size:+.0f} %"
+        size_text = f"{100.0 * step.size:+.0f} %"
     else:
-        ways = {"elevator": ("down", "up"), "aileron": ("to roll right", "to roll left"), "rudder": ("to yaw left", "")}
-        size = f"{abs(math.degrees(step.size)):.1f}° {ways[step.control][step.size < 0.0]}"
-    return f"{name} {size}" + (f", {step.held:.0f} s" if math.isfinite(step.held) else ", held")
+        direction_names = {
+            "elevator": ("down", "up"),
+            "aileron": ("to roll right", "to roll left"),
+            "rudder": ("to yaw left", ""),
+        }
+        size_text = f"{abs(math.degrees(step.size)):.1f}° {direction_names[step.control][step.size < 0.0]}"
+    return f"{name} {size_text}" + (f", {step.held:.0f} s" if math.isfinite(step.held) else ", held")
 
 
-def _legend_above(axes: Any, title: str, columns: int) -> None:
+def _add_legend_above(axes: Any, title: str, columns: int) -> None:
     """Write the legend in the upper part of the panel, and raise the axis limit to keep lines clear of it."""
     legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
     renderer = axes.figure.canvas.get_renderer()
@@ -289,10 +301,10 @@ def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:
     axes.axvline(aircraft.airspeed, color=theme.colour("quiet"), linewidth=0.8, linestyle=":")
 
 
-def _set_up_axes(axes: Any, title: str, x: str, y: str) -> None:
+def _set_up_axes(axes: Any, title: str, x_label: str, y_label: str) -> None:
     axes.set_title(title, fontsize=9.5)
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
     axes.grid(color=theme.colour("grid"), linewidth=0.5)
     axes.set_axisbelow(True)
 

@@ -27,12 +27,12 @@ BLOCKS = 600
 class Layer:
     """One graphical layer of a panel.
 
-    kind: "band" is filled from `low` up to `y`, "area" is the inside of closed outlines, "dashes" are short horizontal
-    strokes, "rings" mark failures.
+    kind: "band" is filled from `lower_edge` up to `y`, "area" is the inside of closed outlines, "dashes" are short
+        horizontal strokes, "rings" mark failures.
     name: name in legend and read-out; "" leaves the layer out of both.
     role: meaning of the layer; `logs.theme` assigns its look.
     x, y: (n,) in the panel's units; NaN separates parts of a line or an outline.
-    low: (n,) lower edge of a band.
+    lower_edge: (n,) lower edge of a band.
     dashed: True for the second of two lines of one role.
     quiet: True for a layer in the legend but not in the read-out of the page.
     legend: common legend text of several layers; "" for the name.
@@ -45,7 +45,7 @@ class Layer:
     role: str
     x: Floats
     y: Floats
-    low: Floats | None = None
+    lower_edge: Floats | None = None
     dashed: bool = False
     quiet: bool = False
     legend: str = ""
@@ -57,7 +57,7 @@ class Layer:
 class Label:
     """A text at a position of a panel, moved away from other labels.
 
-    A "name" without free space is left out.
+    A "name" without free space is omitted.
 
     rank: "fail" is framed, "end" and "number" are bold; the page writes these two and shows the others on hover.
     prefer: direction tried first; (0, 0) centers the text on the position.
@@ -110,7 +110,7 @@ class Panel:
             return self.span
         values = [value for _, value in self.limits if math.isfinite(value)]
         for layer in self.layers:
-            for edge in (layer.y, layer.low):
+            for edge in (layer.y, layer.lower_edge):
                 finite = edge[np.isfinite(edge)] if edge is not None else np.zeros(0)
                 values += [float(finite.min()), float(finite.max())] if finite.size else []
         min_value, max_value = (min(values), max(values)) if values else (0.0, 1.0)
@@ -125,12 +125,12 @@ class Chart:
 
     title: title of a picture; a page has its own headings.
     along, unit: quantity and unit of a shared horizontal axis.
-    reach: range of that axis; None for the range that the layers need.
+    axis_range: range of that axis; None for the range that the layers need.
     shared: True if the panels share the horizontal axis: they are zoomed and read out together.
     marks: starts of legs, as value along the axis and text.
     timed: True if the horizontal axis is the time of flight, so that a click on it can move the aircraft there.
-    tall: height of a panel on a page, pixels.
-    inches: height of a panel in print, inches.
+    page_height: height of a panel on a page, pixels.
+    print_height: height of a panel in print, inches.
     widths: widths of panels side by side in print, as fractions of its width; empty for stacked panels.
     legend: position in print: right of each panel (once above all if the panels share it), or below all.
     scaled: True if print states the factor by which heights are stretched against distances.
@@ -140,12 +140,12 @@ class Chart:
     along: str
     unit: str
     panels: tuple[Panel, ...]
-    reach: tuple[float, float] | None = None
+    axis_range: tuple[float, float] | None = None
     shared: bool = True
     marks: tuple[tuple[float, str], ...] = ()
     timed: bool = False
-    tall: int = 120
-    inches: float = 1.12
+    page_height: int = 120
+    print_height: float = 1.12
     widths: tuple[float, ...] = ()
     legend: Literal["beside", "below"] = "beside"
     scaled: bool = False
@@ -154,10 +154,10 @@ class Chart:
         """Return the panels that have a value, or the first panel if none has any."""
         return tuple(panel for panel in self.panels if panel.has_values()) or self.panels[:1]
 
-    def shown_reach(self) -> tuple[float, float]:
-        """`reach`, or from the first to the last value along the axis."""
-        if self.reach is not None:
-            return self.reach
+    def shown_axis_range(self) -> tuple[float, float]:
+        """`axis_range`, or from the first to the last value along the axis."""
+        if self.axis_range is not None:
+            return self.axis_range
         finite = [layer.x[np.isfinite(layer.x)] for panel in self.panels for layer in panel.layers]
         values = np.concatenate([*finite, np.zeros(0)])
         return (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -188,12 +188,12 @@ def parted(parts: Sequence[Floats]) -> tuple[Floats, Floats]:
     [0.0, 0.0, nan, 1.0, nan]
     """
     gap = np.full((1, 2), np.nan)
-    together = np.vstack([piece for part in parts if len(part) for piece in (part, gap)] or [np.zeros((0, 2))])
-    return together[:, 0], together[:, 1]
+    points = np.vstack([lines for part in parts if len(part) for lines in (part, gap)] or [np.zeros((0, 2))])
+    return points[:, 0], points[:, 1]
 
 
 def held_band(is_held: NDArray[np.bool_], along: Floats, span: tuple[float, float]) -> Layer:
-    """Return a layer that shades, over the full height, where a control is held at its limit on a long axis (t,)."""
+    """Return a layer that shades the parts of a long axis (t,) in which a control is at its limit."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_held, [False]]).astype(np.int8)))
     starts, band_ends = along[edges[::2]], along[edges[1::2] - 1]
     gap = np.full(len(starts), np.nan)
@@ -211,7 +211,7 @@ def leg_marks(legs: NDArray[Any], along: Floats) -> tuple[tuple[float, str], ...
 def outline_rows(values: ArrayLike, count: int) -> Indices:
     """Return the rows of the lowest and highest value of each of `count` blocks, to keep the outline of a long series.
 
-    values: (t,); NaN rows are left out unless a block has no other rows.  All rows of a short series are returned.
+    values: (t,); NaN rows are omitted unless a block has no other rows.  All rows of a short series are returned.
     """
     column = np.asarray(values, dtype=np.float64)
     if column.size <= 2 * count:
@@ -227,12 +227,12 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     return np.unique(np.concatenate([[0, column.size - 1], lowest, highest]))
 
 
-def nice_step(span: float, parts: int) -> float:
-    """Return the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `parts` pieces."""
-    raw = max(span, 1e-9) / parts
-    power = 10.0 ** np.floor(np.log10(raw))
+def nice_step(span: float, max_count: int) -> float:
+    """Return the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `max_count` pieces."""
+    min_step = max(span, 1e-9) / max_count
+    power = 10.0 ** np.floor(np.log10(min_step))
     for factor in (1.0, 2.0, 5.0, 10.0):
-        if factor * power >= raw * (1 - 1e-9):
+        if factor * power >= min_step * (1 - 1e-9):
             return float(factor * power)
     return float(10.0 * power)
 
@@ -281,14 +281,14 @@ def chart_json(chart: Chart) -> Json:
         "unit": chart.unit,
         "shared": chart.shared,
         "timed": chart.timed,
-        "tall": chart.tall,
+        "tall": chart.page_height,
         "marks": [[round(value, 3), text] for value, text in chart.marks],
         "panels": [panel_json(panel) for panel in chart.shown_panels()],
     }
 
 
 def panel_json(panel: Panel) -> Json:
-    """Return a panel as JSON data; layers without a value and NaN limits are left out."""
+    """Return a panel as JSON data; layers without a value and NaN limits are omitted."""
     labels = [label for label in panel.labels if label.rank in ("end", "number")]
     return {
         "title": panel.title,
@@ -306,16 +306,16 @@ def _layer_json(layer: Layer) -> Json:
     document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
     if layer.flight is None:
         document |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}
-    if layer.low is not None:
-        document["low"] = numbers(layer.low, telling_digits(layer.low))
-    rarer: Json = {
+    if layer.lower_edge is not None:
+        document["low"] = numbers(layer.lower_edge, telling_digits(layer.lower_edge))
+    optional_keys: Json = {
         "dashed": layer.dashed,
         "quiet": layer.quiet,
         "legend": layer.legend,
         "words": list(layer.hover_texts),
     }
-    rarer = {word: value for word, value in rarer.items() if value}
-    return document | rarer | ({} if layer.flight is None else {"flight": layer.flight})
+    optional_keys = {key: value for key, value in optional_keys.items() if value}
+    return document | optional_keys | ({} if layer.flight is None else {"flight": layer.flight})
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,6 +336,6 @@ def legend_entries(panels: Sequence[Panel]) -> tuple[LegendEntry, ...]:
     for panel in panels:
         for label, _ in panel.limits:
             if label:
-                none = np.zeros(0)
-                layers_by_name.setdefault(label, []).append(Layer("line", label, "limit", none, none))
+                empty = np.zeros(0)
+                layers_by_name.setdefault(label, []).append(Layer("line", label, "limit", empty, empty))
     return tuple(LegendEntry(text, tuple(layers)) for text, layers in layers_by_name.items())

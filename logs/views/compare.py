@@ -35,7 +35,7 @@ def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
     winds = [
         NamedWind(flight.setup.scenario.wind, flight.name, role) for flight, role in zip(flights, ROLES, strict=True)
     ]
-    a, b = (replace(named_wind.wind, seed=None) for named_wind in winds)
+    first_wind, second_wind = (replace(named_wind.wind, seed=None) for named_wind in winds)
     return map_chart(
         with_fence_zones(first.setup).scenario,
         "two flights from above",
@@ -45,7 +45,7 @@ def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
             DrawnTrack(shorten(flight.name, 40), flight.track, role, k)
             for k, (flight, role) in enumerate(zip(flights, ROLES, strict=True))
         ],
-        winds=[NamedWind(a)] if a == b else winds,
+        winds=[NamedWind(first_wind)] if first_wind == second_wind else winds,
         verdict=None,
         stops=first.setup.route.stops.tolist(),
     )
@@ -56,13 +56,13 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
 
     Without terrain there is no panel of the height above ground.
     """
-    flown = [_distance_flown(flight.track) for flight in flights]
-    along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
+    distances = [_distance_flown(flight.track) for flight in flights]
+    along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
     def both(values: list[Floats]) -> tuple[Layer, ...]:
         return tuple(
             series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
-            for flight, role, distance, value in zip(flights, ROLES, flown, values, strict=True)
+            for flight, role, distance, value in zip(flights, ROLES, distances, values, strict=True)
         )
 
     tracks = [flight.track for flight in flights]

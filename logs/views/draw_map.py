@@ -43,16 +43,16 @@ def draw_map(chart: MapChart) -> Figure:
     """Draw the top view: north up, equal scales, axes in m labelled in km from the scenario's origin."""
     with clean_style():
         handles = [legend_handle(entry) for entry in legend_entries([chart.panel])]
-        legend = _legend_height(handles)
-        figure, axes = map_frame(chart.east, chart.north, legend)
+        legend_height = _legend_height(handles)
+        figure, axes = map_frame(chart.east, chart.north, legend_height)
         axes.set_xlabel(f"east of {chart.origin} (km)")
         axes.set_ylabel("north (km)")
         axes.set_title(chart.title, fontweight="bold")
-        around = draw_ground(figure, axes, chart.terrain, _COLUMN, _TOP)
+        ground_handles = draw_ground(figure, axes, chart.terrain, _COLUMN, _TOP)
         draw_layers(axes, chart.panel)
         write_labels(axes, chart.panel)
-        draw_compass(figure, chart.winds, _COLUMN, legend)
-        draw_legend(figure, handles + around, _LEFT, (legend - 0.02) / figure.get_figheight())
+        draw_compass(figure, chart.winds, _COLUMN, legend_height)
+        draw_legend(figure, handles + ground_handles, _LEFT, (legend_height - 0.02) / figure.get_figheight())
     return figure
 
 
@@ -62,17 +62,17 @@ def _legend_height(handles: list[Any]) -> float:
     return max(_LEGEND, 0.08 + _LEGEND_LINE * max(int(column.sum()) for column in np.array_split(lines, 4)))
 
 
-def map_frame(east: tuple[float, float], north: tuple[float, float], legend: float) -> tuple[Figure, Any]:
+def map_frame(east: tuple[float, float], north: tuple[float, float], legend_height: float) -> tuple[Figure, Any]:
     """Make figure and axes of a map with these ranges (m).
 
-    legend: height of the legend below the map, inches.
+    legend_height: height of the legend below the map, inches.
     """
     height = _MAP_WIDTH * (north[1] - north[0]) / (east[1] - east[0])
-    tall = max(height, _MIN_HEIGHT)
-    total = _TOP + tall + _BOTTOM + legend
-    figure = new_figure(total)
-    base = legend + _BOTTOM + 0.5 * (tall - height)
-    axes = figure.add_axes((_LEFT / WIDTH, base / total, _MAP_WIDTH / WIDTH, height / total))
+    frame_height = max(height, _MIN_HEIGHT)
+    figure_height = _TOP + frame_height + _BOTTOM + legend_height
+    figure = new_figure(figure_height)
+    base = legend_height + _BOTTOM + 0.5 * (frame_height - height)
+    axes = figure.add_axes((_LEFT / WIDTH, base / figure_height, _MAP_WIDTH / WIDTH, height / figure_height))
     axes.set(xlim=east, ylim=north, aspect="equal", facecolor=theme.colour("unknown"))
     step = nice_step(max(east[1] - east[0], north[1] - north[0]), 14)
     kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
@@ -122,61 +122,68 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
     axes.clabel(
         lines, levels[1::2], fmt="%.0f", fontsize=5.5, colors=theme.colour("contour"), inline_spacing=1, zorder=2.1
     )
-    _colour_bar(figure, colours, norm, levels, column, top)
+    _draw_colour_bar(figure, colours, norm, levels, column, top)
     return [Line2D([], [], color=theme.colour("contour"), linewidth=0.8, label=f"contours every {step:g} m AMSL")]
 
 
-def _colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
-    total = float(figure.get_figheight())
-    tall = min(2.6, total - 3.4)
-    frame = (column / WIDTH, (total - top - tall - 0.25) / total, 0.16 / WIDTH, tall / total)
+def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
+    figure_height = float(figure.get_figheight())
+    bar_height = min(2.6, figure_height - 3.4)
+    frame = (
+        column / WIDTH,
+        (figure_height - top - bar_height - 0.25) / figure_height,
+        0.16 / WIDTH,
+        bar_height / figure_height,
+    )
     bar = figure.colorbar(ScalarMappable(norm, colours), cax=figure.add_axes(frame))
     bar.set_ticks(levels[:: max(1, len(levels) // 8)].tolist())
     bar.set_label("ground height (m AMSL)", fontsize=8)
     bar.ax.tick_params(labelsize=7.5)
 
 
-def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend: float = 0.0) -> None:
+def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, legend_height: float = 0.0) -> None:
     """Draw north and the direction of each wind in the column right of the map (left edge in inches).
 
-    legend: height of the legend below the map, inches; the notes on winds stay above its upper edge.
+    legend_height: height of the legend below the map, inches; the notes on winds stay above its upper edge.
     """
-    total = float(figure.get_figheight())
-    side = 1.0
+    figure_height = float(figure.get_figheight())
+    dial_size = 1.0
     notes = [
         (_wind_text(named_wind), theme.colour(named_wind.role) if len(winds) > 1 else theme.colour("ink"))
         for named_wind in winds
     ]
     lines = sum(text.count("\n") + 1 for text, _ in notes)
-    base = max(1.35, max(0.2, legend + 0.04) + _LINE * (lines + len(notes) - 1))
-    dial = figure.add_axes((column / WIDTH - 0.01, base / total, side / WIDTH, side / total))
+    dial_bottom = max(1.35, max(0.2, legend_height + 0.04) + _LINE * (lines + len(notes) - 1))
+    dial = figure.add_axes(
+        (column / WIDTH - 0.01, dial_bottom / figure_height, dial_size / WIDTH, dial_size / figure_height)
+    )
     dial.set(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25), aspect="equal")
     dial.axis("off")
     dial.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor=theme.colour("rim"), linewidth=0.8))
     dial.text(0, 1.05, "N", ha="center", va="bottom", fontsize=8.5, fontweight="bold")
     dial.plot([0, 0], [0.82, 1.0], color=theme.colour("ink"), linewidth=1.2)
-    blowing = [named_wind for named_wind in winds if named_wind.wind.speed > 0.0]
-    for k, named_wind in enumerate(blowing):
+    winds_with_arrows = [named_wind for named_wind in winds if named_wind.wind.speed > 0.0]
+    for k, named_wind in enumerate(winds_with_arrows):
         east, north = np.sin(named_wind.wind.from_course), np.cos(named_wind.wind.from_course)
         # The second arrow is dashed and shorter, so that both show if they overlap.
         arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
         arrow |= {"color": theme.colour(named_wind.role), "linestyle": (0, (3, 1.5)) if k else "-"}
         length = 0.8 - 0.25 * k
         dial.annotate("", (-length * east, -length * north), (length * east, length * north), arrowprops=arrow)
-    if not blowing:
+    if not winds_with_arrows:
         dial.text(0, 0, "calm", ha="center", va="center", fontsize=7.5, color=theme.colour("quiet"))
-    top = base - 0.02
+    note_top = dial_bottom - 0.02
     for text, colour in notes:
-        look: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 7.5, "color": colour}
-        figure.text((column + 0.4) / WIDTH, top / total, text, **look)
-        top -= _LINE * (text.count("\n") + 2)
+        style: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 7.5, "color": colour}
+        figure.text((column + 0.4) / WIDTH, note_top / figure_height, text, **style)
+        note_top -= _LINE * (text.count("\n") + 2)
 
 
 def _wind_text(named_wind: NamedWind) -> str:
     wind = named_wind.wind
-    note = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""
+    text = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""
     if wind.speed > 0.0:
-        note += f"wind {wind.speed:.1f} m/s\nfrom {round(np.degrees(wind.from_course)) % 360:03d}°"
+        text += f"wind {wind.speed:.1f} m/s\nfrom {round(np.degrees(wind.from_course)) % 360:03d}°"
     else:
-        note += "no mean wind"
-    return note + (f"\n{wind.turbulence} turbulence" if wind.turbulence != "none" else "")
+        text += "no mean wind"
+    return text + (f"\n{wind.turbulence} turbulence" if wind.turbulence != "none" else "")

@@ -61,13 +61,16 @@ class Projection:
 
     def project(self, points: Floats) -> Floats:
         """Return picture coordinates and depth towards the viewer, m: (..., 3) from points (..., 3)."""
-        e, n, u = np.moveaxis(points - self.middle, -1, 0)
+        east, north, up = np.moveaxis(points - self.middle, -1, 0)
         cos_azimuth, sin_azimuth = math.cos(self.azimuth), math.sin(self.azimuth)
-        across = -sin_azimuth * e + cos_azimuth * n
-        toward = cos_azimuth * e + sin_azimuth * n
-        height = self.stretch * u
-        sin, cos = math.sin(_ELEVATION), math.cos(_ELEVATION)
-        return np.stack([across, cos * height - sin * toward, sin * height + cos * toward], axis=-1)
+        across = -sin_azimuth * east + cos_azimuth * north
+        toward = cos_azimuth * east + sin_azimuth * north
+        height = self.stretch * up
+        sin_elevation, cos_elevation = math.sin(_ELEVATION), math.cos(_ELEVATION)
+        return np.stack(
+            [across, cos_elevation * height - sin_elevation * toward, sin_elevation * height + cos_elevation * toward],
+            axis=-1,
+        )
 
     @property
     def toward(self) -> Floats:
@@ -93,7 +96,7 @@ def draw_scene(view: SceneView) -> Figure:
     projection = _make_projection(route, bounds, exaggeration(setup, bounds, grid), is_narrow)
     with clean_style():
         figure, axes = _make_axes(setup, projection, bounds, grid)
-        handles = _ground_surface(axes, projection, grid, bounds)
+        handles = _draw_ground(axes, projection, grid, bounds)
         handles += _draw_threats(axes, projection, setup, failed)
         handles += _draw_zones(axes, projection, setup)
         placer = LabelPlacer(axes)
@@ -132,13 +135,19 @@ def _make_axes(
     setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
 ) -> tuple[Figure, Any]:
     min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
-    corners = np.array([[e, n, min_altitude] for e in bounds[0] for n in bounds[1]])
+    corners = np.array([[east, north, min_altitude] for east in bounds[0] for north in bounds[1]])
     threats = setup.scenario.threats
-    tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array([0, 0, 1.0])
-    projected_parts = [projection.project(corners), projection.project(setup.route.waypoints), projection.project(tops)]
+    sphere_tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array(
+        [0, 0, 1.0]
+    )
+    projected_parts = [
+        projection.project(corners),
+        projection.project(setup.route.waypoints),
+        projection.project(sphere_tops),
+    ]
     if grid is not None:
-        e, n = np.meshgrid(grid.east, grid.north)
-        surface = projection.project(np.stack([e, n, grid.heights], axis=-1)).reshape(-1, 3)
+        east, north = np.meshgrid(grid.east, grid.north)
+        surface = projection.project(np.stack([east, north, grid.heights], axis=-1)).reshape(-1, 3)
         projected_parts.append(surface[np.isfinite(surface).all(axis=1)])
     projected_points = np.vstack(projected_parts)[:, :2]
     min_corner, max_corner = projected_points.min(axis=0), projected_points.max(axis=0)
@@ -151,9 +160,9 @@ def _make_axes(
     figure_height = float(
         np.clip(figure_width * (max_corner[1] - min_corner[1]) / (max_corner[0] - min_corner[0]), 3.0, 8.0)
     )
-    total = figure_height + _TOP + _BOTTOM
-    figure = new_figure(total)
-    axes = figure.add_axes((_LEFT / WIDTH, _BOTTOM / total, figure_width / WIDTH, figure_height / total))
+    total_height = figure_height + _TOP + _BOTTOM
+    figure = new_figure(total_height)
+    axes = figure.add_axes((_LEFT / WIDTH, _BOTTOM / total_height, figure_width / WIDTH, figure_height / total_height))
     axes.set(xlim=(min_corner[0], max_corner[0]), ylim=(min_corner[1], max_corner[1]), facecolor=theme.colour("sky"))
     axes.set_aspect("equal", adjustable="box")
     axes.set(xticks=[], yticks=[])
@@ -162,12 +171,15 @@ def _make_axes(
     return figure, axes
 
 
-def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
+def _draw_ground(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
     """Draw the cells of the ground from the farthest to the nearest, shaded by light from the north-west."""
     if grid is None:
-        base = float(projection.middle[2])
+        level_altitude = float(projection.middle[2])
         corners = np.array(
-            [[e, n, base] for e, n in zip(bounds[0][[0, 1, 1, 0]], bounds[1][[0, 0, 1, 1]], strict=True)]
+            [
+                [east, north, level_altitude]
+                for east, north in zip(bounds[0][[0, 1, 1, 0]], bounds[1][[0, 0, 1, 1]], strict=True)
+            ]
         )
         axes.add_collection(
             PolyCollection(
@@ -178,28 +190,28 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
             )
         )
         return [_legend_handle("band", "level-ground", "no terrain: level at mid height")]
-    e, n = np.meshgrid(grid.east, grid.north)
-    corners = projection.project(np.stack([e, n, grid.heights], axis=-1))
+    east, north = np.meshgrid(grid.east, grid.north)
+    corners = projection.project(np.stack([east, north, grid.heights], axis=-1))
     cells = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=2).reshape(-1, 4, 3)
     up_north, up_east = np.gradient(
         np.nan_to_num(grid.heights, nan=float(np.nanmin(grid.heights))), grid.north, grid.east
     )
     slope_e, slope_n = projection.stretch * up_east, projection.stretch * up_north
-    lit = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
+    brightness = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
     min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
     colours = LinearSegmentedColormap.from_list("ground", theme.GROUND)(
         (grid.heights - min_height) / max(max_height - min_height, 1.0)
     )
-    colours[..., :3] *= np.clip(0.55 + 0.5 * lit, 0.35, 1.0)[..., None]
-    faces = 0.25 * (colours[:-1, :-1] + colours[:-1, 1:] + colours[1:, 1:] + colours[1:, :-1]).reshape(-1, 4)
+    colours[..., :3] *= np.clip(0.55 + 0.5 * brightness, 0.35, 1.0)[..., None]
+    cell_colours = 0.25 * (colours[:-1, :-1] + colours[:-1, 1:] + colours[1:, 1:] + colours[1:, :-1]).reshape(-1, 4)
     is_known = np.isfinite(cells).all(axis=(1, 2))
-    order = np.flatnonzero(is_known)[np.argsort(cells[is_known][:, :, 2].mean(axis=1), kind="stable")]
+    draw_order = np.flatnonzero(is_known)[np.argsort(cells[is_known][:, :, 2].mean(axis=1), kind="stable")]
     # Draw edges in the colour of the cells, to close the seams left by antialiasing.
     axes.add_collection(
         PolyCollection(
-            list(cells[order][:, :, :2]),
-            facecolor=faces[order],
-            edgecolor=faces[order],
+            list(cells[draw_order][:, :, :2]),
+            facecolor=cell_colours[draw_order],
+            edgecolor=cell_colours[draw_order],
             linewidth=0.4,
             zorder=1,
             rasterized=True,
@@ -211,7 +223,7 @@ def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, 
 def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
     """Draw outlines of the upper halves of spheres, at the altitude of their centers.
 
-    Entered spheres are broad.
+    Spheres that the flight enters have a broad outline.
     """
     threats = setup.scenario.threats
     handles: list[Any] = []
@@ -220,11 +232,11 @@ def _draw_threats(axes: Any, projection: Projection, setup: FlightSetup, failed:
     angles = np.linspace(0.0, 2.0 * math.pi, 97)
     vertical = np.where(angles < math.pi, top_height, math.sin(_ELEVATION)) * np.sin(angles)
     shape = np.column_stack([np.cos(angles), vertical])
-    looks: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
+    threat_styles: tuple[tuple[str, Floats, dict[str, Any]], ...] = (
         ("missile", threats.kill_radius, {"facecolor": theme.rgba("missile", theme.LOOKS["missile"].fill)}),
         ("radar", threats.detection_radius, {"facecolor": "none", "linestyle": (0, (4, 2.5))}),
     )
-    for kind, radii, style in looks:
+    for kind, radii, style in threat_styles:
         style |= {"edgecolor": theme.colour(kind)}
         indices = np.flatnonzero(radii > 0.0)
         for k in indices:
@@ -264,8 +276,8 @@ def _draw_zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[A
 
 def _legend_handle(kind: LayerKind, role: str, text: str) -> Any:
     """Return the handle of a line in the legend."""
-    none = np.zeros(0)
-    return legend_handle(LegendEntry(text, (Layer(kind, text, role, none, none),)))
+    empty = np.zeros(0)
+    return legend_handle(LegendEntry(text, (Layer(kind, text, role, empty, empty),)))
 
 
 def _find_hidden_points(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
@@ -327,13 +339,13 @@ def _draw_paths(
         axes.plot(*corners[waypoint, :2], "o", markersize=12, mfc="none", mec=theme.colour("fail"), mew=2.2, zorder=7.5)
     if terrain is not None:
         handles.append(_legend_handle("line", "pole", "waypoint above the ground"))
-    marks: tuple[tuple[object, LayerKind, str, str], ...] = (
+    failure_entries: tuple[tuple[object, LayerKind, str, str], ...] = (
         (failed.legs, "line", "failing-leg", "leg that fails a rule"),
         (failed.waypoints, "rings", "fail", "waypoint that fails a rule"),
         (failed.threats, "line", "fail", "threat that is entered"),
     )
     return handles + [
-        _legend_handle(kind, role, text) for failing_elements, kind, role, text in marks if failing_elements
+        _legend_handle(kind, role, text) for failing_elements, kind, role, text in failure_entries if failing_elements
     ]
 
 
@@ -367,9 +379,14 @@ def _draw_labels(
         if k % step == 0 or k in failed.waypoints:
             write(str(k), corners[k], "number", "fail" if k in failed.waypoints else "waypoint")
     threats = setup.scenario.threats
-    entered = failed.threat_names()
+    failing_threats = failed.threat_names()
     labels = list(zip(threats.names, projection.project(threats.position), strict=True))
     # Entered spheres first: they get the best places.
-    for k in sorted(range(min(len(labels), _MAX_NAMES)), key=lambda k: k not in entered):
+    for k in sorted(range(min(len(labels), _MAX_NAMES)), key=lambda k: k not in failing_threats):
         name, point = labels[k]
-        write(shorten(name, 20), point, "number" if k in entered else "name", "fail" if k in entered else "ink")
+        write(
+            shorten(name, 20),
+            point,
+            "number" if k in failing_threats else "name",
+            "fail" if k in failing_threats else "ink",
+        )

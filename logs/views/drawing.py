@@ -160,14 +160,16 @@ def page_svg(figure: Figure, description: str) -> str:
     text = svg_bytes(figure).decode("utf-8")
     text = text[text.index("<svg") :]
     opening, body = text.split(">", 1)
-    box = re.search(r'viewBox="[^"]*"', opening)
-    names = re.findall(r'xmlns(?::\w+)?="[^"]*"', opening)
+    view_box = re.search(r'viewBox="[^"]*"', opening)
+    namespaces = re.findall(r'xmlns(?::\w+)?="[^"]*"', opening)
     # Remove the unused names of groups: they would be duplicates in a page of several pictures.
     content = re.sub(r'<g id="[^"]*"', "<g", re.sub(r"<metadata>.*?</metadata>", "", body, flags=re.DOTALL))
     # Make the used names unique to the picture.
     prefix = f"p{zlib.crc32(description.encode()):x}-"
     content = re.sub(r'( id="|href="#|url\(#)', rf"\g<1>{prefix}", content)
-    head = " ".join(['<svg role="img"', f'aria-label="{escape(description)}"', box[0] if box else "", *sorted(names)])
+    head = " ".join(
+        ['<svg role="img"', f'aria-label="{escape(description)}"', view_box[0] if view_box else "", *sorted(namespaces)]
+    )
     return f"{head}>{theme.replace_colours_by_css_variables(content)}".rstrip()
 
 
@@ -206,15 +208,15 @@ def draw_chart(chart: Chart) -> Figure:
     legend_height = _legend_height(entries, columns)
     rows = 1 if chart.widths else len(panels)
     gap = _GAP if chart.shared else _OWN_AXIS_GAP
-    total = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.inches + max(0, rows - 1) * gap
+    total = top_margin + _BOTTOM + legend_height + max(1, rows) * chart.print_height + max(0, rows - 1) * gap
     with clean_style():
         figure = new_figure(total)
         for k, panel in enumerate(panels):
             row = 0 if chart.widths else k
-            base = _BOTTOM + legend_height + (rows - 1 - row) * (chart.inches + gap)
+            base = _BOTTOM + legend_height + (rows - 1 - row) * (chart.print_height + gap)
             left, width = _panel_extent(chart, k, right_margin)
-            axes = figure.add_axes((left, base / total, width, chart.inches / total))
-            _draw_panel(axes, chart, panel, numbered=k == 0)
+            axes = figure.add_axes((left, base / total, width, chart.print_height / total))
+            _draw_panel(axes, chart, panel, has_leg_numbers=k == 0)
             if chart.legend == "beside" and not has_shared_legend:
                 _add_legend_beside(axes)
             if chart.shared and row < rows - 1:
@@ -232,9 +234,9 @@ def draw_chart(chart: Chart) -> Figure:
     return figure
 
 
-def _panel_extent(chart: Chart, k: int, right: float) -> tuple[float, float]:
+def _panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, float]:
     """Return a panel's left edge and width as fractions of the picture's width."""
-    total_width = WIDTH - _LEFT - right
+    total_width = WIDTH - _LEFT - right_margin
     if not chart.widths:
         return _LEFT / WIDTH, total_width / WIDTH
     gap = 0.75 * (len(chart.widths) - 1)
@@ -277,14 +279,14 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
     return len(labels) == len(looks) == len(distinct_entries) < len(entries)
 
 
-def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> None:
-    min_x, max_x = chart.shown_reach()
+def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool) -> None:
+    min_x, max_x = chart.shown_axis_range()
     if chart.shared:
         axes.set_xlim(min_x, max(max_x, min_x + 1e-3))
         axes.xaxis.set_major_locator(MultipleLocator(nice_step(float(np.ptp(axes.get_xlim())), 14)))
-        _draw_marks(axes, chart.marks, numbered=numbered and chart.legend == "beside")
+        _draw_marks(axes, chart.marks, has_leg_numbers=has_leg_numbers and chart.legend == "beside")
     else:
-        _number_places(axes, panel)
+        _label_places(axes, panel)
     axes.set_ylim(*panel.shown_span())
     if chart.legend == "below" and axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1]:
         axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.7, zorder=1)
@@ -298,7 +300,7 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, numbered: bool) -> Non
             "fontsize": 7,
         }
         axes.annotate(panel.note, (1.0, 1.0), (0, 3), color=theme.colour("limit"), **text_options)
-    axes.set_ylabel(panel.label if chart.inches > 2.0 else "\n".join(_title_lines(panel)))
+    axes.set_ylabel(panel.label if chart.print_height > 2.0 else "\n".join(_title_lines(panel)))
     axes.yaxis.set_label_coords(-_LABEL / (WIDTH * axes.get_position().width), 0.5)
     axes.grid(visible=True, axis="both" if chart.shared else "y")
     axes.set_axisbelow(True)
@@ -315,14 +317,14 @@ def _title_lines(panel: Panel) -> list[str]:
     return [*lines, unit]
 
 
-def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool) -> None:
+def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_numbers: bool) -> None:
     """Separate the legs by thin lines, and number them above the topmost panel as far as the numbers fit."""
     for value, _ in marks[1:]:
         axes.axvline(value, color=theme.colour("rim"), linewidth=0.6, alpha=0.7, zorder=1)
-    if not numbered or not marks:
+    if not has_leg_numbers or not marks:
         return
     min_x, max_x = axes.get_xlim()
-    last = -math.inf
+    last_middle = -math.inf
     mark_ends = [value for value, _ in marks[1:]] + [max_x]
     text_options: dict[str, Any] = {
         "xycoords": ("data", "axes fraction"),
@@ -331,21 +333,21 @@ def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, numbered: bool
     }
     for (value, mark_text), end in zip(marks, mark_ends, strict=True):
         middle = 0.5 * (value + end)
-        if middle - last < 0.022 * (max_x - min_x):
+        if middle - last_middle < 0.022 * (max_x - min_x):
             continue
-        text = mark_text if last == -math.inf else mark_text.removeprefix("leg ")
+        text = mark_text if last_middle == -math.inf else mark_text.removeprefix("leg ")
         axes.annotate(
             text, (middle, 1.0), (0, 3), color=theme.colour("quiet"), annotation_clip=False, fontsize=7, **text_options
         )
-        last = middle
+        last_middle = middle
 
 
-def _number_places(axes: Any, panel: Panel) -> None:
+def _label_places(axes: Any, panel: Panel) -> None:
     """Label the horizontal axis with waypoints or legs, with failing ones in the colour of failures."""
     positions = np.unique(np.concatenate([layer.x for layer in panel.layers]))
     failing = {float(x) for layer in panel.layers if layer.kind == "rings" for x in layer.x}
-    step = -(-len(positions) // _MAX_TICKS)
-    ticks = sorted({*positions[::step].tolist(), *sorted(failing)[:_MAX_TICKS]})
+    label_interval = -(-len(positions) // _MAX_TICKS)
+    ticks = sorted({*positions[::label_interval].tolist(), *sorted(failing)[:_MAX_TICKS]})
     axes.set_xticks(ticks, [f"{tick:.0f}" for tick in ticks])
     for text, tick in zip(axes.get_xticklabels(), ticks, strict=True):
         if tick in failing:
@@ -356,10 +358,10 @@ def _number_places(axes: Any, panel: Panel) -> None:
 # Layers.
 
 
-def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
+def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
     """Draw the layers of a panel from the lowest, with its limits between bands and lines.
 
-    above: zorder of the lowest layer.
+    min_zorder: zorder of the lowest layer.
     """
     for label, value in panel.limits:
         look = theme.LOOKS["limit"]
@@ -369,14 +371,14 @@ def draw_layers(axes: Any, panel: Panel, above: float = 2.0) -> None:
             linewidth=look.width,
             linestyle=_dash_pattern(look),
             label=label or None,
-            zorder=above + 0.95,
+            zorder=min_zorder + 0.95,
         )
     for k, layer in enumerate(panel.layers):
         # Draw bands below the limits, and all other layers above them.
         is_background = layer.kind in ("band", "area") and layer.role != "terrain"
-        order = above + (0.0 if is_background else 1.0) + 0.9 * k / len(panel.layers)
+        zorder = min_zorder + (0.0 if is_background else 1.0) + 0.9 * k / len(panel.layers)
         _DRAWERS[layer.kind](
-            axes, layer, theme.LOOKS[layer.role], zorder=order, label=layer.legend or layer.name or None
+            axes, layer, theme.LOOKS[layer.role], zorder=zorder, label=layer.legend or layer.name or None
         )
 
 
@@ -406,14 +408,19 @@ def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 
 def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
-    lower_edge = layer.low if layer.low is not None else np.zeros(len(layer.y))
+    lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
     is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))
-    sides = [
-        np.column_stack([np.append(layer.x[a:b], layer.x[a:b][::-1]), np.append(layer.y[a:b], lower_edge[a:b][::-1])])
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
+    polygons = [
+        np.column_stack(
+            [
+                np.append(layer.x[start:end], layer.x[start:end][::-1]),
+                np.append(layer.y[start:end], lower_edge[start:end][::-1]),
+            ]
+        )
+        for start, end in zip(edges[::2], edges[1::2], strict=True)
     ]
-    axes.add_collection(PolyCollection(sides, **_area_look(look), **options))
+    axes.add_collection(PolyCollection(polygons, **_area_look(look), **options))
 
 
 def _area_look(look: theme.Look) -> dict[str, Any]:
@@ -449,8 +456,8 @@ def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
     style: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
     if look.face:
         return style | {"mfc": theme.colour(look.face), "mec": look.light, "mew": look.width}
-    faint = look.size < 3.0
-    return style | {"mew": 0.0 if faint else 0.8, "alpha": look.fill if faint else 1.0}
+    is_faint = look.size < 3.0
+    return style | {"mew": 0.0 if is_faint else 0.8, "alpha": look.fill if is_faint else 1.0}
 
 
 def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
@@ -552,9 +559,9 @@ def _legend_column_count(entries: Sequence[LegendEntry]) -> int:
     for columns in (4, 3, 2):
         rows = -(-len(entries) // columns)
         column_widths = [
-            max(len(e.text[:36]) for e in entries[k : k + rows]) for k in range(0, len(entries), rows or 1)
+            max(len(entry.text[:36]) for entry in entries[k : k + rows]) for k in range(0, len(entries), rows or 1)
         ]
-        if sum(0.45 + 0.062 * letters for letters in column_widths) < WIDTH - 1.0:
+        if sum(0.45 + 0.062 * width for width in column_widths) < WIDTH - 1.0:
             return columns
     return 1
 
@@ -569,8 +576,8 @@ def _legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
 
 def _add_legend_beside(axes: Any) -> None:
     handles, labels = axes.get_legend_handles_labels()
-    look: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "handlelength": 1.6}
-    axes.legend(handles, [textwrap.fill(str(label), 23) for label in labels], borderaxespad=0.2, **look)
+    options: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "handlelength": 1.6}
+    axes.legend(handles, [textwrap.fill(str(label), 23) for label in labels], borderaxespad=0.2, **options)
 
 
 def _add_legend_above(figure: Figure, top: float) -> None:

@@ -30,10 +30,10 @@ class EnvelopeLine:
 
 def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
     """Return the envelope at the lowest and the highest altitude of the route."""
-    envelope, up = setup.envelope, setup.route.waypoints[:, 2]
+    envelope, altitudes = setup.envelope, setup.route.waypoints[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     lines = []
-    for amsl in sorted({round(float(up.min())), round(float(up.max()))}):
+    for amsl in sorted({round(float(altitudes.min())), round(float(altitudes.max()))}):
         climb, descent = np.degrees([envelope.air_angles(float(speed), float(amsl)) for speed in speeds]).T
         lines.append(EnvelopeLine(amsl, speeds, climb, -descent))
     return lines
@@ -51,8 +51,8 @@ class FlownMoments:
 def flown_moments(track: Track, count: int = _MAX_DOTS) -> FlownMoments:
     """Return at most ``count`` moments of a track with finite values."""
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), count)).astype(np.intp))
-    air = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
-    east, north, up = air.T
+    air_velocity = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
+    east, north, up = air_velocity.T
     angle = np.degrees(np.arctan2(up, np.hypot(east, north)))
     speed = track.airspeed[rows].astype(np.float64)
     roll, _, _ = track.attitude[rows].T
@@ -80,24 +80,27 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
         flown = flown_moments(track)
         slopes.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.angle))
         banks.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.bank))
-    legs, commanded = np.degrees(leg_slopes(setup.shown_waypoints)), np.asarray(setup.route.airspeed)
-    slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", commanded, legs))
+    leg_slopes_deg, commanded_speeds = np.degrees(leg_slopes(setup.shown_waypoints)), np.asarray(setup.route.airspeed)
+    slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", commanded_speeds, leg_slopes_deg))
     min_speed, max_speed = float(setup.envelope.airspeed[0]), float(setup.envelope.airspeed[-1])
-    reach = (min_speed - 0.5, max_speed + 0.5)
-    reach_ends = np.array(reach)
-    planned, aircraft = (float(np.degrees(bank)) for bank in (setup.max_bank, setup.envelope.max_bank))
-    limits = [("limit of planned turns; corrections may bank beyond it", min(planned, aircraft), False)]
-    if abs(aircraft - min(planned, aircraft)) > 0.1:
-        limits.append(("the aircraft's bank limit", aircraft, True))
+    speed_range = (min_speed - 0.5, max_speed + 0.5)
+    speed_ends = np.array(speed_range)
+    planned_bank, aircraft_bank = (
+        float(np.degrees(bank_limit)) for bank_limit in (setup.max_bank, setup.envelope.max_bank)
+    )
+    limits = [("limit of planned turns; corrections may bank beyond it", min(planned_bank, aircraft_bank), False)]
+    if abs(aircraft_bank - min(planned_bank, aircraft_bank)) > 0.1:
+        limits.append(("the aircraft's bank limit", aircraft_bank, True))
     banks += [
-        Layer("line", name, "steady-limit", reach_ends, np.full(2, value), dashed=dash) for name, value, dash in limits
+        Layer("line", name, "steady-limit", speed_ends, np.full(2, value), dashed=dashed_line)
+        for name, value, dashed_line in limits
     ]
-    top = max([value for _, value, _ in limits] + [float(layer.y.max()) for layer in banks if layer.y.size])
+    max_bank = max([value for _, value, _ in limits] + [float(layer.y.max()) for layer in banks if layer.y.size])
     panels = (
         Panel("path angle through the air", "°", tuple(slopes)),
-        Panel("bank, either side", "°", tuple(banks), span=(0.0, 1.06 * top)),
+        Panel("bank, either side", "°", tuple(banks), span=(0.0, 1.06 * max_bank)),
     )
     aircraft_name = shorten(setup.aircraft, 20)
     title = f"{shorten(setup.scenario.name, 60)}: the {aircraft_name}'s envelope and this flight"
-    look: dict[str, Any] = {"tall": 260, "inches": 3.08, "widths": (0.6, 0.4), "legend": "below"}
-    return Chart(title, "true airspeed", "m/s", panels, reach=reach, **look)
+    layout: dict[str, Any] = {"page_height": 260, "print_height": 3.08, "widths": (0.6, 0.4), "legend": "below"}
+    return Chart(title, "true airspeed", "m/s", panels, axis_range=speed_range, **layout)

@@ -73,9 +73,9 @@ def _failed_rules_by_number(failed_findings: list[Finding], kind: PlaceKind, cou
         place = finding.place
         if place.kind == kind and place.index is not None and place.index < count:
             rules = rules_by_place.setdefault(place.index, [])
-            word = rule_word(finding.rule)
-            if word not in rules:
-                rules.append(word)
+            rule_name = rule_word(finding.rule)
+            if rule_name not in rules:
+                rules.append(rule_name)
     return {number: tuple(rules) for number, rules in sorted(rules_by_place.items())}
 
 
@@ -103,22 +103,24 @@ def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
     return distance, np.column_stack([np.interp(distance, waypoint_distances, waypoints[:, axis]) for axis in range(3)])
 
 
-def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
+def paths_differ(first_path: Floats, second_path: Floats, tolerance: float) -> bool:
     """Return True if any corner of either path is further than `tolerance` (m) from the other path.
 
-    a, b: (n, 3) and (m, 3) m.
+    first_path, second_path: (n, 3) and (m, 3) m.
     """
-    return max(_max_distance(a, b), _max_distance(b, a)) > tolerance
+    return max(_max_distance(first_path, second_path), _max_distance(second_path, first_path)) > tolerance
 
 
 def _max_distance(points: Floats, path: Floats) -> float:
     """Return the largest distance (m) of the points from the path."""
     start, step = path[:-1], np.diff(path, axis=0)
-    length2 = (step**2).sum(axis=1)
+    length_square = (step**2).sum(axis=1)
     max_distance = 0.0
     for point in points:
-        dot = ((point - start) * step).sum(axis=1)
-        fraction = np.clip(np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0), 0.0, 1.0)
+        dot_product = ((point - start) * step).sum(axis=1)
+        fraction = np.clip(
+            np.divide(dot_product, length_square, out=np.zeros_like(dot_product), where=length_square > 0.0), 0.0, 1.0
+        )
         nearest_point = start + fraction[:, None] * step
         max_distance = max(max_distance, float(np.sqrt(((nearest_point - point) ** 2).sum(axis=1).min())))
     return max_distance
@@ -134,22 +136,26 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
     leg = np.clip(track.leg.astype(np.intp), 0, len(waypoints) - 2)
     start, end = waypoints[leg, :2], waypoints[leg + 1, :2]
     step = end - start
-    length2 = (step**2).sum(axis=1)
-    dot = ((track.position[:, :2] - start) * step).sum(axis=1)
-    fraction = np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0)
-    distance = waypoint_distances[leg] + np.clip(fraction, 0.0, 1.0) * np.sqrt(length2)
+    length_square = (step**2).sum(axis=1)
+    dot_product = ((track.position[:, :2] - start) * step).sum(axis=1)
+    fraction = np.divide(dot_product, length_square, out=np.zeros_like(dot_product), where=length_square > 0.0)
+    distance = waypoint_distances[leg] + np.clip(fraction, 0.0, 1.0) * np.sqrt(length_square)
     return np.asarray(np.maximum.accumulate(np.where(np.isfinite(distance), distance, 0.0)))
 
 
-def fail_labels(failed: Failures, corners: Floats, threats_at: Mapping[int, tuple[float, float]]) -> tuple[Label, ...]:
+def fail_labels(
+    failed: Failures, corners: Floats, threat_positions: Mapping[int, tuple[float, float]]
+) -> tuple[Label, ...]:
     """Name the failing rules at the first failing legs, threats and waypoints, as in the verdict.
 
-    corners: (w, 2) drawn positions of the route's waypoints.  threats_at: positions of threats by index; other
-    threats get no label.
+    corners: (w, 2) drawn positions of the route's waypoints.  threat_positions: positions of threats by index;
+    other threats get no label.
     """
     middles = 0.5 * (corners[:-1] + corners[1:])
     labels = [(f"{failed.name('leg', k)}: {', '.join(rules)}", *middles[k]) for k, rules in failed.legs.items()]
-    labels += [(f"{text}: threat", *threats_at[k]) for k, text in failed.threat_names().items() if k in threats_at]
+    labels += [
+        (f"{text}: threat", *threat_positions[k]) for k, text in failed.threat_names().items() if k in threat_positions
+    ]
     labels += [
         (f"{failed.name('waypoint', k)}: {', '.join(rules)}", *corners[k]) for k, rules in failed.waypoints.items()
     ]
@@ -164,8 +170,8 @@ def threat_radius(threats: Threats, place: Place) -> float:
 
 def inside_threats(failed: Failures, threats: Threats, track: Track) -> NDArray[np.bool_]:
     """Return flags (t,) of the rows of the track inside a sphere whose rule fails."""
-    inside = np.zeros(len(track), dtype=bool)
+    is_inside = np.zeros(len(track), dtype=bool)
     for place in failed.threats:
         offsets = track.position - threats.position[place.index or 0]
-        inside |= (offsets**2).sum(axis=1) < threat_radius(threats, place) ** 2
-    return inside
+        is_inside |= (offsets**2).sum(axis=1) < threat_radius(threats, place) ** 2
+    return is_inside

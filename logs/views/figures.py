@@ -49,15 +49,15 @@ class Subject:
     returns: DrawnReturns | None = None
 
     @property
-    def things(self) -> str:
+    def contents_text(self) -> str:
         """Text that lists ground, threats and paths."""
         legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
         ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
         return f"{ground}, {threats} threats, the planned path of {legs} legs{self.flown(' and the flown track')}."
 
-    def flown(self, words: str, otherwise: str = "") -> str:
-        """Return ``words`` for a flight, and ``otherwise`` for a plan that was not flown."""
-        return words if self.track is not None else otherwise
+    def flown(self, flight_text: str, plan_text: str = "") -> str:
+        """Return ``flight_text`` for a flight, and ``plan_text`` for a plan that was not flown."""
+        return flight_text if self.track is not None else plan_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class FigureEntry:
 
     name: name of its section in the page and of its file.
     title: its heading.
-    view: function that builds its description; None if there is nothing to draw.
+    make_view: function that builds its description; None if there is nothing to draw.
     alternative: text for readers who cannot see it.
     caption: explanation of the figure.
     still: True if the page embeds the figure as a picture too, for readers without scripts.
@@ -74,7 +74,7 @@ class FigureEntry:
 
     name: str
     title: str
-    view: Callable[[Subject], View | None]
+    make_view: Callable[[Subject], View | None]
     alternative: Callable[[Subject], str]
     caption: Callable[[Subject], str]
     still: bool = False
@@ -100,8 +100,8 @@ def _make_scene(subject: Subject) -> SceneView:
     return SceneView(subject.setup, subject.track, failures(subject.verdict, waypoints))
 
 
-def _of_flight(build: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
-    return lambda subject: None if subject.track is None else build(subject.setup, subject.track)
+def _flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
+    return lambda subject: None if subject.track is None else make_chart(subject.setup, subject.track)
 
 
 # Builders of the figures on returns, by name.
@@ -113,14 +113,14 @@ RETURN_FIGURES: dict[str, Callable[[FlightSetup, DrawnReturns, Track | None], Vi
 }
 
 
-def return_views(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> dict[str, View]:
-    """Build the descriptions of figures on returns, by name; figures without data are left out."""
+def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> dict[str, View]:
+    """Build the descriptions of figures on returns, by name; figures without data are omitted."""
     setup = with_fence_zones(setup)
-    found = ((name, build(setup, drawn, track)) for name, build in RETURN_FIGURES.items())
-    return {name: view for name, view in found if view is not None and drawn.returns.each}
+    views = ((name, make_view(setup, drawn_returns, track)) for name, make_view in RETURN_FIGURES.items())
+    return {name: view for name, view in views if view is not None and drawn_returns.returns.each}
 
 
-def _of_returns(name: str) -> Callable[[Subject], View | None]:
+def _returns_view(name: str) -> Callable[[Subject], View | None]:
     def view(subject: Subject) -> View | None:
         if subject.returns is None or not subject.returns.returns.each:
             return None
@@ -129,20 +129,20 @@ def _of_returns(name: str) -> Callable[[Subject], View | None]:
     return view
 
 
-def _fixed_caption(words: str) -> Callable[[Subject], str]:
-    return lambda _: words
+def _fixed_caption(text: str) -> Callable[[Subject], str]:
+    return lambda _: text
 
 
-def _sentence(line: str) -> str:
+def _as_sentence(line: str) -> str:
     return f"{line[:1].upper()}{line[1:]}. "
 
 
 def _map_caption(subject: Subject) -> str:
-    arcs = " At corners the two differ: the aircraft flies an arc inside the waypoint."
-    flown = "The broad line is the plan, and the thin line on it is the flight." + (
-        arcs if subject.setup.source is None else ""
+    arc_text = " At corners the two differ: the aircraft flies an arc inside the waypoint."
+    flight_text = "The broad line is the plan, and the thin line on it is the flight." + (
+        arc_text if subject.setup.source is None else ""
     )
-    return subject.flown(flown, "Nothing was flown: the line is the plan.")
+    return subject.flown(flight_text, "Nothing was flown: the line is the plan.")
 
 
 # In the page's order.
@@ -151,7 +151,7 @@ FIGURES = (
         "map",
         "Map",
         _make_map,
-        alternative=lambda subject: f"Map, north up: {subject.things}",
+        alternative=lambda subject: f"Map, north up: {subject.contents_text}",
         caption=_map_caption,
         still=True,
     ),
@@ -178,7 +178,7 @@ FIGURES = (
         "scene",
         "3-D view",
         _make_scene,
-        alternative=lambda subject: f"View from the side: {subject.things}",
+        alternative=lambda subject: f"View from the side: {subject.contents_text}",
         caption=_fixed_caption(
             "Domes are the missiles' reach, dashed domes the radars' reach; thin poles join the "
             "ground and the waypoints. Parts behind a ridge are faint."
@@ -200,19 +200,19 @@ FIGURES = (
     FigureEntry(
         "returns",
         "Returns to launch",
-        _of_returns("returns"),
+        _returns_view("returns"),
         alternative=_fixed_caption(
             "Map, north up: the route coloured by the outcome of a return from there, and the worst returns."
         ),
         caption=lambda subject: (
-            ("" if subject.returns is None else _sentence(headline(subject.returns.returns)))
+            ("" if subject.returns is None else _as_sentence(headline(subject.returns.returns)))
             + "The worst returns are drawn; their numbers refer to the profiles below."
         ),
     ),
     FigureEntry(
         "worst-returns",
         "The worst returns",
-        _of_returns("worst-returns"),
+        _returns_view("worst-returns"),
         alternative=_fixed_caption("Heights along the worst returns: terrain, required clearance and spheres."),
         caption=_fixed_caption(
             "Simulated with the ArduPlane model on a point mass, in the mean wind, from the "
@@ -222,7 +222,7 @@ FIGURES = (
     FigureEntry(
         "return-heights",
         "Return to launch, or engine failure",
-        _of_returns("return-heights"),
+        _returns_view("return-heights"),
         alternative=_fixed_caption(
             "Over time: the flight's height coloured by the outcome of a return, the lowest "
             "height from which a return is safe, and the height that a glide without the engine "
@@ -238,13 +238,13 @@ FIGURES = (
     FigureEntry(
         "glide",
         "Without its engine",
-        _of_returns("glide"),
+        _returns_view("glide"),
         alternative=_fixed_caption(
             "Map, north up: the lowest height from which a glide reaches home, flat ground, and the route coloured "
             "by what can be reached from there."
         ),
         caption=lambda subject: (
-            ("" if subject.returns is None else _sentence(glides_headline(subject.returns.glides)))
+            ("" if subject.returns is None else _as_sentence(glides_headline(subject.returns.glides)))
             + (
                 "Blue: the lowest height above ground from which home or another chosen place is in "
                 "reach, up to 3 km from the route. Flat ground is flat according to the elevation "
@@ -255,7 +255,7 @@ FIGURES = (
     FigureEntry(
         "survey",
         "Photo lines",
-        _of_flight(survey_chart),
+        _flight_view(survey_chart),
         alternative=_fixed_caption(
             "Each survey's photo lines from above: the usable parts, the lost parts, and the flown track."
         ),
@@ -267,7 +267,7 @@ FIGURES = (
     FigureEntry(
         "time",
         "Over time",
-        _of_flight(time_chart),
+        _flight_view(time_chart),
         alternative=_fixed_caption(
             "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground."
         ),
@@ -279,7 +279,7 @@ FIGURES = (
     FigureEntry(
         "exposure",
         "Exposure",
-        _of_flight(exposure_chart),
+        _flight_view(exposure_chart),
         alternative=_fixed_caption(
             "Plots along the flown distance: strength and sum of the exposure to missiles and to radars."
         ),
@@ -292,7 +292,7 @@ FIGURES = (
     FigureEntry(
         "controls",
         "Controls",
-        _of_flight(control_chart),
+        _flight_view(control_chart),
         alternative=_fixed_caption(
             "Plots over time: elevator, aileron, rudder and throttle, commanded and actual, with their limits."
         ),
@@ -301,7 +301,7 @@ FIGURES = (
     FigureEntry(
         "energy",
         "Energy",
-        _of_flight(energy_chart),
+        _flight_view(energy_chart),
         alternative=_fixed_caption(
             "Plots over time: battery energy used, power, current, and the aircraft's energy as a height."
         ),
@@ -324,26 +324,26 @@ FIGURES = (
 )
 
 
-def subject_of(
+def make_subject(
     setup: FlightSetup, track: Track | None, verdict: Verdict, returns: DrawnReturns | None = None
 ) -> Subject:
-    """Return the data for figures; a track without rows is left out."""
+    """Return the data for figures; a track without rows is omitted."""
     return Subject(with_fence_zones(setup), track if track is not None and len(track) else None, verdict, returns)
 
 
 def figure_views(subject: Subject) -> dict[str, View]:
     """Build the descriptions of all figures of a flight or of a plan, by name.
 
-    Figures without data are left out.
+    Figures without data are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.judge_geometry import judge_geometry
     >>> setup = example_log().setup
-    >>> list(figure_views(subject_of(setup, None, judge_geometry(setup))))
+    >>> list(figure_views(make_subject(setup, None, judge_geometry(setup))))
     ['map', 'profile', 'scene', 'turns', 'envelope']
     """
-    found = ((entry.name, entry.view(subject)) for entry in FIGURES)
-    return {name: view for name, view in found if view is not None}
+    views = ((entry.name, entry.make_view(subject)) for entry in FIGURES)
+    return {name: view for name, view in views if view is not None}
 
 
 def draw(view: View) -> "Figure":
@@ -365,8 +365,8 @@ def view_json(view: View) -> dict[str, Any]:
 
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, "Figure"]:
-    """Draw all figures by name; figures without data are left out."""
-    return {name: draw(view) for name, view in figure_views(subject_of(setup, track, verdict)).items()}
+    """Draw all figures by name; figures without data are omitted."""
+    return {name: draw(view) for name, view in figure_views(make_subject(setup, track, verdict)).items()}
 
 
 def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, bytes]:
@@ -377,7 +377,7 @@ def draw_pictures(views: Mapping[str, View], *, svg: bool = False) -> dict[str, 
     from logs.views.drawing import png_bytes, svg_bytes
 
     figures = {name: draw(view) for name, view in views.items()}
-    found = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
+    files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
     if svg:
-        found |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
-    return found
+        files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
+    return files

@@ -29,15 +29,15 @@ class _NamedPlan:
 def _named_plans(front: Front) -> list[_NamedPlan]:
     """Return the best plan in each objective.
 
-    A plan that is best in several is named for the first of them.
+    A plan that is best in several objectives is named after the first of them.
     """
-    rows = front.objectives()
+    objectives = front.objectives()
     names = ("shortest", "least exposed", "highest above ground", f"least {front.fourth}")
     roles = ("front-shortest", "front-unseen", "front-high", "front-sparing")
     named_plans: dict[int, _NamedPlan] = {}
     for k, (name, role) in enumerate(zip(names, roles, strict=True)):
-        if np.ptp(rows[:, k]) > 0.0 or k == 0:
-            row = int(np.argmin(rows[:, k]))
+        if np.ptp(objectives[:, k]) > 0.0 or k == 0:
+            row = int(np.argmin(objectives[:, k]))
             named_plans.setdefault(row, _NamedPlan(row, name, role))
     return list(named_plans.values())
 
@@ -48,10 +48,10 @@ def front_map(front: Front) -> MapChart:
     The best in each objective are numbered and stand out.
     """
     scenario, named_plans = front.plans[0].plan.scenario, _named_plans(front)
-    marked = {plan.row for plan in named_plans}
+    named_rows = {plan.row for plan in named_plans}
     layers, labels = [], []
     for row, plan in enumerate(front.plans):
-        if row not in marked:
+        if row not in named_rows:
             path = plan.plan.waypoints
             layers.append(Layer("line", "other plans", "front-other", path[:, 0], path[:, 1], quiet=True))
     for named_plan in named_plans:
@@ -60,14 +60,14 @@ def front_map(front: Front) -> MapChart:
         layers.append(Layer("line", name, named_plan.role, path[:, 0], path[:, 1], quiet=True))
         middle = path[len(path) // 2]
         labels.append(Label(str(named_plan.row + 1), float(middle[0]), float(middle[1]), "number", named_plan.role))
-    ways = [plan.plan.waypoints for plan in front.plans]
-    shortest = ways[0]
+    paths = [plan.plan.waypoints for plan in front.plans]
+    shortest = paths[0]
     return world_map(
         scenario,
-        f"front of {len(ways)} plans from above",
+        f"front of {len(paths)} plans from above",
         layers,
         [*labels, *end_labels(scenario, None)],
-        map_extent(scenario, None, ways),
+        map_extent(scenario, None, paths),
         route=shortest,
         winds=(NamedWind(scenario.wind),),
     )
@@ -76,7 +76,7 @@ def front_map(front: Front) -> MapChart:
 def front_chart(front: Front) -> Chart:
     """Return exposure, height above ground, and energy or time of each plan over its length."""
     named_plans, plans = _named_plans(front), front.plans
-    along = np.array([plan.length for plan in plans]) / 1e3
+    lengths = np.array([plan.length for plan in plans]) / 1e3
     other_rows = np.setdiff1d(np.arange(len(plans)), [plan.row for plan in named_plans])
     columns = [
         ("exposure to radars", "s", np.array([plan.exposure for plan in plans])),
@@ -87,29 +87,29 @@ def front_chart(front: Front) -> Chart:
     panels = []
     for title, unit, values in columns:
         layers = (
-            [Layer("dots", "other plans", "front-other", along[other_rows], values[other_rows])]
+            [Layer("dots", "other plans", "front-other", lengths[other_rows], values[other_rows])]
             if len(other_rows)
             else []
         )
         layers += [
-            Layer("dots", f"{plan.row + 1}: {plan.name}", plan.role, along[[plan.row]], values[[plan.row]])
+            Layer("dots", f"{plan.row + 1}: {plan.name}", plan.role, lengths[[plan.row]], values[[plan.row]])
             for plan in named_plans
         ]
         labels = tuple(
-            Label(str(row + 1), float(along[row]), float(values[row]), "number")
+            Label(str(row + 1), float(lengths[row]), float(values[row]), "number")
             for row in [*(plan.row for plan in named_plans), *other_rows]
             if math.isfinite(values[row])
         )
         panels.append(Panel(title, unit, tuple(layers), min_span=LEAST_SPAN, labels=labels))
-    margin = 0.03 * max(float(np.ptp(along)), LEAST_LENGTH * float(along.min()))
-    reach = (float(along.min()) - margin, float(along.max()) + margin)
+    margin = 0.03 * max(float(np.ptp(lengths)), LEAST_LENGTH * float(lengths.min()))
+    length_range = (float(lengths.min()) - margin, float(lengths.max()) + margin)
     name = plans[0].plan.scenario.name
     return Chart(
         f"{name}: what each plan of the front gains for its length",
         "length",
         "km",
         tuple(panels),
-        reach=reach,
-        tall=220,
-        inches=1.9,
+        axis_range=length_range,
+        page_height=220,
+        print_height=1.9,
     )

@@ -15,24 +15,27 @@ from logs.views.returns import path_layers
 _LOOKS: dict[Reach, tuple[str, str]] = {reach: (f"reach-{reach}", reached_text(reach)) for reach in REACHES}
 
 
-def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
+def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | None:
     """Return the glide footprint from above, and the path coloured by destination in reach.
 
     Return None if glides were not judged.
     """
-    glides, scenario, route = drawn.glides, setup.scenario, setup.route.waypoints
+    glides, scenario, route = drawn_returns.glides, setup.scenario, setup.route.waypoints
     if not glides.each:
         return None
     sites = np.array([[site.east, site.north, 0.0] for site in glides.sites])
     extent = map_extent(scenario, route, [sites, np.array([glide.start for glide in glides.each])])
-    layers = footprint_layers(drawn, extent)
+    layers = footprint_layers(drawn_returns, extent)
     layers += path_layers(
-        drawn.segments_by_reach, _LOOKS, lambda glide: glide.start[:2], lambda glide: _glide_text(glide, drawn)
+        drawn_returns.segments_by_reach,
+        _LOOKS,
+        lambda glide: glide.start[:2],
+        lambda glide: _glide_text(glide, drawn_returns),
     )
-    down = np.array([glide.own.impact for glide in glides.each if glide.own.end == "ground"])
-    if len(down):
+    impacts = np.array([glide.own_return.impact for glide in glides.each if glide.own_return.end == "ground"])
+    if len(impacts):
         name = "where ArduPlane's own return comes down"
-        layers.append(Layer("dots", name, "comes-down", down[:, 0], down[:, 1], quiet=True))
+        layers.append(Layer("dots", name, "comes-down", impacts[:, 0], impacts[:, 1], quiet=True))
     names = tuple(site_text(site) for site in glides.sites)
     layers.append(
         Layer("dots", "home, rally point or landing", "waypoint", sites[:, 0], sites[:, 1], hover_texts=names)
@@ -51,29 +54,31 @@ def glide_chart(setup: FlightSetup, drawn: DrawnReturns) -> MapChart | None:
     )
 
 
-def _glide_text(glide: Glide, drawn: DrawnReturns) -> str:
-    spare = drawn.glides.altitude_left(glide)
-    left_text = f", {spare:.0f} m left over" if spare >= 0.0 else ""
+def _glide_text(glide: Glide, drawn_returns: DrawnReturns) -> str:
+    altitude_left = drawn_returns.glides.altitude_left(glide)
+    left_text = f", {altitude_left:.0f} m left over" if altitude_left >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 
-def footprint_layers(drawn: DrawnReturns, extent: Extent) -> list[Layer]:
+def footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]:
     """Return layers of the glide footprint: minimum heights above ground to reach a site, and flat ground.
 
     The list is empty without a map.
     """
-    footprint = drawn.glides.footprint
+    footprint = drawn_returns.glides.footprint
     if footprint is None:
         return []
-    layers, place = [], "home, rally point or landing" if len(drawn.glides.sites) > 1 else "home"
+    layers, place = [], "home, rally point or landing" if len(drawn_returns.glides.sites) > 1 else "home"
     for band in footprint.bands(*extent):
         name = f"{place} in reach from {band.up_to:.0f} m above ground"
         layers.append(_area_layer(name, BAND_ROLES[band.up_to], band.parts))
-    flat = footprint.landings(*extent)
-    return layers + ([_area_layer("flat ground according to the elevation file", "landable", flat)] if flat else [])
+    flat_parts = footprint.landings(*extent)
+    return layers + (
+        [_area_layer("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []
+    )
 
 
 def _area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
     gap = np.full((1, 2), np.nan)
-    x, y = np.vstack([piece for part in parts for ring in part for piece in (ring, gap)])[:-1].T
+    x, y = np.vstack([points for part in parts for ring in part for points in (ring, gap)])[:-1].T
     return Layer("area", name, role, x, y, hover_texts=(name,))

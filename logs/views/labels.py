@@ -52,8 +52,8 @@ class LabelPlacer:
             return
         along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         sample_distances = np.arange(0.0, along[-1] + spacing, spacing)
-        sampled = np.column_stack([np.interp(sample_distances, along, points[:, axis]) for axis in (0, 1)])
-        self.lines = np.vstack([self.lines, sampled])
+        samples = np.column_stack([np.interp(sample_distances, along, points[:, axis]) for axis in (0, 1)])
+        self.lines = np.vstack([self.lines, samples])
 
     def place(
         self,
@@ -72,35 +72,37 @@ class LabelPlacer:
         size: font size, points.
         gap: pixels between text and position.
         prefer: the direction tried first; (0, 0) centres the text on the position.
-        optional: leave the label out if it would cover another one.
+        optional: True to omit the label if it would cover another label.
         style: style of the text.
 
         A framed label, and a label that had to move away, gets a line to its point.
         """
-        (px, py) = self._to_pixels([x], [y])[0]
-        if not (math.isfinite(px) and math.isfinite(py)):
+        (point_x, point_y) = self._to_pixels([x], [y])[0]
+        if not (math.isfinite(point_x) and math.isfinite(point_y)):
             return
-        pad = 5.0 if "bbox" in style else 1.0
-        width = 0.62 * size * len(text) * DPI / 72.0 + 2 * pad
-        height = 1.25 * size * DPI / 72.0 + 2 * pad
-        best, best_cost, moved = self._make_box(px, py, width, height, gap, prefer), math.inf, 0
-        for ring, heights in enumerate(
+        padding = 5.0 if "bbox" in style else 1.0
+        width = 0.62 * size * len(text) * DPI / 72.0 + 2 * padding
+        height = 1.25 * size * DPI / 72.0 + 2 * padding
+        best_box, best_cost, best_ring = self._make_box(point_x, point_y, width, height, gap, prefer), math.inf, 0
+        for ring, distance_in_heights in enumerate(
             _FRAMED_DISTANCES if "bbox" in style else _OPTIONAL_DISTANCES if optional else _UNFRAMED_DISTANCES
         ):
-            for rank, direction in enumerate((prefer, *_DIRECTIONS)):
-                box = self._make_box(px, py, width, height, gap + heights * height, direction)
-                order = 0.0 if "bbox" in style else self._order_cost(box, px, py)
-                cost = self._box_cost(box) + order + 0.05 * rank + 1.5 * ring
+            for direction_rank, direction in enumerate((prefer, *_DIRECTIONS)):
+                box = self._make_box(point_x, point_y, width, height, gap + distance_in_heights * height, direction)
+                order_cost = 0.0 if "bbox" in style else self._order_cost(box, point_x, point_y)
+                cost = self._box_cost(box) + order_cost + 0.05 * direction_rank + 1.5 * ring
                 if cost < best_cost:
-                    best, best_cost, moved = box, cost, ring
-        if optional and any(_do_overlap(best, other) for other in self.boxes):
+                    best_box, best_cost, best_ring = box, cost, ring
+        if optional and any(_do_overlap(best_box, other) for other in self.boxes):
             return
-        self.boxes.append(best)
-        self.points.append((px, py))
-        middle = self.axes.transData.inverted().transform((0.5 * (best[0] + best[2]), 0.5 * (best[1] + best[3])))
+        self.boxes.append(best_box)
+        self.points.append((point_x, point_y))
+        center = self.axes.transData.inverted().transform(
+            (0.5 * (best_box[0] + best_box[2]), 0.5 * (best_box[1] + best_box[3]))
+        )
         artist = self.axes.text(
-            middle[0],
-            middle[1],
+            center[0],
+            center[1],
             text,
             fontsize=size,
             ha="center",
@@ -108,18 +110,18 @@ class LabelPlacer:
             **{"color": theme.colour("ink"), "zorder": 9, **style},
         )
         if "bbox" in style:
-            self._draw_lead_line(best, px, py, style["bbox"]["edgecolor"], 0.8)
+            self._draw_lead_line(best_box, point_x, point_y, style["bbox"]["edgecolor"], 0.8)
         else:
-            if moved:
-                self._draw_lead_line(best, px, py, style.get("color", theme.colour("ink")), 0.5)
+            if best_ring:
+                self._draw_lead_line(best_box, point_x, point_y, style.get("color", theme.colour("ink")), 0.5)
             artist.set_path_effects(
                 [patheffects.withStroke(linewidth=1.8, foreground=theme.colour("paper"), alpha=0.85)]
             )
 
     def _draw_lead_line(self, box: Box, x: float, y: float, color: str, width: float) -> None:
         """Draw a thin line from under a label to its point."""
-        middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
-        line_ends = self.axes.transData.inverted().transform([middle, (x, y)])
+        center = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+        line_ends = self.axes.transData.inverted().transform([center, (x, y)])
         self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
 
     def _to_pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
@@ -146,12 +148,15 @@ class LabelPlacer:
         A framed label needs no order, because it has a line to its point.
         """
         cost = 0.0
-        for other, (other_x, other_y) in zip(self.boxes, self.points, strict=True):
+        for other_box, (other_x, other_y) in zip(self.boxes, self.points, strict=True):
             dx, dy = x - other_x, y - other_y
-            if math.hypot(dx, dy) > box[2] - box[0] + other[2] - other[0]:
+            if math.hypot(dx, dy) > box[2] - box[0] + other_box[2] - other_box[0]:
                 continue
-            across, up = box[0] + box[2] - other[0] - other[2], box[1] + box[3] - other[1] - other[3]
-            if dx * across + dy * up < 0.0:
+            x_offset, y_offset = (
+                box[0] + box[2] - other_box[0] - other_box[2],
+                box[1] + box[3] - other_box[1] - other_box[3],
+            )
+            if dx * x_offset + dy * y_offset < 0.0:
                 cost += _ORDER_COST
         return cost
 
@@ -160,17 +165,17 @@ class LabelPlacer:
         cost = 0.0
         if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:
             cost += 60.0
-        for other in self.boxes:
-            if _do_overlap(box, other):
+        for other_box in self.boxes:
+            if _do_overlap(box, other_box):
                 cost += _OVERLAP_COST
         if len(self.lines):
-            inside = (
+            is_covered = (
                 (self.lines[:, 0] > box[0])
                 & (self.lines[:, 0] < box[2])
                 & (self.lines[:, 1] > box[1])
                 & (self.lines[:, 1] < box[3])
             )
-            cost += float(np.count_nonzero(inside))
+            cost += float(np.count_nonzero(is_covered))
         return cost
 
 

@@ -127,23 +127,25 @@ def map_chart(
     route = route_waypoints if route_waypoints is not None else plan_waypoints
     failed = failures(verdict, len(route) if route is not None else 0)
     stops = range(0 if route is None else len(route)) if stops is None else stops
-    tracks = [drawn for drawn in tracks if len(drawn.track)]
-    entered = failed.threat_names()
+    tracks = [drawn_track for drawn_track in tracks if len(drawn_track.track)]
+    failing_threats = failed.threat_names()
     layers: list[Layer] = []
     labels: list[Label] = []
     if route is not None:
         layers += _path_layers(route, plan_waypoints, failed)
-    layers += [_track_layer(drawn) for drawn in tracks]
-    for drawn in tracks if failed.threats else ():
-        layers += _inside_threat_layers(scenario, drawn.track, failed)
+    layers += [_track_layer(drawn_track) for drawn_track in tracks]
+    for drawn_track in tracks if failed.threats else ():
+        layers += _inside_threat_layers(scenario, drawn_track.track, failed)
     if route is not None:
         layers += _waypoint_layers(route, stops, failed, waypoint_texts)
         centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
         labels += fail_labels(failed, route[:, :2], centres)
     labels += end_labels(scenario, route, None if route is None else stops)
     labels += [] if route is None else _waypoint_labels(scenario, route, stops, failed)
-    extent = map_extent(scenario, route, [drawn.track.position for drawn in tracks])
-    return world_map(scenario, subject, layers, labels, extent, route=route, entered=frozenset(entered), winds=winds)
+    extent = map_extent(scenario, route, [drawn_track.track.position for drawn_track in tracks])
+    return world_map(
+        scenario, subject, layers, labels, extent, route=route, failing_threats=frozenset(failing_threats), winds=winds
+    )
 
 
 def world_map(
@@ -154,26 +156,27 @@ def world_map(
     extent: Extent,
     *,
     route: Floats | None,
-    entered: frozenset[int] = frozenset(),
+    failing_threats: frozenset[int] = frozenset(),
     winds: Sequence[NamedWind] = (),
 ) -> MapChart:
     """Return a map of a scenario: its area, threats and zones under layers, start and destination over them.
 
     labels: labels that take precedence over the names of threats and zones.  extent: range as from `map_extent`.
-    route: (w, 3) m, whose altitudes determine the filled sections of missiles.  entered: threats whose rule fails.
+    route: (w, 3) m, whose altitudes determine the filled sections of missiles.
+    failing_threats: threats whose rule fails.
     """
     east, north = extent
-    around = [
+    area_layers = [
         *_area_edge_layers(scenario),
-        *threat_circles(scenario.threats, route, entered),
+        *threat_circles(scenario.threats, route, failing_threats),
         *zone_shapes(scenario.zones),
     ]
-    names = [*threat_names(scenario.threats, entered), *zone_names(scenario.zones)]
+    names = [*threat_names(scenario.threats, failing_threats), *zone_names(scenario.zones)]
     names = [name for name in names if east[0] < name.x < east[1] and north[0] < name.y < north[1]]
     origin = scenario.origin
     return MapChart(
         f"{shorten(scenario.name, 60)}: {subject}",
-        Panel("north", "km", (*around, *layers, *_end_markers(scenario)), span=north, labels=(*labels, *names)),
+        Panel("north", "km", (*area_layers, *layers, *_end_markers(scenario)), span=north, labels=(*labels, *names)),
         east,
         north,
         position_text(origin.lat_deg, origin.lon_deg),
@@ -192,10 +195,10 @@ def map_json(chart: MapChart) -> Json:
     }
 
 
-def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats]) -> Extent:
+def map_extent(scenario: Scenario, route: Floats | None, paths: Sequence[Floats]) -> Extent:
     """Return the east and north range of the scenario's area and everything outside, with a margin, m.
 
-    ways: paths (t, 3) m; unknown rows are left out.
+    paths: paths (t, 3) m; unknown rows are ignored.
     Bounds made around an external mission limit nothing: the range covers its path, and the parts of zones within them.
     """
     points = [scenario.start[None, :2], scenario.destination[None, :2]]
@@ -205,15 +208,15 @@ def map_extent(scenario: Scenario, route: Floats | None, ways: Sequence[Floats])
         points.append(scenario.bounds.T)
     if route is not None:
         points.append(route[:, :2])
-    points += [way[np.isfinite(way).all(axis=1), :2] for way in ways]
-    together = np.vstack(points)
-    min_corner, max_corner = together.min(axis=0), together.max(axis=0)
+    points += [path[np.isfinite(path).all(axis=1), :2] for path in paths]
+    all_points = np.vstack(points)
+    min_corner, max_corner = all_points.min(axis=0), all_points.max(axis=0)
     padding = (_MISSION_RIM if scenario.external else _RIM) * float((max_corner - min_corner).max())
     min_corner, max_corner = min_corner - padding, max_corner + padding
     width, height = (max_corner - min_corner).tolist()
-    grown = np.array([max(width, height / _ASPECTS[1]), max(height, width * _ASPECTS[0])])
+    size = np.array([max(width, height / _ASPECTS[1]), max(height, width * _ASPECTS[0])])
     middle = 0.5 * (min_corner + max_corner)
-    (west, south), (east, north) = (middle - 0.5 * grown).tolist(), (middle + 0.5 * grown).tolist()
+    (west, south), (east, north) = (middle - 0.5 * size).tolist(), (middle + 0.5 * size).tolist()
     return (west, east), (south, north)
 
 
@@ -231,12 +234,12 @@ def _area_edge_layers(scenario: Scenario) -> list[Layer]:
 
 def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[Layer]:
     """Draw failing legs under the route, and the plan if it differs."""
-    differs = plan is not None and paths_differ(plan, route, 1.0)
+    has_different_plan = plan is not None and paths_differ(plan, route, 1.0)
     legs = [route[k : k + 2] for k in failed.legs]
     layers = [Layer("line", "leg that fails a rule", "failing-leg", leg[:, 0], leg[:, 1], quiet=True) for leg in legs]
-    if differs and plan is not None:
+    if has_different_plan and plan is not None:
         layers.append(Layer("line", "plan as searched", "searched", plan[:, 0], plan[:, 1], quiet=True))
-    name = "route of the mission" if plan is None or differs else "planned path"
+    name = "route of the mission" if plan is None or has_different_plan else "planned path"
     return [*layers, Layer("line", name, "planned", route[:, 0], route[:, 1], quiet=True)]
 
 
@@ -249,10 +252,10 @@ def _track_layer(drawn_track: DrawnTrack) -> Layer:
 
 def _inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) -> list[Layer]:
     """Return the part of a track inside a threat whose rule fails."""
-    inside = inside_threats(failed, scenario.threats, track)
-    if not inside.any():
+    is_inside = inside_threats(failed, scenario.threats, track)
+    if not is_inside.any():
         return []
-    east, north = np.where(inside, track.position[:, :2].T, np.nan)
+    east, north = np.where(is_inside, track.position[:, :2].T, np.nan)
     return [Layer("line", "flown inside a threat's reach", "inside", east, north, quiet=True)]
 
 
@@ -285,9 +288,9 @@ def end_labels(scenario: Scenario, route: Floats | None, stops: Sequence[int] | 
     """
     labels = []
     for point, row, name in ((scenario.start, 0, "start"), (scenario.destination, -1, "destination")):
-        at_end = route is not None and _are_close(route[row], point)
+        is_at_waypoint = route is not None and _are_close(route[row], point)
         text = name
-        if at_end and route is not None:
+        if is_at_waypoint and route is not None:
             text = f"{row % len(route) if stops is None else stops[row]} {name}"
         labels.append(Label(text, float(point[0]), float(point[1]), "end"))
     start, destination = labels

@@ -33,7 +33,7 @@ def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", rol
     rows = drawn_rows(track, MAX_MOMENTS)
     position, terrain = track.position[rows], setup.scenario.terrain
     east, north, up = position.T
-    above = np.full(len(rows), np.nan) if terrain is None else up - terrain.height(east, north)
+    height_above_ground = np.full(len(rows), np.nan) if terrain is None else up - terrain.height(east, north)
     roll, pitch, yaw = np.degrees(track.attitude[rows].astype(np.float64)).T
     _, _, climb = track.velocity[rows].T
     return {
@@ -43,7 +43,7 @@ def flight_moments(setup: FlightSetup, track: Track, *, name: str = "flown", rol
         "east": numbers(east, 1),
         "north": numbers(north, 1),
         "up": numbers(up, 1),
-        "above": numbers(above, 1),
+        "above": numbers(height_above_ground, 1),
         "airspeed": numbers(track.airspeed[rows], 2),
         "climb": numbers(climb, 2),
         "bank": numbers(roll, 1),

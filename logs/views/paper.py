@@ -62,30 +62,30 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
     >>> figure.axes[0].get_title(loc="left")
     'example: 1 runs of umda, 1 safe'
     """
-    safe = sum(path.safe for path in paths)
-    title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe} safe"
+    safe_count = sum(path.safe for path in paths)
+    title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe_count} safe"
     with clean_style():
-        figure, axes, around = _draw_ground_and_threats(scenario, title, _LEGEND)
+        figure, axes, ground_handles = _draw_ground_and_threats(scenario, title, _LEGEND)
         handles: list[Any] = []
         for is_safe, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
-            chosen = [path for path in paths if path.safe == is_safe]
-            for path in chosen:
+            matching_paths = [path for path in paths if path.safe == is_safe]
+            for path in matching_paths:
                 axes.plot(*path.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **look)
                 axes.plot(*path.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
-            if chosen:
-                ratios = [path.length_ratio for path in chosen]
-                span = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
-                text = f"{len(chosen)} path{'s' if len(chosen) > 1 else ''} {label}\nPLR {span}"
+            if matching_paths:
+                ratios = [path.length_ratio for path in matching_paths]
+                ratio_text = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
+                text = f"{len(matching_paths)} path{'s' if len(matching_paths) > 1 else ''} {label}\nPLR {ratio_text}"
                 handles.append(Line2D([], [], linewidth=1.6, label=text, **look))
         handles += _draw_ends(axes, scenario, [path.waypoints for path in paths])
-        draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
+        draw_legend(figure, handles + ground_handles, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
     return figure
 
 
-def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: int) -> Figure:
+def draw_encodings(scenario: Scenario, path_by_encoding: Mapping[str, PaperPath], seed: int) -> Figure:
     """Draw one path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
 
-    chosen: paths by encoding.
+    path_by_encoding: the drawn path of each encoding.
 
     >>> from logs.recording.example_log import example_log
     >>> setup = example_log().setup
@@ -96,35 +96,35 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
     """
     with clean_style():
         title = f"{scenario.name}: one path of each encoding, seed {seed}"
-        figure, axes, around = _draw_ground_and_threats(scenario, title, _TALL_LEGEND)
+        figure, axes, ground_handles = _draw_ground_and_threats(scenario, title, _TALL_LEGEND)
         handles = []
-        for (name, path), look, marker in zip(chosen.items(), _LOOKS, _MARKERS, strict=False):
+        for (name, path), look, marker in zip(path_by_encoding.items(), _LOOKS, _MARKERS, strict=False):
             axes.plot(
                 *path.waypoints[:, :2].T, linewidth=1.8, marker=marker, markersize=3.5, zorder=5, clip_on=True, **look
             )
             text = f"{name}\n{'safe' if path.safe else 'not safe'}, PLR {path.length_ratio:.3f}"
             handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **look))
-        handles += _draw_ends(axes, scenario, [path.waypoints for path in chosen.values()])
-        draw_legend(figure, handles + around, _LEFT, (_TALL_LEGEND - 0.02) / figure.get_figheight())
+        handles += _draw_ends(axes, scenario, [path.waypoints for path in path_by_encoding.values()])
+        draw_legend(figure, handles + ground_handles, _LEFT, (_TALL_LEGEND - 0.02) / figure.get_figheight())
     return figure
 
 
-def _draw_ground_and_threats(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, list[Any]]:
+def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: float) -> tuple[Figure, Any, list[Any]]:
     """Draw ground and threats; return figure, axes and their legend handles.
 
-    legend: height of the legend, inches.
+    legend_height: height of the legend, inches.
     """
     min_corner, max_corner = scenario.bounds[:, 0], scenario.bounds[:, 1]
     padding = 0.02 * float((max_corner - min_corner).max())
     (west, south), (east, north) = (min_corner - padding).tolist(), (max_corner + padding).tolist()
-    figure, axes = map_frame((west, east), (south, north), legend)
+    figure, axes = map_frame((west, east), (south, north), legend_height)
     axes.set(xlabel="east (km)", ylabel="north (km)")
     axes.set_title(title, fontweight="bold")
-    around = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
+    ground_handles = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
     # The circles do not depend on altitude: a path inside a circle may pass over the sphere.
-    threats = Panel("north", "m", threat_circles(scenario.threats, None, frozenset()))
-    draw_layers(axes, threats)
-    return figure, axes, around + [legend_handle(entry) for entry in legend_entries([threats])]
+    threat_panel = Panel("north", "m", threat_circles(scenario.threats, None, frozenset()))
+    draw_layers(axes, threat_panel)
+    return figure, axes, ground_handles + [legend_handle(entry) for entry in legend_entries([threat_panel])]
 
 
 def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
@@ -136,7 +136,7 @@ def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[A
     panel = Panel(
         "north", "m", tuple(Layer("dots", name, name, position[:1], position[1:2]) for name, position in endpoints)
     )
-    draw_layers(axes, panel, above=6.0)
+    draw_layers(axes, panel, min_zorder=6.0)
     for name, position in endpoints:
         write_label(placer, Label(name, float(position[0]), float(position[1]), "end"))
     return [legend_handle(entry) for entry in legend_entries([panel])]
@@ -160,13 +160,13 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
             2, count, left=0.075, right=0.985, top=0.9, bottom=0.15, wspace=0.28 if count > 1 else 0.2, hspace=0.16
         )
         names: list[str] = []
-        for column, (threats, groups) in enumerate(histories.items()):
+        for column, (threats, searches_by_algorithm) in enumerate(histories.items()):
             upper = figure.add_subplot(grid[0, column])
             lower = figure.add_subplot(grid[1, column], sharex=upper)
-            for (name, searches), look in zip(groups.items(), _LOOKS, strict=False):
+            for (name, searches), look in zip(searches_by_algorithm.items(), _LOOKS, strict=False):
                 _draw_progress(upper, lower, searches, look)
                 names = names if name in names else [*names, name]
-            max_count = max(len(searches) for searches in groups.values())
+            max_count = max(len(searches) for searches in searches_by_algorithm.values())
             upper.set(ylim=(-0.04 * max_count, 1.06 * max_count), title=f"{threats} threats")
             upper.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
             upper.tick_params(labelbottom=False)
@@ -199,24 +199,24 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
 def _draw_progress(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
     """Draw one algorithm on one problem; a search that ended early keeps its last value."""
     length = max(len(history) for history in histories)
-    stacked = np.stack(
+    padded_histories = np.stack(
         [np.vstack([history, np.repeat(history[-1:], length - len(history), axis=0)]) for history in histories]
     )
-    length_ratio, kill, violations = np.moveaxis(stacked, -1, 0)
-    safe = (violations == 0.0) & (kill == 0.0)
+    length_ratio, kill, violations = np.moveaxis(padded_histories, -1, 0)
+    is_safe = (violations == 0.0) & (kill == 0.0)
     generation = np.arange(length)
-    upper.plot(generation, safe.sum(axis=0), linewidth=1.6, **look)
-    ratios = np.where(safe, length_ratio, np.nan)
-    is_known = safe.any(axis=0)
+    upper.plot(generation, is_safe.sum(axis=0), linewidth=1.6, **look)
+    ratios = np.where(is_safe, length_ratio, np.nan)
+    is_known = is_safe.any(axis=0)
     if not is_known.any():
         return
-    columns = ratios[:, is_known]
+    known_ratios = ratios[:, is_known]
     lower.fill_between(
         generation[is_known],
-        np.nanmin(columns, axis=0),
-        np.nanmax(columns, axis=0),
+        np.nanmin(known_ratios, axis=0),
+        np.nanmax(known_ratios, axis=0),
         color=look["color"],
         alpha=0.13,
         linewidth=0,
     )
-    lower.plot(generation[is_known], np.nanmedian(columns, axis=0), linewidth=1.6, **look)
+    lower.plot(generation[is_known], np.nanmedian(known_ratios, axis=0), linewidth=1.6, **look)

@@ -61,7 +61,7 @@ def profile_chart(
     ('km', ['planned', 'waypoint, numbered'])
     """
     route = route_waypoints if route_waypoints is not None else plan_waypoints
-    is_line = route is None
+    is_straight_line = route is None
     if route is None:
         route = np.vstack([scenario.start, scenario.destination])
     track = track if track is not None and len(track) else None
@@ -76,36 +76,43 @@ def profile_chart(
     plane = PathPlane(distance / 1000.0, points, ground, min_altitude, max_altitude)
     failed = failures(verdict, len(route))
     stops = range(len(route)) if stops is None else stops
-    starts = stop_rows(stops)
+    stop_starts = stop_rows(stops)
     zones, zone_names = zone_bands(scenario.zones, plane)
     cuts, cut_names = threat_cuts(scenario.threats, plane, frozenset(failed.threat_names()))
-    flown, entered = _flown_layers(scenario, route, track, failed, plane)
+    flown_layers, entered_positions = _flown_layers(scenario, route, track, failed, plane)
     layers = [*zones, *cuts, *ground_bands(scenario, plane), *_failing_legs(waypoint_distances, route, failed)]
-    layers += [] if is_line else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
-    layers += flown
+    layers += [] if is_straight_line else [Layer("line", "planned", "planned", plane.kilometres, points[:, 2])]
+    layers += flown_layers
     labels: list[Label] = []
-    if not is_line:
-        role = "waypoint" if len(starts) <= _MAX_DOTS else "waypoint-small"
+    if not is_straight_line:
+        role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
         layers.append(
-            Layer("dots", "waypoint, numbered", role, waypoint_distances[starts] / 1000.0, route[starts, 2], quiet=True)
+            Layer(
+                "dots",
+                "waypoint, numbered",
+                role,
+                waypoint_distances[stop_starts] / 1000.0,
+                route[stop_starts, 2],
+                quiet=True,
+            )
         )
         labels = _waypoint_labels(waypoint_distances, route, stops, failed)
     layers += _failing_waypoints(waypoint_distances, route, failed)
     corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])
-    labels = [*fail_labels(failed, corners, entered), *labels, *cut_names, *zone_names]
+    labels = [*fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_names]
     limits, note = _limit_lines(scenario, min_altitude, max_altitude)
     panel = Panel(
         "height", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
     )
-    return _make_chart(scenario, waypoint_distances, starts, panel, is_straight=is_line)
+    return _make_chart(scenario, waypoint_distances, stop_starts, panel, is_straight=is_straight_line)
 
 
 def _make_chart(
-    scenario: Scenario, waypoint_distances: Floats, starts: list[int], panel: Panel, *, is_straight: bool
+    scenario: Scenario, waypoint_distances: Floats, stop_starts: list[int], panel: Panel, *, is_straight: bool
 ) -> Chart:
     """Return the panel as a chart.
 
-    waypoint_distances: distance of each waypoint along the route, m.  first: waypoints at which a stop begins.
+    waypoint_distances: distance of each waypoint along the route, m.  stop_starts: waypoints at which a stop begins.
     """
     path = "the straight line from start to destination" if is_straight else "the planned path"
     title = f"{shorten(scenario.name, 60)}: heights along the path"
@@ -114,14 +121,14 @@ def _make_chart(
         f"distance along {path}",
         "km",
         (panel,),
-        reach=(0.0, max(float(waypoint_distances[-1]), 1.0) / 1000.0),
+        axis_range=(0.0, max(float(waypoint_distances[-1]), 1.0) / 1000.0),
         # The leg to a loiter includes the loiter.
         marks=tuple(
             (float(waypoint_distances[end]) / 1000.0, f"leg {n}")
-            for n, end in enumerate(_leg_start_waypoints(starts, len(waypoint_distances)))
+            for n, end in enumerate(_leg_start_waypoints(stop_starts, len(waypoint_distances)))
         ),
-        tall=420,
-        inches=4.05,
+        page_height=420,
+        print_height=4.05,
         legend="below",
         scaled=True,
     )
@@ -137,7 +144,7 @@ def _planned_altitudes(
     route: Floats,
     height_above_ground: Floats,
     distance: Floats,
-    up: Floats,
+    line_altitude: Floats,
     ground: Floats,
     scenario: Scenario,
 ) -> Floats:
@@ -145,16 +152,16 @@ def _planned_altitudes(
 
     waypoint_distances: distance of each waypoint along the route, m.
     height_above_ground: height above ground at the end of each leg, m, (w,); NaN if it does not follow the terrain.
-    distance, up, ground: distance, straight-line altitude and ground altitude of each sample, m, (s,).
+    distance, line_altitude, ground: distance, straight-line altitude and ground altitude of each sample, m, (s,).
     """
     ground_altitudes = terrain_altitudes(scenario, route)
-    starts = route[:, 2] - (0.0 if ground_altitudes is None else ground_altitudes)
-    leg = np.clip(np.searchsorted(waypoint_distances, distance, side="left"), 1, len(waypoint_distances) - 1)
-    fraction = (distance - waypoint_distances[leg - 1]) / np.maximum(
-        waypoint_distances[leg] - waypoint_distances[leg - 1], 1e-9
+    waypoint_heights = route[:, 2] - (0.0 if ground_altitudes is None else ground_altitudes)
+    end = np.clip(np.searchsorted(waypoint_distances, distance, side="left"), 1, len(waypoint_distances) - 1)
+    fraction = (distance - waypoint_distances[end - 1]) / np.maximum(
+        waypoint_distances[end] - waypoint_distances[end - 1], 1e-9
     )
-    altitudes = ground + starts[leg - 1] + fraction * (height_above_ground[leg] - starts[leg - 1])
-    return np.where(np.isfinite(altitudes), altitudes, up)
+    altitudes = ground + waypoint_heights[end - 1] + fraction * (height_above_ground[end] - waypoint_heights[end - 1])
+    return np.where(np.isfinite(altitudes), altitudes, line_altitude)
 
 
 def terrain_altitudes(scenario: Scenario, points: Floats) -> Floats | None:
@@ -201,7 +208,7 @@ def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
                 "band", f"required clearance, {min_clearance:g} m", "clearance", along, ground + min_clearance, ground
             )
         )
-    layers.append(Layer("band", "terrain", "terrain", along, ground, np.full(len(ground), plane.low)))
+    layers.append(Layer("band", "terrain", "terrain", along, ground, np.full(len(ground), plane.min_altitude)))
     if max_height is not None:
         name = f"greatest height, {max_height:g} m above ground"
         layers.append(Layer("line", name, "limit", along, ground + max_height))
@@ -221,7 +228,7 @@ def _flown_layers(
         return [line], {}
     ground = terrain_altitudes(scenario, track.position)
     layers, label_positions = entered_cuts(
-        scenario.threats, failed, PathPlane(progress, track.position, ground, plane.low, plane.high)
+        scenario.threats, failed, PathPlane(progress, track.position, ground, plane.min_altitude, plane.max_altitude)
     )
     altitudes_inside = np.where(inside_threats(failed, scenario.threats, track), heights, np.nan)
     return [

@@ -49,16 +49,16 @@ def path_layers(
     return [layer for layer in layers if layer.x.size]
 
 
-def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
+def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
     """Return the path from above, coloured by the outcome of returns, and the paths of the worst returns."""
     scenario, route = setup.scenario, setup.route.waypoints
-    limit = drawn.returns.limit
+    limit = drawn_returns.returns.limit
 
     def return_text(ret: SimulatedReturn) -> str:
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
-    layers = path_layers(drawn.segments_by_outcome, _LOOKS, lambda ret: ret.start[:2], return_text)
-    for worst in drawn.worst:
+    layers = path_layers(drawn_returns.segments_by_outcome, _LOOKS, lambda ret: ret.start[:2], return_text)
+    for worst in drawn_returns.worst:
         name = "path of one of the worst returns, numbered"
         layers.append(
             Layer(
@@ -70,23 +70,23 @@ def returns_map(setup: FlightSetup, drawn: DrawnReturns) -> MapChart:
                 hover_texts=(return_text(worst.simulated),),
             )
         )
-    unsafe = [worst for worst in drawn.worst if not worst.simulated.safe]
+    unsafe = [worst for worst in drawn_returns.worst if not worst.simulated.safe]
     if unsafe:
         positions = np.array([worst.marked_position for worst in unsafe])
         texts = tuple(return_text(worst.simulated) for worst in unsafe)
         layers.append(Layer("rings", "where it fails", "fail", positions[:, 0], positions[:, 1], hover_texts=texts))
-    targets = {ret.target.name: ret.target.position for ret in drawn.returns.each}
+    targets = {ret.target.name: ret.target.position for ret in drawn_returns.returns.each}
     layers += _target_layers(targets)
     labels = [
         Label(str(number), float(worst.marked_position[0]), float(worst.marked_position[1]), "number", "fail")
-        for number, worst in enumerate(drawn.worst, 1)
+        for number, worst in enumerate(drawn_returns.worst, 1)
     ]
     labels += [
         Label(shorten(name, 30), position[0], position[1], "end", "waypoint", (1, 1))
         for name, position in targets.items()
     ]
-    paths = [worst.path for worst in drawn.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
-    extent = map_extent(scenario, route, [*paths, np.array([ret.start for ret in drawn.returns.each])])
+    paths = [worst.path for worst in drawn_returns.worst] + [np.array(list(targets.values()) or np.zeros((0, 3)))]
+    extent = map_extent(scenario, route, [*paths, np.array([ret.start for ret in drawn_returns.returns.each])])
     return world_map(
         scenario,
         "returns to launch from points along the route",
@@ -109,24 +109,24 @@ def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer
 # The worst returns in profile.
 
 
-def worst_returns_chart(setup: FlightSetup, drawn: DrawnReturns) -> Chart | None:
+def worst_returns_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> Chart | None:
     """Return altitude profiles of the worst returns with the ground below, one panel each.
 
     Return None without returns.
     """
-    if not drawn.worst:
+    if not drawn_returns.worst:
         return None
     scenario = setup.scenario
-    spans = [_altitude_span(scenario, worst) for worst in drawn.worst]
+    spans = [_altitude_span(scenario, worst) for worst in drawn_returns.worst]
     span = (min(bottom for bottom, _ in spans), max(top for _, top in spans))
-    panels = tuple(_profile_panel(scenario, worst, number, span) for number, worst in enumerate(drawn.worst, 1))
+    panels = tuple(_profile_panel(scenario, worst, number, span) for number, worst in enumerate(drawn_returns.worst, 1))
     return Chart(
         f"{shorten(scenario.name, 60)}: the worst returns to launch",
         "distance since it turned back",
         "km",
         panels,
-        tall=240,
-        inches=2.3,
+        page_height=240,
+        print_height=2.3,
         legend="below",
         scaled=True,
     )
@@ -163,56 +163,56 @@ def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tu
 # Heights over time.
 
 
-def return_heights_chart(setup: FlightSetup, drawn: DrawnReturns, track: Track | None) -> Chart | None:
+def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> Chart | None:
     """Chart flown altitudes by outcome of a return, minimum safe altitudes, and margins of glides, over time.
 
-    None if no returns were judged.
+    Return None if no returns were judged.
     """
-    if not drawn.returns.each:
+    if not drawn_returns.returns.each:
         return None
-    scenario, limit = setup.scenario, drawn.returns.limit
-    time, positions = _path_positions(drawn, track)
-    ground, least_altitudes = terrain_altitudes(scenario, positions), drawn.min_safe_altitudes
-    altitudes = np.concatenate([positions[:, 2], least_altitudes.altitude, np.zeros(0) if ground is None else ground])
+    scenario, limit = setup.scenario, drawn_returns.returns.limit
+    time, positions = _path_positions(drawn_returns, track)
+    ground, safe_altitudes = terrain_altitudes(scenario, positions), drawn_returns.min_safe_altitudes
+    altitudes = np.concatenate([positions[:, 2], safe_altitudes.altitude, np.zeros(0) if ground is None else ground])
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
     margin = 0.06 * max(max_altitude - min_altitude, _MIN_SPAN)
     span = (min_altitude - margin, max_altitude + margin)
-    name = f"lowest height for a safe return (no line: none up to {least_altitudes.search_range:.0f} m more)"
+    name = f"lowest height for a safe return (no line: none up to {safe_altitudes.search_range:.0f} m more)"
     layers = [
         *ground_bands(scenario, PathPlane(time, positions, ground, *span)),
         *path_layers(
-            drawn.segments_by_outcome,
+            drawn_returns.segments_by_outcome,
             _LOOKS,
             lambda ret: (ret.time, ret.start[2]),
             lambda ret: outcome_text(ret, limit),
         ),
-        Layer("line", name, "limit", least_altitudes.time, least_altitudes.altitude),
+        Layer("line", name, "limit", safe_altitudes.time, safe_altitudes.altitude),
     ]
     panels = [Panel("height", "m AMSL", tuple(layers), span=span)]
-    if drawn.glides.each:
-        panels.append(_glide_margin_panel(drawn.glides))
+    if drawn_returns.glides.each:
+        panels.append(_glide_margin_panel(drawn_returns.glides))
     return Chart(
         f"{shorten(scenario.name, 60)}: return to launch, or engine failure",
         "time since the start",
         "s",
         tuple(panels),
         timed=True,
-        tall=300,
-        inches=2.8,
+        page_height=300,
+        print_height=2.8,
         legend="below",
     )
 
 
-def _path_positions(drawn: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
+def _path_positions(drawn_returns: DrawnReturns, track: Track | None) -> tuple[Floats, Floats]:
     """Return times, s, (t,), and positions, m, (t, 3), of the path, from the track or from the starts of returns."""
-    first, last = drawn.returns.each[0].time, max(ret.time for ret in drawn.returns.each)
-    if track is not None and drawn.returns.flown:
+    first, last = drawn_returns.returns.each[0].time, max(ret.time for ret in drawn_returns.returns.each)
+    if track is not None and drawn_returns.returns.flown:
         is_shown = np.isfinite(track.position).all(axis=1) & (track.time >= first) & (track.time <= last)
         rows = np.flatnonzero(is_shown)
         rows = rows[:: max(1, len(rows) // _GROUND_POINTS)]
         if rows.size:
             return track.time[rows], track.position[rows]
-    returns = [ret for _, group in drawn.segments_by_outcome for ret in group]
+    returns = [ret for _, group in drawn_returns.segments_by_outcome for ret in group]
     return np.array([ret.time for ret in returns]), np.array([ret.start for ret in returns])
 
 

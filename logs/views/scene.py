@@ -46,19 +46,19 @@ def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
     points = [setup.scenario.bounds.T, setup.route.waypoints[:, :2]]
     if track is not None:
         points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
-    together = np.vstack(points)
-    return np.stack([together.min(axis=0), together.max(axis=0)], axis=1)
+    all_points = np.vstack(points)
+    return np.stack([all_points.min(axis=0), all_points.max(axis=0)], axis=1)
 
 
-def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGrid | None:
-    """Sample the ground at up to ``most`` crossings a side, with nearly square cells; None without ground."""
+def ground_grid(terrain: Terrain | None, bounds: Floats, max_samples: int) -> GroundGrid | None:
+    """Sample the ground at up to ``max_samples`` crossings a side, with nearly square cells; None without ground."""
     if terrain is None:
         return None
     spans = np.ptp(bounds, axis=1)
-    pitch = max(float(spans.max()) / (most - 1), terrain.spacing, 1.0)
+    spacing = max(float(spans.max()) / (max_samples - 1), terrain.spacing, 1.0)
     axes = [
-        np.linspace(float(low), float(high), int(np.clip(np.ceil((high - low) / pitch) + 1, 2, most)))
-        for low, high in bounds
+        np.linspace(float(start), float(end), int(np.clip(np.ceil((end - start) / spacing) + 1, 2, max_samples)))
+        for start, end in bounds
     ]
     heights = np.asarray(terrain.height(axes[0][None, :], axes[1][:, None]), dtype=np.float64)
     return GroundGrid(axes[0], axes[1], heights) if np.isfinite(heights).any() else None
@@ -66,19 +66,22 @@ def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGri
 
 def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) -> float:
     """Return the factor by which heights are stretched to be visible: 1, 1.5, 2 or 3."""
-    up = setup.route.waypoints[:, 2]
-    low, high = float(up.min()), float(up.max())
+    altitudes = setup.route.waypoints[:, 2]
+    min_altitude, max_altitude = float(altitudes.min()), float(altitudes.max())
     if grid is not None:
-        low, high = min(low, float(np.nanmin(grid.heights))), max(high, float(np.nanmax(grid.heights)))
-    wanted = 0.09 * float(np.ptp(bounds, axis=1).max()) / max(high - low, 50.0)
-    return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wanted, 1.0))
+        min_altitude, max_altitude = (
+            min(min_altitude, float(np.nanmin(grid.heights))),
+            max(max_altitude, float(np.nanmax(grid.heights))),
+        )
+    requested_factor = 0.09 * float(np.ptp(bounds, axis=1).max()) / max(max_altitude - min_altitude, 50.0)
+    return max(factor for factor in (1.0, 1.5, 2.0, 3.0) if factor <= max(requested_factor, 1.0))
 
 
 def drawn_rows(track: Track, max_rows: int) -> NDArray[np.intp]:
     """Return at most ``max_rows`` rows of the track with a known position, including the first and last."""
-    is_finite = np.flatnonzero(np.isfinite(track.position).all(axis=1))
-    return is_finite[
-        np.unique(np.linspace(0, max(len(is_finite) - 1, 0), min(len(is_finite), max_rows)).astype(np.intp))
+    finite_rows = np.flatnonzero(np.isfinite(track.position).all(axis=1))
+    return finite_rows[
+        np.unique(np.linspace(0, max(len(finite_rows) - 1, 0), min(len(finite_rows), max_rows)).astype(np.intp))
     ]
 
 
@@ -126,26 +129,33 @@ def _zone_walls(setup: FlightSetup) -> dict[str, object]:
 
     The result is empty without zones.
     """
-    zones, up = setup.scenario.zones, setup.route.waypoints[:, 2]
+    zones, altitudes = setup.scenario.zones, setup.route.waypoints[:, 2]
     if not zones:
         return {}
-    walls = [zone_walls(zone, setup.scenario.terrain, float(up.min()), float(up.max()) + 50.0) for zone in zones]
+    walls = [
+        zone_walls(zone, setup.scenario.terrain, float(altitudes.min()), float(altitudes.max()) + 50.0)
+        for zone in zones
+    ]
     return {
         "zones": [
-            {"name": zone.name, "keep_out": zone.kind == "exclusion", "rings": [np.round(w, 1).tolist() for w in rings]}
+            {
+                "name": zone.name,
+                "keep_out": zone.kind == "exclusion",
+                "rings": [np.round(ring, 1).tolist() for ring in rings],
+            }
             for zone, rings in zip(zones, walls, strict=True)
         ]
     }
 
 
 def _ground_data(grid: GroundGrid) -> dict[str, object]:
-    low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
-    share = (grid.heights - low) / max(high - low, 1e-6)
-    steps = np.where(np.isfinite(share), np.round(share * (MISSING - 1)), MISSING).astype("<u2")
+    min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
+    fraction = (grid.heights - min_height) / max(max_height - min_height, 1e-6)
+    codes = np.where(np.isfinite(fraction), np.round(fraction * (MISSING - 1)), MISSING).astype("<u2")
     return {
         "columns": len(grid.east),
         "rows": len(grid.north),
-        "low": low,
-        "high": high,
-        "heights": base64.b64encode(steps.tobytes()).decode("ascii"),
+        "low": min_height,
+        "high": max_height,
+        "heights": base64.b64encode(codes.tobytes()).decode("ascii"),
     }

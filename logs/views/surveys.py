@@ -30,17 +30,17 @@ def survey_chart(setup: FlightSetup, track: Track) -> Chart | None:
         return None
     panels = []
     for number, survey in enumerate(requirements.surveys, 1):
-        measured = [measure_line(requirements, aligned, survey, line) for line in survey.lines]
+        line_measures = [measure_line(requirements, aligned, survey, line) for line in survey.lines]
         rows = slice(int(aligned.rows[survey.first]), int(aligned.rows[survey.last]) + 1)
         name = "survey" if len(requirements.surveys) == 1 else f"survey {number}"
-        panels.append(_survey_panel(requirements, survey, measured, aligned.track.position[rows], name))
+        panels.append(_survey_panel(requirements, survey, line_measures, aligned.track.position[rows], name))
     return Chart(
         f"{setup.scenario.name}: photo lines",
         "along the first line",
         "m",
         tuple(panels),
-        tall=360,
-        inches=4.6,
+        page_height=360,
+        print_height=4.6,
         legend="below",
     )
 

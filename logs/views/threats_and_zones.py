@@ -26,10 +26,10 @@ _CIRCLE_ANGLES_RAD = np.linspace(0.0, 2.0 * np.pi, 73)
 # Threats.
 
 
-def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[int]) -> tuple[Layer, ...]:
+def threat_circles(threats: Threats, route: Floats | None, failing_threats: frozenset[int]) -> tuple[Layer, ...]:
     """Return circles of missiles and radars from above, m: the sphere as a line, its section at the path filled.
 
-    route: (w, 3) m, or None to show only the spheres.  entered: threats whose rule fails.
+    route: (w, 3) m, or None to show only the spheres.  failing_threats: threats whose rule fails.
     """
     radars, sections, missiles, units = [], [], [], []
     missile_indices = np.flatnonzero(threats.kill_radius > 0.0)
@@ -38,11 +38,11 @@ def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[in
         radius_at_path[missile_indices] = kill_radius_at_path(threats, missile_indices, route)
     section_name = "missile: its reach at path height" if route is not None else "missile: circle of its sphere"
     for k, name in enumerate(threats.names):
-        kill, detection = float(threats.kill_radius[k]), float(threats.detection_radius[k])
-        centre = threats.position[k, :2]
-        texts = (_threat_text(name, kill, detection),)
-        if detection > 0.0:
-            x, y = circle(centre, detection)
+        kill_radius, detection_radius = float(threats.kill_radius[k]), float(threats.detection_radius[k])
+        center = threats.position[k, :2]
+        texts = (_threat_text(name, kill_radius, detection_radius),)
+        if detection_radius > 0.0:
+            x, y = circle(center, detection_radius)
             radars.append(
                 Layer(
                     "line",
@@ -55,40 +55,40 @@ def threat_circles(threats: Threats, route: Floats | None, entered: frozenset[in
                 )
             )
         if radius_at_path[k] > 0.0:
-            x, y = circle(centre, float(radius_at_path[k]))
+            x, y = circle(center, float(radius_at_path[k]))
             sections.append(Layer("area", name, "missile-reach", x, y, legend=section_name, hover_texts=texts))
-        if kill > 0.0:
-            x, y = circle(centre, kill)
-            is_entered = k in entered
+        if kill_radius > 0.0:
+            x, y = circle(center, kill_radius)
+            is_entered = k in failing_threats
             legend = "threat that is entered" if is_entered else "missile: circle of its sphere"
             missiles.append(Layer("line", name, "fail" if is_entered else "missile", x, y, quiet=True, legend=legend))
-        units.append(Layer("dots", "", "unit", centre[:1], centre[1:], hover_texts=texts))
+        units.append(Layer("dots", "", "unit", center[:1], center[1:], hover_texts=texts))
     return (*radars, *sections, *missiles, *units)
 
 
-def _threat_text(name: str, kill: float, detection: float) -> str:
+def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
     return "\n".join(
         [
             name,
-            *([f"missile: {kill:.0f} m"] if kill > 0.0 else []),
-            *([f"radar: {detection:.0f} m"] if detection else []),
+            *([f"missile: {kill_radius:.0f} m"] if kill_radius > 0.0 else []),
+            *([f"radar: {detection_radius:.0f} m"] if detection_radius else []),
         ]
     )
 
 
-def circle(centre: Floats, radius: float) -> tuple[Floats, Floats]:
+def circle(center: Floats, radius: float) -> tuple[Floats, Floats]:
     """Return east and north (73,) of a closed circle."""
-    return centre[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), centre[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
+    return center[0] + radius * np.cos(_CIRCLE_ANGLES_RAD), center[1] + radius * np.sin(_CIRCLE_ANGLES_RAD)
 
 
-def threat_names(threats: Threats, names: frozenset[int] = frozenset()) -> tuple[Label, ...]:
-    """Return the names of threats at their positions on the map.  named: threats with their own labels."""
+def threat_names(threats: Threats, labelled_elsewhere: frozenset[int] = frozenset()) -> tuple[Label, ...]:
+    """Return the names of threats at their positions on the map.  labelled_elsewhere: threats with their own labels."""
     if len(threats) > _MAX_NAMES:
         return ()
     return tuple(
         Label(shorten(name, 20), float(east), float(north), "name")
         for k, (name, (east, north, _)) in enumerate(zip(threats.names, threats.position, strict=True))
-        if k not in names
+        if k not in labelled_elsewhere
     )
 
 
@@ -107,14 +107,14 @@ def kill_radius_at_path(threats: Threats, indices: NDArray[np.intp], route: Floa
     return section_radii
 
 
-def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
+def sphere_cuts(center: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
     """Return lower and upper surface (m AMSL) of a sphere at each of the points, NaN outside the sphere.
 
-    centre: (3,), points: (s, 3) m.
+    center: (3,), points: (s, 3) m.
     """
-    distance_square = ((points[:, :2] - centre[:2]) ** 2).sum(axis=1)
+    distance_square = ((points[:, :2] - center[:2]) ** 2).sum(axis=1)
     half_height = np.sqrt(np.where(distance_square <= radius**2, radius**2 - distance_square, np.nan))
-    return centre[2] - half_height, centre[2] + half_height
+    return center[2] - half_height, center[2] + half_height
 
 
 def outline_anchor(
@@ -122,8 +122,8 @@ def outline_anchor(
 ) -> tuple[float, float, tuple[int, int]] | None:
     """Find the anchor of a name on a sphere's section within the altitude range of a picture.
 
-    kilometres, lower, upper: (s,), NaN outside the sphere; low: (s,), the ground where it hides the sphere.  Returns
-    km, m AMSL and the side of the name; None if no part of the outline is in the picture.
+    kilometres, lower, upper: (s,), NaN outside the sphere.  min_altitudes: (s,), the ground where it hides the sphere.
+    Returns km, m AMSL and the side of the name; None if no part of the outline is in the picture.
     """
     rows_inside = np.flatnonzero(np.isfinite(upper))
     top, bottom = rows_inside[np.argmax(upper[rows_inside])], rows_inside[np.argmin(lower[rows_inside])]
@@ -149,19 +149,19 @@ class PathPlane:
     """Vertical plane through a path, for its profile.
 
     kilometres: (s,) along the path.  points: (s, 3) m.  ground: (s,) m AMSL under the points, or None if unknown.
-    low, high: altitude range of the profile, m AMSL.
+    min_altitude, max_altitude: altitude range of the profile, m AMSL.
     """
 
     kilometres: Floats
     points: Floats
     ground: Floats | None
-    low: float
-    high: float
+    min_altitude: float
+    max_altitude: float
 
-    def visible_low(self) -> Floats:
+    def min_visible_altitudes(self) -> Floats:
         """Return the lowest visible altitude at each sample, (s,) m AMSL: the ground, if it is in the picture."""
-        base = np.full(len(self.points), self.low)
-        return base if self.ground is None else np.fmax(self.ground, self.low)
+        base = np.full(len(self.points), self.min_altitude)
+        return base if self.ground is None else np.fmax(self.ground, self.min_altitude)
 
 
 def threat_cuts(
@@ -187,7 +187,7 @@ def threat_cuts(
             rows = slice(max(0, int(rows_inside[0]) - 1), int(rows_inside[-1]) + 2)
             name, legend = f"{threats.names[k][:40]} ({kind})", f"{kind}'s sphere over the path"
             layers.append(Layer("band", name, kind, plane.kilometres[rows], upper[rows], lower[rows], legend=legend))
-            anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
+            anchor = outline_anchor(plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude)
             if anchor is not None and k not in labelled_elsewhere:
                 role = "radar" if kind == "radar" else "ink"
                 labels[int(k)] = Label(shorten(threats.names[k], 20), anchor[0], anchor[1], "name", role, anchor[2])
@@ -206,7 +206,7 @@ def entered_cuts(
             continue
         legend = "threat that is entered"
         layers.append(Layer("band", legend, "entered", plane.kilometres, upper, lower, quiet=True))
-        anchor = outline_anchor(plane.kilometres, lower, upper, plane.visible_low(), plane.high)
+        anchor = outline_anchor(plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude)
         if anchor is not None:
             label_positions[k] = anchor[:2]
     return layers, label_positions
@@ -282,7 +282,7 @@ class ZoneCut:
 
 def zone_cuts(zones: tuple[Zone, ...], plane: PathPlane) -> list[ZoneCut]:
     """Return the sections of zones in the plane, without zones away from the path."""
-    min_altitude, max_altitude, points = plane.low, plane.high, plane.points
+    min_altitude, max_altitude, points = plane.min_altitude, plane.max_altitude, plane.points
     terrain = np.full(len(points), min_altitude)
     if plane.ground is not None:
         terrain = np.where(np.isfinite(plane.ground), plane.ground, min_altitude)

@@ -13,7 +13,7 @@ from world.arrays import Floats
 from world.geometry import segment_exposure
 from world.kernels import compiled
 
-_SEEN = "as guidance saw it"
+_GUIDANCE_SERIES = "according to guidance"
 # Window for power from battery energy, s: a shorter one would show the float32 steps of the energy.
 _POWER_WINDOW_S = 2.0
 
@@ -39,12 +39,12 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
     roll, _, _ = track.attitude.T
     _, _, climb = track.velocity.T
     east, north, _ = doubles(track.wind).T
-    limit = float(np.degrees(min(setup.max_bank, setup.envelope.max_bank)))
+    bank_limit = float(np.degrees(min(setup.max_bank, setup.envelope.max_bank)))
     airspeed = (
         series("commanded", "commanded", time, track.speed_command),
         series("flown", "flown", time, track.airspeed),
     )
-    turn_limits = (("limit of planned turns; corrections may pass it", limit), ("", -limit))
+    turn_limits = (("limit of planned turns; corrections may bank beyond it", bank_limit), ("", -bank_limit))
 
     def one(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
         return Panel(title, unit, (series(name, "flown", time, values),), min_span=min_span)
@@ -55,36 +55,45 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
         one("climb rate", "m/s", doubles(climb), 1.0),
         one("load factor", "g", doubles(track.load_factor), 0.2),
         one("wind, with gusts", "m/s", np.hypot(east, north), 1.0),
-        one("cross-track, right +", "m", doubles(track.cross_track), 0.1, _SEEN),
-        one("height error, high +", "m", doubles(track.height_error), 0.1, _SEEN),
+        one("cross-track, right +", "m", doubles(track.cross_track), 0.1, _GUIDANCE_SERIES),
+        one("height error, high +", "m", doubles(track.height_error), 0.1, _GUIDANCE_SERIES),
     ]
     terrain = setup.scenario.terrain
     if terrain is not None:
-        above = track.position[:, 2] - terrain.height(track.position[:, 0], track.position[:, 1])
-        required = (("required", setup.scenario.limits.min_clearance_m),)
-        panels.append(replace(one("height above ground", "m", above, 1.0, "from track and terrain"), limits=required))
+        height_above_ground = track.position[:, 2] - terrain.height(track.position[:, 0], track.position[:, 1])
+        clearance_limit = (("required", setup.scenario.limits.min_clearance_m),)
+        panels.append(
+            replace(
+                one("height above ground", "m", height_above_ground, 1.0, "from track and terrain"),
+                limits=clearance_limit,
+            )
+        )
     return over_time(setup, "the flight over time", panels, track)
 
 
 def control_chart(setup: FlightSetup, track: Track) -> Chart:
     """Return commanded and actual elevator, aileron, rudder and throttle over time.
 
-    Shaded stretches: the command is at or beyond the limit of the control.
+    The chart is shaded where the command is at or beyond the limit of the control.
     """
     panels = []
     limits = control_limits(setup.aircraft)
-    for k, ((name, limit), asked, stood) in enumerate(zip(limits, track.commands.T, track.controls.T, strict=True)):
+    for k, ((name, limit), command, position) in enumerate(
+        zip(limits, track.commands.T, track.controls.T, strict=True)
+    ):
         unit, scale = ("%", 100.0) if name == "throttle" else ("°", 180.0 / np.pi)
-        low, high = (0.0, 1.0) if name == "throttle" else (-limit, limit)
+        min_value, max_value = (0.0, 1.0) if name == "throttle" else (-limit, limit)
         layers = (
-            series("commanded", "commanded", track.time, scale * doubles(asked)),
-            series("as it stood", "flown", track.time, scale * doubles(stood)),
+            series("commanded", "commanded", track.time, scale * doubles(command)),
+            series("actual", "flown", track.time, scale * doubles(position)),
         )
-        known = np.isfinite([low, high]).all()
-        panel = Panel(name, unit, layers, (("limits", scale * low), ("", scale * high)) if known else ())
-        held = held_at_limit(track, k, low, high)
-        if held.any():
-            panel = replace(panel, layers=(held_band(held, track.time, panel.shown_span()), *layers))
+        has_limits = np.isfinite([min_value, max_value]).all()
+        panel = Panel(
+            name, unit, layers, (("limits", scale * min_value), ("", scale * max_value)) if has_limits else ()
+        )
+        is_held = held_at_limit(track, k, min_value, max_value)
+        if is_held.any():
+            panel = replace(panel, layers=(held_band(is_held, track.time, panel.shown_span()), *layers))
         panels.append(panel)
     return over_time(setup, "controls and their limits", panels, track)
 
@@ -94,29 +103,31 @@ def energy_chart(setup: FlightSetup, track: Track) -> Chart:
 
     For an aircraft that burns fuel, the heat of the fuel is shown, and no current.
     """
-    burns = setup.envelope.power_level.size > 0 and not setup.envelope.volts
-    store, unit, power_unit, scale = (
-        ("heat of fuel", "kWh", "kW", 1e-3) if burns else ("battery energy", "Wh", "W", 1.0)
+    burns_fuel = setup.envelope.power_level.size > 0 and not setup.envelope.volts
+    store_name, unit, power_unit, scale = (
+        ("heat of fuel", "kWh", "kW", 1e-3) if burns_fuel else ("battery energy", "Wh", "W", 1.0)
     )
     time = track.time
-    used = doubles(track.energy)
-    late = np.searchsorted(time, time - _POWER_WINDOW_S)
-    duration = np.maximum(time - time[late], 1e-9)
-    power = np.where(late < np.arange(len(track)), 3600.0 * (used - used[late]) / duration, np.nan)
+    used_energy = doubles(track.energy)
+    window_start = np.searchsorted(time, time - _POWER_WINDOW_S)
+    durations = np.maximum(time - time[window_start], 1e-9)
+    power = np.where(
+        window_start < np.arange(len(track)), 3600.0 * (used_energy - used_energy[window_start]) / durations, np.nan
+    )
     height = track.position[:, 2]
-    kinetic = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
-    as_height = (
-        series("height and speed", "second", time, height + kinetic),
-        series("height alone", "flown", time, height),
+    kinetic_height = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
+    energy_heights = (
+        series("height and speed", "second", time, height + kinetic_height),
+        series("height only", "flown", time, height),
     )
     panels = [
-        Panel(f"{store} used", unit, (filled_series("used", "difference", time, scale * used),)),
+        Panel(f"{store_name} used", unit, (filled_series("used", "difference", time, scale * used_energy),)),
         Panel("power", power_unit, (series(f"mean of {_POWER_WINDOW_S:g} s", "flown", time, scale * power),)),
-        *([] if burns else [Panel("battery current", "A", (series("current", "flown", time, track.current),))]),
-        Panel("energy as height", "m", as_height),
+        *([] if burns_fuel else [Panel("battery current", "A", (series("current", "flown", time, track.current),))]),
+        Panel("energy as height", "m", energy_heights),
     ]
-    full = f"{scale * setup.battery:.0f} {unit} {'in full tanks' if burns else 'in a full battery'}"
-    return over_time(setup, f"energy, of {full}", panels, track)
+    capacity_text = f"{scale * setup.battery:.0f} {unit} {'in full tanks' if burns_fuel else 'in a full battery'}"
+    return over_time(setup, f"energy, of {capacity_text}", panels, track)
 
 
 # Exposure along the flown track.
@@ -139,13 +150,13 @@ def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Flo
 @compiled
 def _exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
     count = position.shape[0] - 1
-    out = np.zeros(max(0, count))
+    rates = np.zeros(max(0, count))
     for k in range(count):
         for m in range(centres.shape[0]):
             if radii[m] > 0.0:
                 _, rate = segment_exposure(position[k], position[k + 1], centres[m], radii[m], scales[m])
-                out[k] += rate
-    return out
+                rates[k] += rate
+    return rates
 
 
 def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
@@ -173,10 +184,10 @@ def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
         rate = exposure_rates(position, threats.position, radii, scales)
         if not np.nansum(rate):
             continue
-        total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(rate) * np.diff(time))])
-        strength = filled_series("strength", role, kilometres, np.append(rate, rate[-1]))
-        panels.append(Panel(f"{name} strength", "", (strength,)))
-        panels.append(Panel(f"{name} so far", "s", (series("sum over time", role, kilometres, total),)))
+        exposure = np.concatenate([[0.0], np.cumsum(np.nan_to_num(rate) * np.diff(time))])
+        strength_layer = filled_series("strength", role, kilometres, np.append(rate, rate[-1]))
+        panels.append(Panel(f"{name} strength", "", (strength_layer,)))
+        panels.append(Panel(f"{name} so far", "s", (series("sum over time", role, kilometres, exposure),)))
     if not panels:
         return None
     title = f"{shorten(setup.scenario.name, 60)}: exposure along the flown track"

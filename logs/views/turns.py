@@ -13,7 +13,7 @@ from world.arrays import Floats
 
 # Margin of a panel above and below its values, as a fraction of their span.
 _MARGIN = 0.12
-# A limit above the largest value times this ratio is left out.
+# A limit above the largest value times this ratio is omitted.
 _MAX_LIMIT_RATIO = 4.0
 # Rule, kind of place, title and unit.
 PLACE_PANELS = (
@@ -38,15 +38,15 @@ class PlaceValue:
 
 def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
     """List the findings of a rule by number of waypoint or leg, without findings on the whole flight."""
-    found = []
+    place_rows = []
     for finding in findings:
         place = finding.place
         if finding.rule == rule and place.kind in ("leg", "waypoint") and place.index is not None:
             planned, flown, limit = (
                 math.nan if value is None else value for value in (finding.planned, finding.flown, finding.limit)
             )
-            found.append(PlaceValue(place.index, planned, flown, limit, finding.ok))
-    return sorted(found, key=lambda value: value.number)
+            place_rows.append(PlaceValue(place.index, planned, flown, limit, finding.ok))
+    return sorted(place_rows, key=lambda value: value.number)
 
 
 def turn_chart(name: str, verdict: Verdict) -> Chart:
@@ -64,38 +64,41 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
         if (values := place_values(verdict.findings, rule))
     )
     title = f"{shorten(name, 60)}: turn by turn, leg by leg"
-    return Chart(title, "", "", panels, shared=False, tall=170, inches=1.55, legend="below")
+    return Chart(title, "", "", panels, shared=False, page_height=170, print_height=1.55, legend="below")
 
 
 def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
-    at = np.array([value.number for value in values], dtype=np.float64)
+    numbers = np.array([value.number for value in values], dtype=np.float64)
     planned, flown, limit = (
         np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")
     )
     failed = np.array([value.ok is False for value in values])
     layers = [
-        Layer("bars", "planned", "planned", at, planned),
-        Layer("dashes", "limit", "limit", at, limit),
-        Layer("dots", "flown", "flown", at, flown),
+        Layer("bars", "planned", "planned", numbers, planned),
+        Layer("dashes", "limit", "limit", numbers, limit),
+        Layer("dots", "flown", "flown", numbers, flown),
     ]
     if failed.any():
-        shown = np.where(np.isfinite(flown), flown, planned)
-        layers.append(Layer("rings", "fails", "fail", at[failed], shown[failed], quiet=True))
-    seen = np.concatenate([[0.0], planned, flown])
-    seen = seen[np.isfinite(seen)]
+        marked_values = np.where(np.isfinite(flown), flown, planned)
+        layers.append(Layer("rings", "fails", "fail", numbers[failed], marked_values[failed], quiet=True))
+    known_values = np.concatenate([[0.0], planned, flown])
+    known_values = known_values[np.isfinite(known_values)]
     limits = limit[np.isfinite(limit)]
-    near = limits[_is_near(limits, rule, float(np.abs(seen).max()))]
-    low, high = float(min([*seen, *near])), float(max([*seen, *near]))
-    margin = _MARGIN * ((high - low) or 1.0)
+    shown_limits = limits[_is_shown_limit(limits, rule, float(np.abs(known_values).max()))]
+    min_value, max_value = float(min([*known_values, *shown_limits])), float(max([*known_values, *shown_limits]))
+    margin = _MARGIN * ((max_value - min_value) or 1.0)
     note = ""
-    if len(near) < len(limits):
-        far = limits[~_is_near(limits, rule, float(np.abs(seen).max()))]
-        note = f"{'other ' if near.size else ''}limits from {far.min():.0f}{unit if unit == '°' else ' ' + unit}"
-    base = low - margin if failed.any() or low < 0.0 else 0.0
-    return Panel(title, unit, tuple(layers), span=(base, high + margin), along=place, note=note)
+    if len(shown_limits) < len(limits):
+        hidden_limits = limits[~_is_shown_limit(limits, rule, float(np.abs(known_values).max()))]
+        note = (
+            f"{'other ' if shown_limits.size else ''}limits from {hidden_limits.min():.0f}"
+            f"{unit if unit == '°' else ' ' + unit}"
+        )
+    bottom = min_value - margin if failed.any() or min_value < 0.0 else 0.0
+    return Panel(title, unit, tuple(layers), span=(bottom, max_value + margin), along=place, note=note)
 
 
-def _is_near(limits: Floats, rule: str, largest: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Return the limits to show; a far higher limit of turns or corridors would flatten everything else."""
-    far = _MAX_LIMIT_RATIO * max(largest, 1e-9) if rule in ("turn", "corridor") else math.inf
-    return np.asarray(limits <= far, dtype=np.bool_)
+def _is_shown_limit(limits: Floats, rule: str, max_value: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Return a mask of the limits to show; a much higher limit of turns or corridors would flatten the other values."""
+    max_limit = _MAX_LIMIT_RATIO * max(max_value, 1e-9) if rule in ("turn", "corridor") else math.inf
+    return np.asarray(limits <= max_limit, dtype=np.bool_)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import complete_aircraft, files, with_completer
+from planfly.terminal.arguments import complete_aircraft, file_completer, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call_api, result_options
@@ -37,9 +37,9 @@ _INTERVAL_SIGMAS = 1.96
 _WIND_MPS = 10.0
 
 
-def aircraft_options(line: LineParser) -> None:
+def aircraft_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly aircraft``."""
-    parser = line.command(
+    parser = command_line.command(
         "aircraft",
         "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list the aircraft",
         "planfly aircraft aerosonde --out aerosonde",
@@ -70,7 +70,7 @@ def aircraft_options(line: LineParser) -> None:
             nargs="+",
             help=".BIN or .tlog of ArduPlane, .ulg of PX4, or a table of columns; needs planfly[identification]",
         ),
-        files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
+        file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     with_completer(
         log_group.add_argument(
@@ -82,7 +82,7 @@ def aircraft_options(line: LineParser) -> None:
     )
     with_completer(
         log_group.add_argument("--check", metavar="LOG", help="with --identify: another log to predict"),
-        files("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
+        file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
     )
     result_options(
         parser,
@@ -133,8 +133,8 @@ def aircraft(args: argparse.Namespace) -> int:
     if args.name is None:
         embedded_aircraft = list(planfly.aircraft().values())
         for entry in embedded_aircraft:
-            size = f"{entry.mass:.5g} kg, span {entry.wing_span:.5g} m"
-            print(f"{entry.name:<14} {entry.title}: {size}, cruises at {entry.airspeed:g} m/s")
+            size_text = f"{entry.mass:.5g} kg, span {entry.wing_span:.5g} m"
+            print(f"{entry.name:<14} {entry.title}: {size_text}, cruises at {entry.airspeed:g} m/s")
         write_json_if_requested(args, lambda: _json_answer(embedded_aircraft))
         return FLYABLE
     out = args.out or "runs/aircraft-{name}"
@@ -231,9 +231,10 @@ def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) 
     for prediction in predicted.predictions:
         rms_text = ", ".join(f"{name} {rms:.2g}" for name, rms in zip(QUANTITIES, prediction.rms[0.5], strict=True))
         print(f"  ahead    {prediction.model}: {rms_text}")
-    shares = ", ".join(f"{100.0 * share:.0f}" for share in predicted.predictions[-1].whiteness)
+    shares_text = ", ".join(f"{100.0 * share:.0f}" for share in predicted.predictions[-1].whiteness)
     print(
-        f"  ahead    innovations of roll, pitch, yaw: white at {shares} % of lags to 0.5 s (95 % in a complete model)"
+        f"  ahead    innovations of roll, pitch, yaw: white at {shares_text} % of lags to 0.5 s"
+        " (95 % in a complete model)"
     )
 
 
@@ -243,8 +244,8 @@ def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
         print("  performance only: fewer than 10 rows of inertial sensors or outputs a second do not show the moments")
     for log in result.slow:
         print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs; {log.setting} records more")
-    for number in result.wide:
-        print(f"  wide     {number.text}")
+    for wide_number in result.wide:
+        print(f"  wide     {wide_number.text}")
     for line in result.estimate.silent():
         print(f"  not seen {line}")
     for log_name in result.without_current:
@@ -272,9 +273,9 @@ def _print_sheet(aircraft: "Aircraft") -> None:
             f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
         )
         power = envelope.power(aircraft.airspeed, 500.0, 0.0)
-        low, high = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power) for sign in (-1.0, 1.0))
-        kind = "from the battery" if aircraft.battery_voltage else "of fuel heat"
-        print(f"  power    {power:.3g} W {kind} in level flight at cruise, {low:.3g} to {high:.3g} (95 %)")
+        lower, upper = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power) for sign in (-1.0, 1.0))
+        source = "from the battery" if aircraft.battery_voltage else "of fuel heat"
+        print(f"  power    {power:.3g} W {source} in level flight at cruise, {lower:.3g} to {upper:.3g} (95 %)")
     print("  guessed  README.md lists the guessed values and their possible error")
 
 
@@ -294,29 +295,34 @@ def _print_numbers(numbers: "AircraftNumbers") -> None:
 def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
     min_speed, max_speed = envelope.level_speeds(0.0)
     if aircraft.battery_voltage > 0.0:
-        store = f"battery {aircraft.battery_energy / 3600.0:g} Wh at {aircraft.battery_voltage:g} V"
+        storage_text = f"battery {aircraft.battery_energy / 3600.0:g} Wh at {aircraft.battery_voltage:g} V"
     else:
-        store = f"fuel with {aircraft.battery_energy / 3.6e9:.4g} MWh of heat; energy is the heat of the fuel burned"
+        storage_text = (
+            f"fuel with {aircraft.battery_energy / 3.6e9:.4g} MWh of heat; energy is the heat of the fuel burned"
+        )
     braking = "the motor brakes" if envelope.motor_braking else "the motor does not brake"
     if aircraft.battery_voltage == 0.0:
         braking = "descents with the throttle closed"
-    print(f"  mass     {aircraft.mass:g} kg; wing {aircraft.wing_area:g} m2, span {aircraft.wing_span:g} m; {store}")
+    print(
+        f"  mass     {aircraft.mass:g} kg; wing {aircraft.wing_area:g} m2,"
+        f" span {aircraft.wing_span:g} m; {storage_text}"
+    )
     print(
         f"  speed    cruise {aircraft.airspeed:g} m/s, guidance uses"
         f" {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g};"
         f" level flight at sea level {min_speed:.1f}..{max_speed:.1f} m/s"
     )
     print(
-        f"  limits   bank {_deg(aircraft.max_bank):.0f}, pitch {_deg(aircraft.max_pitch):.0f}, elevator"
-        f" {_deg(aircraft.max_elevator):.0f}, aileron {_deg(aircraft.max_aileron):.0f}, rudder"
-        f" {_deg(aircraft.max_rudder):.0f} deg either way; {braking}"
+        f"  limits   bank {_degrees(aircraft.max_bank):.0f}, pitch {_degrees(aircraft.max_pitch):.0f}, elevator"
+        f" {_degrees(aircraft.max_elevator):.0f}, aileron {_degrees(aircraft.max_aileron):.0f}, rudder"
+        f" {_degrees(aircraft.max_rudder):.0f} deg either way; {braking}"
     )
     if envelope.source:
-        climb, descent = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
+        climb_sd, descent_sd = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
         print(
-            f"  known    from {envelope.source}: climbs to {climb:.1f} deg, descents to {descent:.1f}, the fastest"
-            f" level flight to {envelope.fastest_sd:.1f} m/s, power to a factor of {math.exp(envelope.power_sd):.2f}"
-            " (one deviation)"
+            f"  accuracy from {envelope.source}: climb ± {climb_sd:.1f} deg, descent ± {descent_sd:.1f}, fastest level"
+            f" flight ± {envelope.fastest_sd:.1f} m/s, power within a factor of {math.exp(envelope.power_sd):.2f}"
+            " (one standard deviation)"
         )
 
 
@@ -327,9 +333,9 @@ def _print_trims(trims: "tuple[TrimRow, ...]", amsl: float) -> None:
     for row in trims:
         trim = row.trim
         print(
-            f"  {trim.airspeed:8.1f}{_deg(trim.alpha):8.2f}{_deg(trim.elevator):10.2f}{_deg(trim.aileron):9.2f}"
-            f"{_deg(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}{row.power / 1000.0:9.3f}"
-            f"{row.endurance / 3600.0:11.2f}{row.endurance * trim.airspeed / 1000.0:8.0f}"
+            f"  {trim.airspeed:8.1f}{_degrees(trim.alpha):8.2f}{_degrees(trim.elevator):10.2f}"
+            f"{_degrees(trim.aileron):9.2f}{_degrees(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}"
+            f"{row.power / 1000.0:9.3f}{row.endurance / 3600.0:11.2f}{row.endurance * trim.airspeed / 1000.0:8.0f}"
         )
 
 
@@ -372,7 +378,7 @@ def _print_turns(aircraft: "Aircraft") -> None:
     for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
         cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
         print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND_MPS else ""))
-    bank = _deg(aircraft.max_bank)
+    bank = _degrees(aircraft.max_bank)
     print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
     print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
     for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
@@ -383,12 +389,12 @@ def _print_turns(aircraft: "Aircraft") -> None:
         )
 
 
-def _deg(angle: float) -> float:
+def _degrees(angle: float) -> float:
     return math.degrees(angle)
 
 
 def _angle_pair(climb: float, descent: float) -> str:
     def angle_text(angle: float) -> str:
-        return "-" if math.isnan(angle) else f"{_deg(angle):.1f}"
+        return "-" if math.isnan(angle) else f"{_degrees(angle):.1f}"
 
     return f"{angle_text(climb)} / {angle_text(descent)}"

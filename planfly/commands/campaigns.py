@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import planfly
-from planfly.terminal.arguments import complete_mission_or_scenario, files, number, with_completer
+from planfly.terminal.arguments import complete_mission_or_scenario, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.options import (
@@ -27,9 +27,9 @@ from world.interruption import Interrupted
 _EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "no target": FLYABLE}
 
 
-def campaign_options(line: LineParser) -> None:
+def campaign_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly campaign``."""
-    parser = line.command(
+    parser = command_line.command(
         "campaign",
         "fly a mission many times in varied weather with varied aircraft, to estimate how likely it is to succeed",
         "planfly campaign jacksboro-air --prove 0.99",
@@ -41,35 +41,35 @@ def campaign_options(line: LineParser) -> None:
     goal.add_argument(
         "--prove",
         metavar="P",
-        type=number("prove"),
+        type=number_parser("prove"),
         help="fly until it is shown whether the probability is at least P",
     )
     goal.add_argument(
         "--at-least",
         metavar="P",
-        type=number("at_least"),
+        type=number_parser("at_least"),
         help="decide after all flights whether the probability is at least P",
     )
     parser.add_argument(
         "--flights",
         metavar="N",
-        type=number("flights"),
+        type=number_parser("flights"),
         help="number of flights (default: 300); with --prove, the maximum (default: 5000)",
     )
     parser.add_argument(
         "--confidence",
         metavar="C",
-        type=number("confidence"),
+        type=number_parser("confidence"),
         help="confidence of each bound (default: 0.95, or with --resume the previous value)",
     )
     parser.add_argument(
-        "--refly", metavar="K", type=number("index"), help="repeat flight K of the campaign in --out, with a log"
+        "--refly", metavar="K", type=number_parser("index"), help="repeat flight K of the campaign in --out, with a log"
     )
 
 
-def winds_options(line: LineParser) -> None:
+def winds_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly winds``."""
-    parser = line.command(
+    parser = command_line.command(
         "winds",
         "for each wind direction, find the strongest wind in which a mission is flyable",
         "planfly winds jacksboro-air --prove 0.99 --directions 16",
@@ -79,31 +79,35 @@ def winds_options(line: LineParser) -> None:
     parser.add_argument(
         "--prove",
         metavar="P",
-        type=number("prove"),
+        type=number_parser("prove"),
         default=0.99,
         help="probability of success to prove (default: 0.99)",
     )
     parser.add_argument(
         "--confidence",
         metavar="C",
-        type=number("confidence"),
+        type=number_parser("confidence"),
         default=0.95,
         help="confidence of each interval (default: 0.95)",
     )
     parser.add_argument(
         "--directions",
         metavar="N",
-        type=number("directions"),
+        type=number_parser("directions"),
         default=16,
         help="number of directions, 4 to 72 (default: 16)",
     )
     parser.add_argument(
-        "--most", metavar="M/S", type=number("most"), default=20.0, help="strongest wind to try, m/s (default: 20)"
+        "--most",
+        metavar="M/S",
+        type=number_parser("most"),
+        default=20.0,
+        help="strongest wind to try, m/s (default: 20)",
     )
     parser.add_argument(
         "--flights",
         metavar="N",
-        type=number("flights"),
+        type=number_parser("flights"),
         help="maximum number of flights, all directions together (default: 5000)",
     )
 
@@ -120,13 +124,16 @@ def _shared_options(parser: CommandParser) -> None:
     steering_options(parser)
     with_completer(
         parser.add_argument("--spread", metavar="FILE", help="dispersions, as TOML (default: planfly's own)"),
-        files("toml"),
+        file_completer("toml"),
     )
     parser.add_argument(
-        "--seed", metavar="N", type=number("seed"), help="seed of plan and draws (default: the scenario's, or 1)"
+        "--seed", metavar="N", type=number_parser("seed"), help="seed of plan and draws (default: the scenario's, or 1)"
     )
     parser.add_argument(
-        "--workers", metavar="N", type=number("workers"), help="processes on this machine (default: one per core)"
+        "--workers",
+        metavar="N",
+        type=number_parser("workers"),
+        help="processes on this machine (default: one per core)",
     )
     parser.add_argument(
         "--scheduler",

@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, MISSION_SUFFIXES, autopilots, files, with_completer
+from planfly.terminal.arguments import (
+    IMPORTED_LOG_SUFFIXES,
+    MISSION_SUFFIXES,
+    file_completer,
+    parse_autopilots,
+    with_completer,
+)
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import LOSS, verdict_code
 from planfly.terminal.options import (
@@ -29,9 +35,9 @@ if TYPE_CHECKING:
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
-def check_options(line: LineParser) -> None:
+def check_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly check``."""
-    parser = line.command(
+    parser = command_line.command(
         "check",
         "judge a flight from its log (planfly's or an autopilot's), or a mission by flying it, without writing files",
         "planfly check flight.mcap --json verdict.json",
@@ -43,7 +49,7 @@ def check_options(line: LineParser) -> None:
         parser.add_argument(
             "what", metavar="LOG|MISSION", help=f"a flight log (.mcap, or {LOGS}), or plan.json, .waypoints, .plan"
         ),
-        files("mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
+        file_completer("mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
     )
     imported_log_options(parser)
     world_options(parser)
@@ -53,7 +59,7 @@ def check_options(line: LineParser) -> None:
         "--for",
         dest="autopilots",
         metavar="AUTOPILOT,...",
-        type=autopilots,
+        type=parse_autopilots,
         help="fly a mission with several simulated autopilots, and print one table with a column for each: "
         + ", ".join(CHOICES["autopilot"]),
     )

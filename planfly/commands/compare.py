@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from planfly import Comparison
 
 
-def compare_options(line: LineParser) -> None:
+def compare_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly compare``."""
-    parser = line.command(
+    parser = command_line.command(
         "compare",
         "compare two flights: a table of differences, and pictures",
         "planfly compare calm.mcap windy.mcap --out both",

@@ -3,7 +3,7 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import MISSION_SUFFIXES, files, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.options import fence_option, result_options, time_option
@@ -11,9 +11,9 @@ from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 
 
-def export_options(line: LineParser) -> None:
+def export_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly export``."""
-    parser = line.command(
+    parser = command_line.command(
         "export",
         "convert a plan, mission or log to the formats given by the suffixes of the files",
         "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
@@ -24,7 +24,7 @@ def export_options(line: LineParser) -> None:
             metavar="PLAN.json|MISSION|LOG.mcap",
             help="a plan that planfly made, a mission file, or a flight log",
         ),
-        files("mcap", *MISSION_SUFFIXES),
+        file_completer("mcap", *MISSION_SUFFIXES),
     )
     parser.add_argument(
         "files",

@@ -5,7 +5,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import MISSION_SUFFIXES, files, number, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import call_api, flight_options, log_rate_option, result_options, world_options
@@ -17,22 +17,22 @@ if TYPE_CHECKING:
     from planfly import FlownMission
 
 
-def fly_options(line: LineParser) -> None:
+def fly_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly fly``."""
-    parser = line.command(
+    parser = command_line.command(
         "fly",
         "fly a plan or any mission file, write the log, and judge the flight",
         "planfly fly mission.waypoints --terrain jacksboro --wind 8,270 --turbulence light",
     )
     with_completer(
         parser.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan"),
-        files(*MISSION_SUFFIXES),
+        file_completer(*MISSION_SUFFIXES),
     )
     world_options(parser)
     flight_options(parser)
     log_group = parser.group("the log")
     log_group.add_argument(
-        "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: the plan's, or 1)"
+        "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
     log_group.add_argument(
         "--log",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.commands.check import LOGS
-from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, complete_aircraft, files, with_completer
+from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, complete_aircraft, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, LOSS, verdict_code
 from planfly.terminal.options import (
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from planfly import ImportedFlight, Reflown
 
 
-def import_log_options(line: LineParser) -> None:
+def import_log_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly import``."""
-    parser = line.command(
+    parser = command_line.command(
         "import",
         "convert an autopilot's log into a flight log, and judge the flight against its plan",
         "planfly import 00000042.BIN flight.mcap --terrain dem.tif --aircraft aerosonde",
@@ -40,7 +40,7 @@ def import_log_options(line: LineParser) -> None:
             help="a log of ArduPilot, of a ground station (.tlog; extra planfly[live]), of PX4 (.ulg; extra"
             " planfly[px4-logs]), a track, or a table of columns (extra planfly[data-logs])",
         ),
-        files(*IMPORTED_LOG_SUFFIXES),
+        file_completer(*IMPORTED_LOG_SUFFIXES),
     )
     parser.add_argument("target", metavar="FLIGHT.mcap", nargs="?", help="the flight log to write")
     with_completer(
@@ -52,7 +52,7 @@ def import_log_options(line: LineParser) -> None:
             help="write a table of columns for these CSV, MAT, Parquet or HDF5 files to LOG, guessed from names and"
             " values, for you to check; needs the extra planfly[data-logs]",
         ),
-        files("csv", "mat", "parquet", "h5", "hdf5"),
+        file_completer("csv", "mat", "parquet", "h5", "hdf5"),
     )
     imported_log_options(parser)
     world_options(parser)
@@ -98,16 +98,16 @@ def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
     return ImportAnswer(exit_code=code, log=str(target), rows=len(flight.track), verdict=verdict)
 
 
-def refly_options(line: LineParser) -> None:
+def refly_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly refly``."""
-    parser = line.command(
+    parser = command_line.command(
         "refly",
         "fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare both flights",
         "planfly refly flight.mcap --out refly",
     )
     with_completer(
         parser.add_argument("log", metavar="FLIGHT.mcap", help="a flight log written by 'planfly import'"),
-        files("mcap"),
+        file_completer("mcap"),
     )
     with_completer(
         parser.add_argument(

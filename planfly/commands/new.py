@@ -5,16 +5,16 @@ import shlex
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import complete_aircraft, number, place, with_completer
+from planfly.terminal.arguments import complete_aircraft, number_parser, parse_position, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import call_api, result_options, terrain_option
 from planfly.terminal.output import write_json_if_requested
 
 
-def new_options(line: LineParser) -> None:
+def new_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly new``."""
-    parser = line.command(
+    parser = command_line.command(
         "new",
         "write a commented scenario for a flight from one place to another, and plan it once",
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --terrain dem.tif",
@@ -24,12 +24,17 @@ def new_options(line: LineParser) -> None:
     route_group = parser.group("the way")
     for option, keyword in (("--from", "start"), ("--to", "destination")):
         route_group.add_argument(
-            option, dest=keyword, metavar="LAT,LON", type=place, required=True, help="latitude and longitude, degrees"
+            option,
+            dest=keyword,
+            metavar="LAT,LON",
+            type=parse_position,
+            required=True,
+            help="latitude and longitude, degrees",
         )
     route_group.add_argument(
         "--height",
         metavar="M",
-        type=number("height"),
+        type=number_parser("height"),
         default=120.0,
         help="height of both ends above ground, m (default: 120)",
     )

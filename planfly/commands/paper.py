@@ -6,7 +6,7 @@ from pathlib import Path
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import number, problems
+from planfly.terminal.arguments import number_parser, parse_problems
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call_api, result_options
@@ -14,9 +14,9 @@ from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
 
 
-def paper_options(line: LineParser) -> None:
+def paper_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly paper``."""
-    parser = line.command(
+    parser = command_line.command(
         "paper",
         "reproduce section V of the paper: tables and figures of seeded plans in three encodings",
         "planfly paper --problems 7,60 --runs 5 --out my-paper",
@@ -24,14 +24,14 @@ def paper_options(line: LineParser) -> None:
     parser.add_argument(
         "--problems",
         metavar="N,...",
-        type=problems,
+        type=parse_problems,
         default=CHOICES["problems"],
         help="numbers of threats (default: 7,15,30,60)",
     )
     parser.add_argument(
         "--runs",
         metavar="N",
-        type=number("runs"),
+        type=number_parser("runs"),
         default=15,
         help="runs of each problem, with seeds 1 to N (default: 15)",
     )
@@ -41,7 +41,7 @@ def paper_options(line: LineParser) -> None:
         default="umda",
         help="algorithm to compare with the two baselines (default: umda, the paper's)",
     )
-    parser.add_argument("--jobs", metavar="N", type=number("jobs"), help="processes (default: one per core)")
+    parser.add_argument("--jobs", metavar="N", type=number_parser("jobs"), help="processes (default: one per core)")
     result_options(parser, "folder for tables and figures (default: runs/paper; an existing one is replaced)")
 
 

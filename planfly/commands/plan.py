@@ -8,7 +8,7 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import budget, files, number, threat, with_completer
+from planfly.terminal.arguments import file_completer, number_parser, parse_budget, parse_threat, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import (
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from planfly import Plan
 
 
-def plan_options(line: LineParser) -> None:
+def plan_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly plan``."""
-    parser = line.command(
+    parser = command_line.command(
         "plan",
         "plan a path, or plan again in flight, without flying it",
         "planfly plan jacksboro --seed 3 --out plan.json",
@@ -44,7 +44,7 @@ def plan_options(line: LineParser) -> None:
     scenario_argument(parser, help="TOML file or embedded name")
     planning_group = parser.group("planning")
     planning_group.add_argument(
-        "--seed", metavar="N", type=number("seed"), help="seed of the planner (default: the scenario's, or 1)"
+        "--seed", metavar="N", type=number_parser("seed"), help="seed of the planner (default: the scenario's, or 1)"
     )
     planning_group.add_argument(
         "--algorithm", metavar="A", help="the planner's algorithm, in place of the scenario's (see below)"
@@ -52,14 +52,14 @@ def plan_options(line: LineParser) -> None:
     planning_group.add_argument(
         "--budget",
         metavar="N|Xs",
-        type=budget,
+        type=parse_budget,
         help="stop after N evaluations or X seconds with the best plan so far (as Ctrl-C does); a plan under a budget "
         "in seconds may differ from run to run",
     )
     planning_group.add_argument(
         "--front",
         metavar="N",
-        type=number("front"),
+        type=number_parser("front"),
         help=(
             "plan up to N alternatives (2 to 100); none is better than another in length, exposure "
             "to radars, height above ground and energy at once (time for energy with [planner] "
@@ -70,16 +70,16 @@ def plan_options(line: LineParser) -> None:
     replanning_group = parser.group("planning again in flight")
     with_completer(
         replanning_group.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
-        files("json"),
+        file_completer("json"),
     )
     replanning_group.add_argument(
-        "--at-leg", metavar="K", type=number("at_leg"), help="keep the legs before leg K, which have been flown"
+        "--at-leg", metavar="K", type=number_parser("at_leg"), help="keep the legs before leg K, which have been flown"
     )
     replanning_group.add_argument(
         "--add-threat",
         dest="threats",
         metavar="EAST,NORTH,KILL,DETECTION",
-        type=threat,
+        type=parse_threat,
         action="append",
         help="a new threat: east, north, kill radius and detection radius, m; repeatable",
     )
@@ -104,7 +104,7 @@ def plan(args: argparse.Namespace) -> int:
     name = "plan.json" if args.old is None else "replan.json"
     out = f"{RUN_FOLDER}/{name}" if args.out is None else args.out
     evaluations, seconds = args.budget or (None, None)
-    with _stop_on_interrupt() as stop:
+    with _stop_on_interrupt() as should_stop:
         new_plan = call_api(
             planfly.plan if args.old is None else planfly.replan,
             args,
@@ -112,7 +112,7 @@ def plan(args: argparse.Namespace) -> int:
             seconds=seconds,
             out=out,
             overwrite=args.overwrite or args.out is None,
-            stop=stop,
+            stop=should_stop,
         )
     target = expand_path_pattern(out, new_plan.scenario.name, new_plan.seed)
     print_warnings(new_plan.scenario.notes)
@@ -136,7 +136,7 @@ def _plan_front(args: argparse.Namespace) -> int:
         allowed = "with `front` N: expected a number of seconds, as in 10s"
         raise ScenarioError.of_argument("budget", evaluations, allowed)
     out = FRONT_FOLDER if args.out is None else args.out
-    with _stop_on_interrupt() as stop:
+    with _stop_on_interrupt() as should_stop:
         front = call_api(
             planfly.plan_front,
             args,
@@ -144,7 +144,7 @@ def _plan_front(args: argparse.Namespace) -> int:
             seconds=seconds,
             out=out,
             overwrite=args.overwrite or args.out is None,
-            stop=stop,
+            stop=should_stop,
         )
     default_plan = front.default.plan
     folder = expand_path_pattern(out, default_plan.scenario.name, default_plan.seed)
@@ -220,7 +220,10 @@ def _print_plan(plan: "Plan") -> None:
         reason = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
         print(f"  note    the search was ended {reason}, after {plan.evaluations:,} evaluations: the best plan so far")
     if plan.flown_legs:
-        print(f"  note    legs 0..{plan.flown_legs - 1} are flown and kept; judged is what follows them")
+        print(
+            f"  note    legs 0..{plan.flown_legs - 1} are already flown and unchanged;"
+            " only the legs after them are judged"
+        )
     for problem in plan.certificate.problems:
         print(f"  failed  {problem}")
     for obstacle in planfly.what_blocks(plan):

@@ -11,9 +11,9 @@ from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
 
 
-def recover_options(line: LineParser) -> None:
+def recover_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly recover``."""
-    parser = line.command(
+    parser = command_line.command(
         "recover",
         "write a new, complete log from what can be read of an unfinished or damaged one",
         "planfly recover flight.mcap --out recovered.mcap",

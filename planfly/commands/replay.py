@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import number, time_or_stations
+from planfly.terminal.arguments import number_parser, parse_time_or_stations
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.control_characters import without_controls
 from planfly.terminal.exit_codes import FLYABLE, LOSS
@@ -42,9 +42,9 @@ _ERASE_LINE_END = "\x1b[K"
 _ERASE_SCREEN_END = "\x1b[J"
 
 
-def replay_options(line: LineParser) -> None:
+def replay_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly replay``."""
-    parser = line.command(
+    parser = command_line.command(
         "replay",
         "replay a flight from its log: as instruments on a terminal, as a timeline elsewhere",
         "planfly replay flight.mcap --speed 20 --from 60",
@@ -52,26 +52,26 @@ def replay_options(line: LineParser) -> None:
     )
     parser.alias_keyword("end", "--to")
     log_argument(parser)
-    part_group = parser.group("which part, how fast")
+    part_group = parser.group("part and speed")
     part_group.add_argument(
-        "--from", dest="start", metavar="S", type=number("start"), help="start at this time of the flight, s"
+        "--from", dest="start", metavar="S", type=number_parser("start"), help="start at this time of the flight, s"
     )
     part_group.add_argument(
         "--to",
         metavar="S|IP:PORT,...",
-        type=time_or_stations,
+        type=parse_time_or_stations,
         help="end at this time of the flight, s; or play the log to ground stations at this address (extra "
         "planfly[live])",
     )
     part_group.add_argument(
         "--speed",
         metavar="X",
-        type=number("speed"),
+        type=number_parser("speed"),
         help="at X times real time (default: 1 on a terminal and to Foxglove; for a film, so that it takes 20 s; "
         "otherwise at once)",
     )
     part_group.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
-    output_group = parser.group("other ways to see it")
+    output_group = parser.group("other outputs")
     output_group.add_argument(
         "--movie",
         metavar="FILE|DIR",
@@ -86,7 +86,7 @@ def replay_options(line: LineParser) -> None:
     output_group.add_argument(
         "--port",
         metavar="N",
-        type=number("port"),
+        type=number_parser("port"),
         default=8765,
         help="port of --foxglove (default: 8765; 0: any free port)",
     )
@@ -96,7 +96,7 @@ def replay_options(line: LineParser) -> None:
     output_group.add_argument(
         "--wait",
         metavar="S",
-        type=number("wait"),
+        type=number_parser("wait"),
         help="wait S seconds for a ground station (default: 10) or for Foxglove (default: forever)",
     )
     own_link_options(parser, bind="127.0.0.1:0")
@@ -113,9 +113,9 @@ def replay(args: argparse.Namespace) -> int:
     if not to_station:
         args.end = args.to
     if to_station or args.foxglove:
-        play = planfly.play_to_stations if to_station else planfly.play_to_foxglove
-        with watch_stop_signals() as stop:
-            call_api(play, args, log=log, stop=stop, on_message=print_and_flush)
+        play_log = planfly.play_to_stations if to_station else planfly.play_to_foxglove
+        with watch_stop_signals() as should_stop:
+            call_api(play_log, args, log=log, stop=should_stop, on_message=print_and_flush)
     elif args.movie:
         for file in call_api(planfly.movie, args, log=log, out=args.movie)[:3]:
             print(f"movie     {file}")

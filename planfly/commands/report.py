@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import files, with_completer
+from planfly.terminal.arguments import file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE, verdict_code
 from planfly.terminal.options import result_options
@@ -19,14 +19,16 @@ if TYPE_CHECKING:
     from planfly import Verdict
 
 
-def report_options(line: LineParser) -> None:
+def report_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly report``."""
-    parser = line.command(
+    parser = command_line.command(
         "report",
         "write report.html, map.png and profile.png from a log, or write the layout for Foxglove",
         "planfly report flight.mcap --out report --pictures",
     )
-    with_completer(parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), files("mcap"))
+    with_completer(
+        parser.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log"), file_completer("mcap")
+    )
     parser.add_argument("--pictures", action="store_true", help="write every figure of the page as PNG")
     parser.add_argument("--svg", action="store_true", help="also write the same figures as SVG")
     parser.add_argument("--layout", metavar="FILE", help="write only the layout file for Foxglove")

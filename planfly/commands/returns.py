@@ -6,7 +6,13 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.commands.check import LOGS
-from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, MISSION_SUFFIXES, files, number, with_completer
+from planfly.terminal.arguments import (
+    IMPORTED_LOG_SUFFIXES,
+    MISSION_SUFFIXES,
+    file_completer,
+    number_parser,
+    with_completer,
+)
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.options import (
@@ -27,9 +33,9 @@ if TYPE_CHECKING:
 _MAX_LISTED = 20
 
 
-def returns_options(line: LineParser) -> None:
+def returns_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly returns``."""
-    parser = line.command(
+    parser = command_line.command(
         "returns",
         "simulate a return to launch from points all along the route: is each safe, where does it end and why; and"
         " what can the aircraft reach without its engine",
@@ -41,11 +47,15 @@ def returns_options(line: LineParser) -> None:
         parser.add_argument(
             "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
         ),
-        files(*MISSION_SUFFIXES, "mcap", *IMPORTED_LOG_SUFFIXES),
+        file_completer(*MISSION_SUFFIXES, "mcap", *IMPORTED_LOG_SUFFIXES),
     )
     group = parser.group("the returns")
     group.add_argument(
-        "--every", metavar="S", type=number("every"), default=1.0, help="seconds between two returns (default: 1)"
+        "--every",
+        metavar="S",
+        type=number_parser("every"),
+        default=1.0,
+        help="seconds between two returns (default: 1)",
     )
     group.add_argument(
         "--suggest",
@@ -62,14 +72,14 @@ def returns_options(line: LineParser) -> None:
     group.add_argument(
         "--points",
         metavar="N",
-        type=number("points"),
+        type=number_parser("points"),
         help="number of the worst returns that the program flies, spaced far apart (default: 3)",
     )
     imported_log_options(parser)
     world_options(parser)
     aircraft_and_wind_options(parser)
     steering_options(parser).add_argument(
-        "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: the plan's, or 1)"
+        "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
     result_options(
         parser,

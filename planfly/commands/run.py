@@ -4,7 +4,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import number
+from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import (
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from planfly import Round, RunResult
 
 
-def run_options(line: LineParser) -> None:
+def run_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly run``."""
-    parser = line.command(
+    parser = command_line.command(
         "run",
         "plan, export, fly, log, judge and report",
         "planfly run jacksboro --seed 3 --out my-run",
@@ -35,13 +35,13 @@ def run_options(line: LineParser) -> None:
     planning.add_argument(
         "--seed",
         metavar="N",
-        type=number("seed"),
+        type=number_parser("seed"),
         help="seed of planner and turbulence (default: the scenario's, or 1)",
     )
     planning.add_argument(
         "--refine",
         metavar="N",
-        type=number("refine"),
+        type=number_parser("refine"),
         default=0,
         help="if the plan is not flyable, tighten the limits and plan again, up to N times (default: 0)",
     )

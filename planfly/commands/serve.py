@@ -3,7 +3,7 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import MISSION_SUFFIXES, files, number, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
@@ -23,9 +23,9 @@ Parameters are read, listed and set by name before a flight: those of the simula
 which at 1 lets the vehicle arm and fly even a mission that is judged not flyable (default: 0)."""
 
 
-def serve_options(line: LineParser) -> None:
+def serve_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly serve``."""
-    parser = line.command(
+    parser = command_line.command(
         "serve",
         "simulate a MAVLink vehicle: a ground station uploads a mission, arms and starts the vehicle, and monitors it",
         "planfly serve mission.waypoints --terrain jacksboro",
@@ -34,7 +34,7 @@ def serve_options(line: LineParser) -> None:
     )
     with_completer(
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="mission to load at start-up"),
-        files(*MISSION_SUFFIXES),
+        file_completer(*MISSION_SUFFIXES),
     )
     world_options(parser)
     aircraft_and_wind_options(parser)
@@ -49,7 +49,7 @@ def serve_options(line: LineParser) -> None:
     parser.add_argument(
         "--speed",
         metavar="X",
-        type=number("served_speed"),
+        type=number_parser("served_speed"),
         default=1.0,
         help="fly at X times real time, 0.1 to 100 (default: 1)",
     )
@@ -60,6 +60,6 @@ def serve_options(line: LineParser) -> None:
 
 def serve(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    with watch_stop_signals() as stop:
-        call_api(planfly.serve, args, stop=stop, on_message=print_and_flush)
+    with watch_stop_signals() as should_stop:
+        call_api(planfly.serve, args, stop=should_stop, on_message=print_and_flush)
     return FLYABLE

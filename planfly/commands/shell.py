@@ -22,9 +22,9 @@ to enable completion in this shell and in new ones:
 # ``planfly completion``: the completion script of a shell.
 
 
-def completion_options(line: LineParser) -> None:
+def completion_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly completion``."""
-    parser = line.command(
+    parser = command_line.command(
         "completion",
         "print a script that makes a shell complete planfly's commands, options and names",
         "planfly completion bash",
@@ -43,14 +43,14 @@ def completion(args: argparse.Namespace) -> int:
 # ``planfly help``: the help of a command, or the JSON schema of its answer.
 
 
-def show_help_options(line: LineParser) -> None:
+def show_help_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly help``."""
-    parser = line.command(
+    parser = command_line.command(
         "help", "show the help of a command, or list the commands", "planfly help fly", "planfly help fly --schema"
     )
     with_completer(
         parser.add_argument("topic", metavar="COMMAND", nargs="?", help="a command (default: all of them)"),
-        lambda prefix, **_: [name for name in line.commands if name.startswith(prefix)],
+        lambda prefix, **_: [name for name in command_line.commands if name.startswith(prefix)],
     )
     parser.add_argument("--schema", action="store_true", help="print the JSON schema of the command's --json output")
 
@@ -88,9 +88,9 @@ def _report_bad_usage(reason: str) -> int:
 # ``planfly scenarios``: the embedded scenarios, one line each.
 
 
-def scenarios_options(line: LineParser) -> None:
+def scenarios_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly scenarios``."""
-    parser = line.command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
+    parser = command_line.command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     json_option(parser.group("results"), "scenarios")
 
 

@@ -3,7 +3,13 @@
 import argparse
 
 import planfly
-from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, MISSION_SUFFIXES, files, number, with_completer
+from planfly.terminal.arguments import (
+    IMPORTED_LOG_SUFFIXES,
+    MISSION_SUFFIXES,
+    file_completer,
+    number_parser,
+    with_completer,
+)
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
@@ -24,9 +30,9 @@ redo, Escape cancels a drag.
 The page can be reached only from this machine, at the printed address."""
 
 
-def studio_options(line: LineParser) -> None:
+def studio_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly studio``."""
-    parser = line.command(
+    parser = command_line.command(
         "studio",
         "open a page on which you drag a mission while it is judged, fly it, and save it",
         "planfly studio jacksboro",
@@ -44,10 +50,13 @@ def studio_options(line: LineParser) -> None:
                 ".plan; or a log, whose mission is opened (default: jacksboro)"
             ),
         ),
-        files("toml", "mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
+        file_completer("toml", "mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
     )
     parser.add_argument(
-        "--port", metavar="PORT", type=number("port"), help="port of the studio (default: 8790, or any free port)"
+        "--port",
+        metavar="PORT",
+        type=number_parser("port"),
+        help="port of the studio (default: 8790, or any free port)",
     )
     parser.add_argument(
         "--no-browser",
@@ -59,7 +68,7 @@ def studio_options(line: LineParser) -> None:
     parser.add_argument(
         "--seed",
         metavar="N",
-        type=number("seed"),
+        type=number_parser("seed"),
         help="seed of planner and turbulence (default: the scenario's, or 1)",
     )
     parser.add_argument(
@@ -72,6 +81,6 @@ def studio_options(line: LineParser) -> None:
 
 def studio(args: argparse.Namespace) -> int:
     """Serve until SIGINT or SIGTERM."""
-    with watch_stop_signals() as stop:
-        call_api(planfly.open_studio, args, stop=stop, on_message=print_and_flush)
+    with watch_stop_signals() as should_stop:
+        call_api(planfly.open_studio, args, stop=should_stop, on_message=print_and_flush)
     return FLYABLE

@@ -6,7 +6,7 @@ from shlex import quote
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import MISSION_SUFFIXES, camera, files, number, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_camera, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
 from planfly.terminal.options import (
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from planfly import SurveyFound
 
 
-def survey_options(line: LineParser) -> None:
+def survey_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly survey``."""
-    parser = line.command(
+    parser = command_line.command(
         "survey",
         "fly a survey: how much of each photo line can be used, and what would help the lines that are lost",
         "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot ardupilot --wind 5,250",
@@ -32,13 +32,13 @@ def survey_options(line: LineParser) -> None:
     )
     with_completer(
         parser.add_argument("what", metavar="MISSION|LOG", help=".waypoints or .plan, or a flight log (.mcap)"),
-        files(*MISSION_SUFFIXES, "mcap"),
+        file_completer(*MISSION_SUFFIXES, "mcap"),
     )
     group = parser.group("the survey")
     group.add_argument(
         "--camera",
         metavar="WxH,FOCAL",
-        type=camera,
+        type=parse_camera,
         help=(
             "width and height of the camera's sensor (across and along the track) and its focal "
             "length, mm, optionally followed by the required overlaps along and across the lines, "
@@ -55,7 +55,7 @@ def survey_options(line: LineParser) -> None:
     world_options(parser)
     aircraft_and_wind_options(parser)
     steering_options(parser).add_argument(
-        "--seed", metavar="N", type=number("seed"), help="seed of the turbulence (default: 1)"
+        "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: 1)"
     )
     result_options(parser, "folder for a picture of the lines, and for each mission that would help (default: none)")
 

@@ -4,7 +4,7 @@ import argparse
 import shlex
 
 import planfly
-from planfly.terminal.arguments import MISSION_SUFFIXES, area, files, number, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_area, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call_api, result_options
@@ -15,9 +15,9 @@ from planfly.terminal.results import print_warnings
 _MAX_LISTED_CELLS = 4
 
 
-def terrain_options(line: LineParser) -> None:
+def terrain_options(command_line: LineParser) -> None:
     """Add the parser of ``planfly terrain``."""
-    parser = line.command(
+    parser = command_line.command(
         "terrain",
         "write the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
         "planfly terrain --around field.waypoints --out dem.tif",
@@ -28,11 +28,15 @@ def terrain_options(line: LineParser) -> None:
         area_group.add_argument(
             "--around", metavar="MISSION", help=".waypoints or .plan file, all of whose positions are covered"
         ),
-        files(*MISSION_SUFFIXES),
+        file_completer(*MISSION_SUFFIXES),
     )
-    area_group.add_argument("--box", metavar="S,W,N,E", type=area, help="edges of the area, degrees")
+    area_group.add_argument("--box", metavar="S,W,N,E", type=parse_area, help="edges of the area, degrees")
     area_group.add_argument(
-        "--margin", metavar="KM", type=number("margin"), default=3.0, help="margin around the area, km (default: 3)"
+        "--margin",
+        metavar="KM",
+        type=number_parser("margin"),
+        default=3.0,
+        help="margin around the area, km (default: 3)",
     )
     tile_group = parser.group("the tiles")
     tile_group.add_argument(

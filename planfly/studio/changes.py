@@ -25,7 +25,7 @@ _MAX_VALUE_CHANGES = 3
 _WORST_FIRST = {False: 0, None: 1, True: 2}
 
 
-class Figure(NamedTuple):
+class PlaceResult(NamedTuple):
     """Result of a rule at a place.
 
     ok: True if it passes, None if not judged.
@@ -47,10 +47,10 @@ class Figure(NamedTuple):
         return "" if self.value is None else quantity_text(self.value, self.unit)
 
 
-_Results = dict[tuple[str, PlaceKey], Figure]
+_Results = dict[tuple[str, PlaceKey], PlaceResult]
 
 
-class Figures(NamedTuple):
+class FlightResults(NamedTuple):
     """Results of a flight, for a comparison with another flight.
 
     items: contents of each item of its mission, in order.
@@ -63,7 +63,7 @@ class Figures(NamedTuple):
     seconds: float
 
 
-def flight_figures(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> Figures:
+def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
     """Collect the results of a flight of a mission."""
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
@@ -71,15 +71,17 @@ def flight_figures(mission: Mission, route: Route, findings: Iterable[Finding], 
     for finding in findings:
         key, description = _place_key(finding.place, route.items.tolist(), order)
         value = finding.planned if finding.flown is None else finding.flown
-        figure = Figure(finding.ok, value, finding.margin, finding.unit, description, RULE_WORDS[finding.rule].scale)
+        result = PlaceResult(
+            finding.ok, value, finding.margin, finding.unit, description, RULE_WORDS[finding.rule].scale
+        )
         previous = results.get((finding.rule, key))
-        if previous is None or _severity_key(figure) < _severity_key(previous):
-            results[finding.rule, key] = figure
-    return Figures(item_contents, results, seconds)
+        if previous is None or _severity_key(result) < _severity_key(previous):
+            results[finding.rule, key] = result
+    return FlightResults(item_contents, results, seconds)
 
 
-def _severity_key(figure: Figure) -> tuple[int, float]:
-    return _WORST_FIRST[figure.ok], 0.0 if figure.margin is None else figure.margin
+def _severity_key(result: PlaceResult) -> tuple[int, float]:
+    return _WORST_FIRST[result.ok], 0.0 if result.margin is None else result.margin
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
@@ -110,22 +112,24 @@ def match_items(old_items: Sequence[tuple[float, ...]], new_items: Sequence[tupl
     new_position: dict[int, int] = {}
     # NaN is unequal to itself; replace it by None, so that equal items compare equal.
     old_keys, new_keys = (
-        [tuple(None if v != v else v for v in item) for item in mission_items]
+        [tuple(None if value != value else value for value in item) for item in mission_items]
         for mission_items in (old_items, new_items)
     )
-    for kind, a, a_end, b, b_end in SequenceMatcher(a=old_keys, b=new_keys, autojunk=False).get_opcodes():
-        if kind == "equal" or (kind == "replace" and a_end - a == b_end - b):
-            new_position.update(zip(range(a, a_end), range(b, b_end), strict=True))
+    for kind, old_start, old_end, new_start, new_end in SequenceMatcher(
+        a=old_keys, b=new_keys, autojunk=False
+    ).get_opcodes():
+        if kind == "equal" or (kind == "replace" and old_end - old_start == new_end - new_start):
+            new_position.update(zip(range(old_start, old_end), range(new_start, new_end), strict=True))
     return new_position
 
 
-def describe_changes(previous: Figures | None, current: Figures) -> list[str]:
+def describe_changes(previous: FlightResults | None, current: FlightResults) -> list[str]:
     """Return a line for each change since the previous flight; no lines for the first flight.
 
     >>> leg = ("clearance", ("leg", 0, 1))
     >>> items = ((16.0, 46.0, 8.0, 100.0), (16.0, 46.0, 8.1, 100.0))
-    >>> low = Figures(items, {leg: Figure(False, 22.0, -38.0, "m", "leg 1\u20132")}, 500.0)
-    >>> high = Figures(items, {leg: Figure(True, 61.0, 1.0, "m", "leg 1\u20132")}, 512.0)
+    >>> low = FlightResults(items, {leg: PlaceResult(False, 22.0, -38.0, "m", "leg 1\u20132")}, 500.0)
+    >>> high = FlightResults(items, {leg: PlaceResult(True, 61.0, 1.0, "m", "leg 1\u20132")}, 512.0)
     >>> describe_changes(low, high)
     ['leg 1\u20132: clearance 22 m \u2192 61 m, now passes', '12 s longer']
     >>> describe_changes(high, high), describe_changes(None, high)
@@ -146,79 +150,82 @@ def describe_changes(previous: Figures | None, current: Figures) -> list[str]:
 
 
 # Kinds of places that are identified by items.
-_OF_ITEMS = ("leg", "waypoint", "mission")
+_ITEM_PLACE_KINDS = ("leg", "waypoint", "mission")
 # Kind of a place whose item was removed.
-_GONE_PLACE = "gone"
+_REMOVED_PLACE = "gone"
 # Position of a removed item.
-_GONE = -1
+_REMOVED_POSITION = -1
 
 
-def _renumber(previous: Figures, current: Figures) -> _Results:
+def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
     """Return the previous results keyed by their current places; each result at a removed item gets a unique place."""
     new_positions, renumbered = match_items(previous.items, current.items), {}
-    for number, ((rule, (kind, first, last)), figure) in enumerate(previous.results.items()):
-        if kind in _OF_ITEMS and first is not None and last is not None:
-            first, last = new_positions.get(first, _GONE), new_positions.get(last, _GONE)
-            if _GONE in (first, last):
-                kind, first, last = _GONE_PLACE, number, _GONE
-        renumbered[rule, (kind, first, last)] = figure
+    for number, ((rule, (kind, first, last)), result) in enumerate(previous.results.items()):
+        if kind in _ITEM_PLACE_KINDS and first is not None and last is not None:
+            first, last = new_positions.get(first, _REMOVED_POSITION), new_positions.get(last, _REMOVED_POSITION)
+            if _REMOVED_POSITION in (first, last):
+                kind, first, last = _REMOVED_PLACE, number, _REMOVED_POSITION
+        renumbered[rule, (kind, first, last)] = result
     return renumbered
 
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
     """Describe each change of a place's state, with both values; places that became worse come first."""
     worse, better = [], []
-    for (rule, key), figure in new_results.items():
-        old_figure = old_results.get((rule, key))
-        had_failed = old_figure is not None and old_figure.ok is False
-        if figure.ok is False and not had_failed:
-            worse.append(_change_text(rule, figure, old_figure, "fails now"))
-        elif figure.ok is not False and had_failed:
-            better.append(_change_text(rule, figure, old_figure, "now passes" if figure.ok else "is not judged now"))
+    for (rule, key), result in new_results.items():
+        old_result = old_results.get((rule, key))
+        had_failed = old_result is not None and old_result.ok is False
+        if result.ok is False and not had_failed:
+            worse.append(_change_text(rule, result, old_result, "fails now"))
+        elif result.ok is not False and had_failed:
+            better.append(_change_text(rule, result, old_result, "now passes" if result.ok else "is not judged now"))
     current_keys = {key for _, key in new_results}
-    for (rule, key), old_figure in old_results.items():
-        if old_figure.ok is False and (rule, key) not in new_results:
-            was_removed = key not in current_keys and key[0] in (*_OF_ITEMS, _GONE_PLACE)
+    for (rule, key), old_result in old_results.items():
+        if old_result.ok is False and (rule, key) not in new_results:
+            was_removed = key not in current_keys and key[0] in (*_ITEM_PLACE_KINDS, _REMOVED_PLACE)
             better.append(
-                f"the former {_change_text(rule, old_figure, None, 'is gone')}"
+                f"the former {_change_text(rule, old_result, None, 'is gone')}"
                 if was_removed
-                else _change_text(rule, old_figure, None, "now passes")
+                else _change_text(rule, old_result, None, "now passes")
             )
     return worse + better
 
 
-def _change_text(rule: str, figure: Figure, old_figure: Figure | None, state_text: str) -> str:
+def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None, state_text: str) -> str:
     values = dict.fromkeys(
-        value_figure.text for value_figure in (old_figure, figure) if value_figure is not None and value_figure.text
+        shown_result.text for shown_result in (old_result, result) if shown_result is not None and shown_result.text
     )
     values_text = " \u2192 ".join(values)
-    return f"{figure.place}: {RULE_WORDS[rule].word} {values_text}".rstrip() + f", {state_text}"
+    return f"{result.place}: {RULE_WORDS[rule].word} {values_text}".rstrip() + f", {state_text}"
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
     """Describe the changes of the values of failures, then of the smallest margin of each rule."""
     failures = [
-        (rule, old_results[rule, key], figure)
-        for (rule, key), figure in new_results.items()
-        if figure.ok is False and (rule, key) in old_results
+        (rule, old_results[rule, key], result)
+        for (rule, key), result in new_results.items()
+        if result.ok is False and (rule, key) in old_results
     ]
     failure_lines = [
-        _change_text(rule, figure, old_figure, "still fails")
-        for rule, old_figure, figure in failures
-        if old_figure.text != figure.text
+        _change_text(rule, result, old_result, "still fails")
+        for rule, old_result, result in failures
+        if old_result.text != result.text
     ]
-    old_closest, new_closest = _closest_figures(old_results), _closest_figures(new_results)
+    old_closest, new_closest = _closest_results(old_results), _closest_results(new_results)
     change_lines = []
-    for rule, figure in new_closest.items():
-        old_figure = old_closest.get(rule)
-        if old_figure is None or old_figure.text == figure.text or not old_figure.scale:
+    for rule, result in new_closest.items():
+        old_result = old_closest.get(rule)
+        if old_result is None or old_result.text == result.text or not old_result.scale:
             continue
-        relative_change = abs((figure.margin or 0.0) - (old_figure.margin or 0.0)) / old_figure.scale
-        where = figure.place if old_figure.place == figure.place else f"{old_figure.place}, now {figure.place}"
+        relative_change = abs((result.margin or 0.0) - (old_result.margin or 0.0)) / old_result.scale
+        place_description = (
+            result.place if old_result.place == result.place else f"{old_result.place}, now {result.place}"
+        )
         change_lines.append(
             (
                 relative_change,
-                f"closest to its limit: {RULE_WORDS[rule].word} {old_figure.text} \u2192 {figure.text} ({where})",
+                f"closest to its limit: {RULE_WORDS[rule].word} {old_result.text} \u2192 {result.text}"
+                f" ({place_description})",
             )
         )
     return failure_lines[:_MAX_VALUE_CHANGES] + [
@@ -226,9 +233,9 @@ def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
     ]
 
 
-def _closest_figures(results: _Results) -> dict[str, Figure]:
-    closest: dict[str, Figure] = {}
-    for (rule, _), figure in results.items():
-        if figure.margin is not None and (rule not in closest or figure.margin < (closest[rule].margin or 0.0)):
-            closest[rule] = figure
+def _closest_results(results: _Results) -> dict[str, PlaceResult]:
+    closest: dict[str, PlaceResult] = {}
+    for (rule, _), result in results.items():
+        if result.margin is not None and (rule not in closest or result.margin < (closest[rule].margin or 0.0)):
+            closest[rule] = result
     return closest

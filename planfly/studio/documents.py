@@ -91,7 +91,10 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
     Raises PlanflyError.
     """
     suffix = Path(name).suffix.lower()
-    shown_name = "".join(ch if ch.isprintable() and ch not in "/\\" else "_" for ch in name)[-60:] or "dropped"
+    shown_name = (
+        "".join(character if character.isprintable() and character not in "/\\" else "_" for character in name)[-60:]
+        or "dropped"
+    )
     if suffix not in DROPPED:
         raise MissionError.at(shown_name, "suffix", suffix, f"allowed {', '.join(DROPPED)}", shown=repr(suffix))
     if suffix == ".json":
@@ -201,7 +204,7 @@ def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
 
 
 @dataclass(frozen=True, slots=True)
-class Saved:
+class SavedFile:
     """Name and bytes of a saved file, and one line for each content that the format cannot store."""
 
     name: str
@@ -209,7 +212,7 @@ class Saved:
     losses: tuple[str, ...] = ()
 
 
-def save_document(document: Document, context: EditContext, judged: JudgedMission, kind: str) -> Saved:
+def save_document(document: Document, context: EditContext, judged: JudgedMission, kind: str) -> SavedFile:
     """Return the edited mission as a file of one of `SAVED`.  Raises PlanflyError if the format cannot store it.
 
     An unchanged mission in its original format is saved as the original bytes.
@@ -220,18 +223,18 @@ def save_document(document: Document, context: EditContext, judged: JudgedMissio
     opened_scenario = document.setup.scenario
     has_same_world = kind != "plan.json" or context.scenario is opened_scenario
     if kind == document.kind and mission is document.setup.mission and has_same_world:
-        return Saved(name, document.data, _lost_settings(opened_scenario, context))
+        return SavedFile(name, document.data, _lost_settings(opened_scenario, context))
     if kind == "plan.json":
         return _saved_plan(name, context, judged)
     if kind == "kml":
         text = kml_text(context.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
-        return Saved(
+        return SavedFile(
             name, _to_bytes(text), ("only a map: it does not contain the commands, speeds and frames of the items",)
         )
     mission = replace(mission, autopilot=judged.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
     losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(opened_scenario, context))
-    return Saved(name, text.encode(), losses)
+    return SavedFile(name, text.encode(), losses)
 
 
 def _to_bytes(text: str | bytes) -> bytes:
@@ -280,20 +283,20 @@ def _lost_parameters(context: EditContext) -> tuple[str, ...]:
     return (f"{count} parameter{('s' if count != 1 else '')} set here: a .parm contains them",) if count else ()
 
 
-def _saved_parameters(name: str, context: EditContext) -> Saved:
+def _saved_parameters(name: str, context: EditContext) -> SavedFile:
     """Return a file of the parameters set in the studio.  Raises PlanflyError if no parameter was set."""
     if not context.parameters.values:
         raise PlanflyError("no parameter was set here: Settings sets them", field="form")
-    return Saved(
+    return SavedFile(
         name, context.parameters.text(f"set in planfly studio for {context.airframe.autopilot.title}").encode()
     )
 
 
-def _saved_plan(name: str, context: EditContext, judged: JudgedMission) -> Saved:
+def _saved_plan(name: str, context: EditContext, judged: JudgedMission) -> SavedFile:
     """Return the mission as a plan of its scenario, with the current certificate of its path."""
     plan = judged.setup.plan
     if plan is not None:
-        return Saved(name, plan_json(plan).encode())
+        return SavedFile(name, plan_json(plan).encode())
     new_plan = make_certified_plan(context, judged)
     has_changed_items = not context.planned or planned_mission(new_plan, context.airframe).items != judged.mission.items
     losses = (
@@ -301,20 +304,21 @@ def _saved_plan(name: str, context: EditContext, judged: JudgedMission) -> Saved
     )
     if not new_plan.feasible:
         problem = (new_plan.certificate.problems or ("violations are counted",))[0]
-        losses.append(f"it is a plan that is not feasible: {problem}")
-    return Saved(name, plan_json(new_plan).encode(), (*losses, *_lost_parameters(context)))
+        losses.append(f"the plan is not feasible: {problem}")
+    return SavedFile(name, plan_json(new_plan).encode(), (*losses, *_lost_parameters(context)))
 
 
 def _check_plain_waypoints(mission: Mission) -> None:
     """Raise MissionError for items that a plan cannot store: take-off, landing and speed changes en route."""
     first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
     for index, item in enumerate(mission.items):
-        lost = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
+        lost_content = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
         if item.command == Command.DO_CHANGE_SPEED and index > first:
-            lost = "a change of speed along its path"
-        if lost:
+            lost_content = "a change of speed along its path"
+        if lost_content:
             reason = (
-                f"a plan.json of edited waypoints cannot contain {lost} (item {item.seq}): save a .plan, or plan again"
+                f"a plan.json of edited waypoints cannot contain {lost_content} (item {item.seq}):"
+                " save a .plan, or plan again"
             )
             raise MissionError(f"{mission.source}: {reason}", file=mission.source, field=f"item {item.seq}")
 

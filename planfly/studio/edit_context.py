@@ -35,7 +35,7 @@ class EditContext(MissionContext):
     parameters: SetParameters = _DEFAULT_PARAMETERS
 
     @classmethod
-    def of(
+    def from_setup(
         cls, setup: FlightSetup, terrain: str | Path | None = None, fences: NamedFences = _NO_FENCES
     ) -> "EditContext":
         """Make the editing context of an opened mission or plan."""

@@ -74,9 +74,9 @@ def judge_windows(
     for first, last in spans:
         start, end = _extend_span(route, first, last)
         part = part_of_route(route, start, end)
-        at_end = end == route.legs
-        if start or not at_end:
-            part, added_count = _add_extreme_legs(context, route, part, before_part=at_end)
+        reaches_route_end = end == route.legs
+        if start or not reaches_route_end:
+            part, added_count = _add_extreme_legs(context, route, part, before_part=reaches_route_end)
             start -= added_count
         windows.append(_judge_window(context.part_setup(mission, part), first, last, start))
     return route, tuple(windows)
@@ -114,13 +114,15 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
     # The first appended leg keeps the airspeed at the end of the part.  Each further leg has the airspeed for the pair
     # of altitudes at its ends.
     added_airspeeds = np.concatenate([part.airspeed[end : end + 1 or None], leg_airspeeds])
-    order = slice(None, None, -1) if before_part else slice(None)
+    element_order = slice(None, None, -1) if before_part else slice(None)
 
     def join(part_values: np.ndarray, added_values: np.ndarray) -> np.ndarray:
-        return np.concatenate([added_values[order], part_values] if before_part else [part_values, added_values])
+        return np.concatenate(
+            [added_values[element_order], part_values] if before_part else [part_values, added_values]
+        )
 
     stops = part.stops.max() + 1 + np.arange(count)
-    extended = replace(
+    extended_part = replace(
         part,
         waypoints=join(part.waypoints, points),
         airspeed=join(part.airspeed, added_airspeeds),
@@ -131,7 +133,7 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
         above_ground=join(part.above_ground, np.full(count, np.nan)),
         stops=np.concatenate([np.arange(count), part.stops + count]) if before_part else join(part.stops, stops),
     )
-    return extended, count if before_part else 0
+    return extended_part, count if before_part else 0
 
 
 def _speed_factor(context: EditContext, altitude: float) -> float:

@@ -9,7 +9,7 @@ from typing import Any
 from aircraft.catalog import aircraft_names
 from planfly.arguments import CHOICES
 from planfly.studio import messages
-from planfly.studio.changes import Figures, describe_changes
+from planfly.studio.changes import FlightResults, describe_changes
 from planfly.studio.pilot import Answer, Work, WorkerProcess
 from planfly.studio.session import Session
 from planfly.studio.view_model import Json, round_to_json
@@ -31,20 +31,20 @@ class _ActiveWork:
     """Work in progress.
 
     rev: revision of the mission for which the work is done.
-    reported: time of the last progress report, s.
-    share: largest reported fraction of the work, 0 to 1.
+    report_time: time of the last progress report, s.
+    fraction: largest reported fraction of the work, 0 to 1.
     """
 
     number: int
     name: str
     rev: int
-    reported: float = 0.0
-    share: float = 0.0
+    report_time: float = 0.0
+    fraction: float = 0.0
 
     @property
     def message(self) -> Json:
         """Progress message to the pages; its number distinguishes the work from earlier work of the same name."""
-        return {"kind": "working", "job": self.name, "number": self.number, "rev": self.rev, "share": self.share}
+        return {"kind": "working", "job": self.name, "number": self.number, "rev": self.rev, "share": self.fraction}
 
 
 @dataclass
@@ -63,7 +63,7 @@ class Jobs:
     _replaced: dict[int, str] = field(default_factory=dict)
     _number: int = 0
     _flight_message: Json | None = None
-    _last_figures: Figures | None = None
+    _last_results: FlightResults | None = None
     _other_messages: list[Json] = field(default_factory=list)
     _uses_first_path: bool = False
 
@@ -111,7 +111,7 @@ class Jobs:
     def drop_results(self) -> None:
         """Cancel all work and drop all results, because another mission was opened."""
         self.stop()
-        self._flight_message = self._last_figures = None
+        self._flight_message = self._last_results = None
         self._other_messages = []
 
     # ------------------------------------------------------------------
@@ -196,12 +196,12 @@ class Jobs:
             return [] if replaced_name is None else [self._stopped_message(replaced_name)]
         if answer.kind == "progress":
             now = time.monotonic()
-            if now - work.reported < _REPORT_INTERVAL_S:
+            if now - work.report_time < _REPORT_INTERVAL_S:
                 return []
-            work.reported = now
+            work.report_time = now
             done, total, remark = answer.value
             # A search that begins another stage counts from zero again.
-            work.share = max(work.share, round(min(1.0, done / total), 3) if total > 0.0 else 0.0)
+            work.fraction = max(work.fraction, round(min(1.0, done / total), 3) if total > 0.0 else 0.0)
             return [work.message | {"text": remark}]
         del self._active[worker]
         if answer.kind == "cancelled":
@@ -221,7 +221,7 @@ class Jobs:
 
     def _result_message(self, work: _ActiveWork, value: Any, session: Session) -> Json:
         if work.name == "fly":
-            previous_figures, self._last_figures = self._last_figures, value.pop("figures")
+            previous_results, self._last_results = self._last_results, value.pop("figures")
             judged_mission = value.pop("judged")
             if judged_mission and work.rev == session.rev:
                 self._send_work(
@@ -235,7 +235,7 @@ class Jobs:
                 "kind": "flown",
                 "rev": work.rev,
                 **value,
-                "changes": describe_changes(previous_figures, self._last_figures),
+                "changes": describe_changes(previous_results, self._last_results),
             }
             return self._flight_message
         if work.name == "trials":
@@ -267,9 +267,10 @@ def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
         "least energy": [plan.energy for plan in plans],
     }
     # Quantities that are equal for all paths, or unknown, do not help to choose.
-    differing = {name: values for name, values in quantities.items() if max(values) > min(values)}
+    differing_quantities = {name: values for name, values in quantities.items() if max(values) > min(values)}
     return [
-        _path_json(plan) | {"best": [name for name, values in differing.items() if values[index] == min(values)]}
+        _path_json(plan)
+        | {"best": [name for name, values in differing_quantities.items() if values[index] == min(values)]}
         for index, plan in enumerate(plans)
     ]
 

@@ -215,19 +215,19 @@ class WorkerProcess:
         if self._pipe is not None and self._process is not None and self._process.is_alive():
             return self._pipe
         context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
+        server_end, worker_end = context.Pipe()
         # Not a daemon: a campaign starts child processes.
-        process = context.Process(target=run_worker, args=(theirs,), name=self._name)
+        process = context.Process(target=run_worker, args=(worker_end,), name=self._name)
         try:
             process.start()
         except OSError:
-            ours.close()
+            server_end.close()
             raise
         finally:
-            theirs.close()
-        self._process, self._pipe = process, ours
-        threading.Thread(target=self._forward_answers, args=(ours,), name=self._name, daemon=True).start()
-        return ours
+            worker_end.close()
+        self._process, self._pipe = process, server_end
+        threading.Thread(target=self._forward_answers, args=(server_end,), name=self._name, daemon=True).start()
+        return server_end
 
     def _forward_answers(self, pipe: Connection) -> None:
         """Forward answers until the pipe closes; if the process ends without an answer, report a fault of its task."""

@@ -37,7 +37,7 @@ from planfly.studio.view_model import Json
 from world.errors import MissionError, PlanflyError
 from world.files import read_small_file, utf8_text
 
-Given = TypeVar("Given")
+Result = TypeVar("Result")
 
 # Maximum number of pages.
 MAX_PAGES = 4
@@ -67,17 +67,17 @@ NOT_UNDERSTOOD = 1007
 class Page:
     """Page that has sent its token.
 
-    seen: hash of the terrain that was sent last, and whether that page was dark.
-    full: set when the queue of frames has overflowed.
+    sent_ground: hash of the terrain that was sent last, and whether that page was dark.
+    has_overflowed: set when the queue of frames has overflowed.
     """
 
     socket: WebSocket
     dark: bool
     frames: asyncio.Queue[str | bytes] = field(default_factory=lambda: asyncio.Queue(_MAX_WAITING_FRAMES))
     drag: messages.Drag | None = None
-    dragged: asyncio.Event = field(default_factory=asyncio.Event)
-    seen: tuple[int, bool] = (0, False)
-    full: asyncio.Event = field(default_factory=asyncio.Event)
+    drag_received: asyncio.Event = field(default_factory=asyncio.Event)
+    sent_ground: tuple[int, bool] = (0, False)
+    has_overflowed: asyncio.Event = field(default_factory=asyncio.Event)
 
     def send(self, message: Json | bytes) -> None:
         """Queue a message for the page; a page whose queue is full is closed."""
@@ -86,7 +86,7 @@ class Page:
             self.frames.put_nowait(frame)
         except asyncio.QueueFull:
             # A page that has missed a frame shows a wrong state and has to reconnect.
-            self.full.set()
+            self.has_overflowed.set()
 
 
 class Server:
@@ -103,7 +103,7 @@ class Server:
         self._ground_frames: dict[tuple[int, bool], tuple[bytes, ...]] = {}
         self.jobs = Jobs(self._forward_answer, self._pack_work)
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._take_task: asyncio.Future[None] | None = None
+        self._initial_plan_task: asyncio.Future[None] | None = None
         self._autosave_error = ""
         self.first_page_served = threading.Event()
 
@@ -125,7 +125,7 @@ class Server:
                 await self._run_judging(lambda: self.session.autosave(self._autosave_file or Path()))
             except (OSError, PlanflyError) as error:
                 if not self._autosave_error:
-                    self._broadcast({"kind": "fault", "job": "keep", "text": f"edits are not being kept: {error}"})
+                    self._broadcast({"kind": "fault", "job": "keep", "text": f"edits are not being saved: {error}"})
                 self._autosave_error = str(error)
             else:
                 self._autosave_error = ""
@@ -137,7 +137,7 @@ class Server:
         self._judge_thread.shutdown(wait=False, cancel_futures=True)
         self._draw_thread.shutdown(wait=False, cancel_futures=True)
 
-    async def _run_judging(self, function: Callable[[], Given]) -> Given:
+    async def _run_judging(self, function: Callable[[], Result]) -> Result:
         return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
     def _pack_work(self, work: Work | None) -> bytes:
@@ -156,13 +156,13 @@ class Server:
         self._pages.add(page)
         self.first_page_served.set()
         tasks = [asyncio.create_task(self._write_frames(page)), asyncio.create_task(self._judge_drags(page))]
-        messages_task, full_task = (
+        messages_task, overflow_task = (
             asyncio.create_task(self._handle_messages(page)),
-            asyncio.create_task(page.full.wait()),
+            asyncio.create_task(page.has_overflowed.wait()),
         )
         try:
-            await asyncio.wait((messages_task, full_task), return_when=asyncio.FIRST_COMPLETED)
-            if full_task.done():
+            await asyncio.wait((messages_task, overflow_task), return_when=asyncio.FIRST_COMPLETED)
+            if overflow_task.done():
                 with contextlib.suppress(RuntimeError, WebSocketDisconnect, asyncio.TimeoutError):
                     await asyncio.wait_for(socket.close(TOO_SLOW), TOKEN_TIMEOUT_S)
             else:
@@ -174,12 +174,12 @@ class Server:
                 await socket.close(NOT_UNDERSTOOD)
         finally:
             self._pages.discard(page)
-            for task in (*tasks, messages_task, full_task):
+            for task in (*tasks, messages_task, overflow_task):
                 task.cancel()
-            await asyncio.gather(*tasks, messages_task, full_task, return_exceptions=True)
+            await asyncio.gather(*tasks, messages_task, overflow_task, return_exceptions=True)
 
     async def _handle_messages(self, page: Page) -> None:
-        await self._show_all(page)
+        await self._send_initial_messages(page)
         while True:
             await self._handle_message(page, await _receive_text(page.socket))
             await asyncio.sleep(MESSAGE_PAUSE_S)
@@ -218,8 +218,8 @@ class Server:
     async def _judge_drags(self, page: Page) -> None:
         """Judge the newest position of a drag, one at a time."""
         while True:
-            await page.dragged.wait()
-            page.dragged.clear()
+            await page.drag_received.wait()
+            page.drag_received.clear()
             drag, page.drag = page.drag, None
             if drag is None:
                 continue
@@ -237,24 +237,24 @@ class Server:
             # Let the answer be sent before the next position is judged, which keeps the interpreter busy.
             await asyncio.sleep(_SEND_PAUSE_S)
 
-    async def _show_all(self, page: Page) -> None:
+    async def _send_initial_messages(self, page: Page) -> None:
         page.send({"kind": "choices", **self.jobs.choices(), **folder_message(self._folder)})
         page.send(self.session.world_message())
         for message in (*self.jobs.progress_messages(), self._sheet_message(), *self.jobs.result_messages()):
             page.send(message)
-        await self._show_ground(page)
+        await self._send_ground(page)
 
     def _sheet_message(self) -> Json:
         """Return the mission as page data; "planning" is true for a placeholder until its path is found."""
         return {**self.session.sheet(), "planning": self.jobs.is_planning_first_path(self.session)}
 
-    async def _show_ground(self, page: Page) -> None:
+    async def _send_ground(self, page: Page) -> None:
         """Send the terrain of the current world to a page, once for each world and each color scheme."""
         terrain, world_message = self.session.context.scenario.terrain, self.session.world_message()
         key = (hash(json.dumps(world_message["shown"])), page.dark)
-        if terrain is None or page.seen == key:
+        if terrain is None or page.sent_ground == key:
             return
-        page.seen = key
+        page.sent_ground = key
         east, north = world_message["shown"]
         if key not in self._ground_frames:
             self._ground_frames.clear()
@@ -285,11 +285,11 @@ class Server:
             return
         if isinstance(message, messages.Drag):
             page.drag = message
-            page.dragged.set()
+            page.drag_received.set()
             return
         if isinstance(message, messages.Look):
             page.dark = message.dark
-            await self._show_ground(page)
+            await self._send_ground(page)
             return
         try:
             await self._dispatch(page, message)
@@ -340,7 +340,7 @@ class Server:
         self.jobs.fly(session)
         if session.world_rev != world_rev:
             for page in list(self._pages):
-                await self._show_ground(page)
+                await self._send_ground(page)
 
     def _apply_change(self, message: messages.Message) -> None:
         session = self.session
@@ -375,7 +375,7 @@ class Server:
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
-            raise MissionError(f"{message.name[:60]}: it did not arrive completely", field="data") from error
+            raise MissionError(f"{message.name[:60]}: the file did not arrive completely", field="data") from error
         return open_dropped(message.name, data, self.session.options)
 
     def _read_parameter_file(self, name: str) -> messages.Settings:
@@ -399,7 +399,7 @@ class Server:
             self._broadcast(message)
         if self.jobs.take_initial_plan(self.session):
             choice = messages.Choose(kind="choose", rev=self.session.rev, which=0)
-            self._take_task = asyncio.ensure_future(self._take_initial_plan(choice))
+            self._initial_plan_task = asyncio.ensure_future(self._take_initial_plan(choice))
 
     async def _take_initial_plan(self, message: messages.Choose) -> None:
         """Use the path that was planned at the start of the studio, unless the mission was edited in the meantime."""

@@ -15,7 +15,7 @@ from flight.mission.items import LANDINGS, Mission
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
-from planfly.studio.documents import Document, Saved, open_document, planned_mission, save_document
+from planfly.studio.documents import Document, SavedFile, open_document, planned_mission, save_document
 from planfly.studio.edit_context import EditContext
 from planfly.studio.history import History
 from planfly.studio.incremental_verdict import judge_windows
@@ -81,9 +81,11 @@ class Session:
     undone_states: list[_OpenedState] = field(default_factory=list)
 
     @classmethod
-    def of(cls, document: Document, options: MissionOptions) -> "Session":
+    def from_document(cls, document: Document, options: MissionOptions) -> "Session":
         """Make a session of an opened document."""
-        context = EditContext.of(document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ()))
+        context = EditContext.from_setup(
+            document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ())
+        )
         judged = context.judge(document.setup.mission)
         history = History(document.setup.mission)
         named_path = None if document.path is None else document.path.resolve()
@@ -92,7 +94,7 @@ class Session:
     def open(self, document: Document) -> None:
         """Open another document; an undo before its first edit restores the previous document."""
         is_named_file = document.path is not None and document.path.resolve() == self.named_file
-        new_session = Session.of(document if is_named_file else replace(document, path=None), self.options)
+        new_session = Session.from_document(document if is_named_file else replace(document, path=None), self.options)
         self.earlier_states, self.undone_states = (
             [*self.earlier_states, self._opened_state()][-_MAX_EARLIER_DOCUMENTS:],
             [],
@@ -169,9 +171,9 @@ class Session:
             self.earlier_states, self.undone_states = [*self.earlier_states, current_state], self.undone_states[:-1]
             return
         previous_position = self.history.position
-        done = self.history.undo() if kind == "undo" else self.history.redo()
+        has_moved = self.history.undo() if kind == "undo" else self.history.redo()
         try:
-            if done:
+            if has_moved:
                 self._judge_and_set(self.mission)
         except Exception:
             self.history.position = previous_position
@@ -191,14 +193,14 @@ class Session:
         """Replace the whole mission, or the items between two items, by a planned path.  Raises StaleEdit."""
         if message.rev != self.rev:
             raise StaleEdit
-        plans, between = self.plans
+        plans, item_range = self.plans
         if not 0 <= message.which < len(plans):
             raise PlanflyError("that path no longer exists: plan again", field="which")
         plan = plans[message.which]
-        if between is None:
+        if item_range is None:
             self._show_plan(plan)
             return
-        mission = self._replace_part(plan, *between)
+        mission = self._replace_part(plan, *item_range)
         self._judge_and_set(mission)
         self._add_to_history(mission, "plan a part")
 
@@ -395,14 +397,14 @@ class Session:
             "settings": self.settings_json(),
         }
 
-    def save(self, form: str) -> Saved:
+    def save(self, form: str) -> SavedFile:
         """Return the mission as a file.  Raises PlanflyError if the format cannot store it."""
         saved = save_document(self.document, self.context, self.judged, form)
         if form != "kml":
             self.saved_mission = self.mission
         return saved
 
-    def save_over(self) -> Saved:
+    def save_over(self) -> SavedFile:
         """Overwrite the file that the command named.  Raises PlanflyError if there is none."""
         path = self.document.path
         if path is None or not self.document.kind:
@@ -457,11 +459,11 @@ class Session:
             self.unreadable.append(file)
             return False
         if autosave[0] is not self.history.first:
-            self._add_to_history(autosave[0], "what was done before the studio ended")
+            self._add_to_history(autosave[0], "the edits of the previous session")
         return True
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:
     """Open a target of the command; also return True if an autosave was restored.  Raises PlanflyError."""
-    session = Session.of(open_document(target, options), options)
+    session = Session.from_document(open_document(target, options), options)
     return session, autosave_file is not None and session.restore(autosave_file)

@@ -270,7 +270,7 @@ def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
                 "name": layer.name,
                 "x": round_to_json(layer.x),
                 "top": round_to_json(layer.y),
-                "low": round_to_json(layer.low),
+                "low": round_to_json(layer.lower_edge),
             }
             for layer in threat_cuts(scenario.threats, view, frozenset())[0]
         ]

@@ -19,7 +19,7 @@ from flight.simulation.track import Track
 from logs.verdict.judge_geometry import with_passing_suggestions
 from logs.views.failures import track_distance
 from planfly.planning.pareto_plans import make_pareto_plans
-from planfly.studio.changes import flight_figures
+from planfly.studio.changes import flight_results
 from planfly.studio.edit_context import EditContext
 from planfly.studio.pilot import Advance
 from planfly.studio.states import place_states
@@ -65,7 +65,7 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
         "ended": flight.ended,
         "autopilot": setup.autopilot.title,
         "seconds": seconds,
-        "figures": flight_figures(mission, setup.route, flight.verdict.findings, seconds),
+        "figures": flight_results(mission, setup.route, flight.verdict.findings, seconds),
         **_track_json(setup.route.waypoints, flight.track, flight.verdict.leg_ends),
     }
 

@@ -14,10 +14,10 @@ from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_camera, is_plac
 # Convert command line texts to values within the ranges of the API's keywords.
 
 
-def number(keyword: str) -> Callable[[str], Any]:
+def number_parser(keyword: str) -> Callable[[str], Any]:
     """Return a function that parses a number in the range of a keyword of the API.
 
-    >>> number("seed")("3"), number("max_hours")("1.5")
+    >>> number_parser("seed")("3"), number_parser("max_hours")("1.5")
     (3, 1.5)
     """
     allowed_range = RANGES[keyword]
@@ -36,7 +36,7 @@ def number(keyword: str) -> Callable[[str], Any]:
     return parse
 
 
-def wind(text: str) -> tuple[float, float]:
+def parse_wind(text: str) -> tuple[float, float]:
     """Parse SPEED,FROM, the speed of a steady wind, m/s, and the direction it blows from, degrees."""
     try:
         speed, from_deg = (float(part) for part in text.split(","))
@@ -49,15 +49,15 @@ def wind(text: str) -> tuple[float, float]:
     return speed, from_deg
 
 
-def camera(text: str) -> tuple[float, ...]:
+def parse_camera(text: str) -> tuple[float, ...]:
     """Parse WxH,FOCAL or WxH,FOCAL,FRONT,SIDE, with sensor size and focal length in mm, and overlaps in percent.
 
-    >>> camera("23.5x15.6,16")
+    >>> parse_camera("23.5x15.6,16")
     (23.5, 15.6, 16.0)
     """
-    sensor, *others = text.split(",")
+    sensor, *other_parts = text.split(",")
     try:
-        numbers = tuple(float(part) for part in (*sensor.lower().split("x"), *others))
+        numbers = tuple(float(part) for part in (*sensor.lower().split("x"), *other_parts))
     except ValueError:
         numbers = ()
     if not is_camera(numbers) or sensor.lower().count("x") != 1:
@@ -65,7 +65,7 @@ def camera(text: str) -> tuple[float, ...]:
     return numbers
 
 
-def place(text: str) -> tuple[float, float]:
+def parse_position(text: str) -> tuple[float, float]:
     """Parse LAT,LON of a position, degrees."""
     try:
         lat, lon = (float(part) for part in text.split(","))
@@ -78,7 +78,7 @@ def place(text: str) -> tuple[float, float]:
     return lat, lon
 
 
-def area(text: str) -> tuple[float, ...]:
+def parse_area(text: str) -> tuple[float, ...]:
     """Parse S,W,N,E, the edges of an area, degrees; the API checks the order of the edges."""
     try:
         edges = tuple(float(part) for part in text.split(","))
@@ -89,7 +89,7 @@ def area(text: str) -> tuple[float, ...]:
     return edges
 
 
-def autopilots(text: str) -> list[str]:
+def parse_autopilots(text: str) -> list[str]:
     """Parse names of autopilots separated by commas."""
     names = [name.strip() for name in text.split(",")]
     for name in names:
@@ -98,26 +98,26 @@ def autopilots(text: str) -> list[str]:
     return names
 
 
-def time_or_stations(text: str) -> float | str:
+def parse_time_or_stations(text: str) -> float | str:
     """Parse a time of the flight, s; return a text with a colon, the addresses of ground stations, unchanged."""
     if ":" in text:
         return text
-    return number("end")(text)
+    return number_parser("end")(text)
 
 
-def budget(text: str) -> tuple[int | None, float | None]:
+def parse_budget(text: str) -> tuple[int | None, float | None]:
     """Parse a number of evaluations, or a number of seconds if the text ends in s; return (evaluations, seconds)."""
     try:
         if text.endswith("s"):
-            return None, number("seconds")(text[:-1])
-        return number("budget")(text), None
+            return None, number_parser("seconds")(text[:-1])
+        return number_parser("budget")(text), None
     except argparse.ArgumentTypeError:
         raise argparse.ArgumentTypeError(
             f"{text!r}: expected a number of evaluations (4..10^10), or of seconds such as 2.5s (up to 1,000,000s)"
         ) from None
 
 
-def threat(text: str) -> tuple[float, float, float, float]:
+def parse_threat(text: str) -> tuple[float, float, float, float]:
     """Parse EAST,NORTH,KILL,DETECTION, position and radii of a pop-up threat, m."""
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
@@ -130,7 +130,7 @@ def threat(text: str) -> tuple[float, float, float, float]:
     return east, north, kill, detection
 
 
-def problems(text: str) -> tuple[int, ...]:
+def parse_problems(text: str) -> tuple[int, ...]:
     """Parse numbers of threats separated by commas; only the four numbers of the paper are allowed."""
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
@@ -163,7 +163,7 @@ def with_completer(action: argparse.Action, completer: Completer) -> argparse.Ac
     return action
 
 
-def files(*suffixes: str) -> Completer:
+def file_completer(*suffixes: str) -> Completer:
     """Return a completer for files with these suffixes, and for folders."""
 
     def propose(prefix: str, **_context: object) -> Iterable[str]:
@@ -181,7 +181,7 @@ def complete_scenario(prefix: str, **_context: object) -> list[str]:
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
     """
     names = sorted(file.stem for file in (_ROOT / "world" / "scenarios").glob("*.toml"))
-    return [*(name for name in names if name.startswith(prefix)), *files("toml")(prefix)]
+    return [*(name for name in names if name.startswith(prefix)), *file_completer("toml")(prefix)]
 
 
 def complete_aircraft(prefix: str, **_context: object) -> list[str]:
@@ -191,12 +191,12 @@ def complete_aircraft(prefix: str, **_context: object) -> list[str]:
     ['aerosonde']
     """
     names = sorted(file.stem for file in (_ROOT / "aircraft").glob("*/*.toml") if file.stem == file.parent.name)
-    return [*(name for name in names if name.startswith(prefix)), *files("no-suffix")(prefix)]
+    return [*(name for name in names if name.startswith(prefix)), *file_completer("no-suffix")(prefix)]
 
 
 def complete_mission_or_scenario(prefix: str, **context: object) -> list[str]:
     """Return the scenarios, plans and missions that start with `prefix`."""
-    return [*complete_scenario(prefix, **context), *files(*MISSION_SUFFIXES)(prefix)]
+    return [*complete_scenario(prefix, **context), *file_completer(*MISSION_SUFFIXES)(prefix)]
 
 
 def complete_for_shell(parser: argparse.ArgumentParser) -> None:

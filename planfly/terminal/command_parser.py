@@ -178,22 +178,28 @@ class LineParser(CommandParser):
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
         """Parse the command line.  For bad usage, print one line with a suggestion and raise SystemExit."""
-        words = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
-        if words and not words[0].startswith("-") and words[0] not in self.commands:
-            hint = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
-            self.error(f"{words[0]!r}: no such command{hint}")
-        parsed, unknown_words = self.parse_known_args(words, namespace)
-        if unknown_words:
+        arguments = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
+        if arguments and not arguments[0].startswith("-") and arguments[0] not in self.commands:
+            hint = did_you_mean(arguments[0], self.commands) or f"; there are {', '.join(self.commands)}"
+            self.error(f"{arguments[0]!r}: no such command{hint}")
+        parsed, unknown_arguments = self.parse_known_args(arguments, namespace)
+        if unknown_arguments:
             parser = self.commands[parsed.command]
             # Words after a -- are not options, even if they begin with a dash.
-            words_after_dashes = words[words.index("--") :] if "--" in words else []
+            arguments_after_dashes = arguments[arguments.index("--") :] if "--" in arguments else []
             option = next(
-                (word for word in unknown_words if word.startswith("-") and word not in words_after_dashes), ""
+                (
+                    argument
+                    for argument in unknown_arguments
+                    if argument.startswith("-") and argument not in arguments_after_dashes
+                ),
+                "",
             ).partition("=")[0]
             if option:
                 parser.error(f"{option}: no such option{did_you_mean(option, parser.options())}")
             parser.error(
-                f"{next((word for word in unknown_words if word != '--'), unknown_words[0])}: no such argument"
+                f"{next((argument for argument in unknown_arguments if argument != '--'), unknown_arguments[0])}:"
+                " no such argument"
             )
         return parsed
 
@@ -202,15 +208,15 @@ class LineParser(CommandParser):
 _NEGATIVE_NUMBERS = re.compile(r"-\.?\d[^=]*")
 
 
-def _join_negative_numbers(words: list[str]) -> list[str]:
+def _join_negative_numbers(arguments: list[str]) -> list[str]:
     """Join each negative number of a command line to the option before it, as in --from=-33.9,18.4."""
-    joined_words: list[str] = []
-    for word in words:
-        if _NEGATIVE_NUMBERS.fullmatch(word) and joined_words and _LONG_OPTION.fullmatch(joined_words[-1]):
-            joined_words[-1] += f"={word}"
+    joined_arguments: list[str] = []
+    for argument in arguments:
+        if _NEGATIVE_NUMBERS.fullmatch(argument) and joined_arguments and _LONG_OPTION.fullmatch(joined_arguments[-1]):
+            joined_arguments[-1] += f"={argument}"
         else:
-            joined_words.append(word)
-    return joined_words
+            joined_arguments.append(argument)
+    return joined_arguments
 
 
 # ----------------------------------------------------------------------

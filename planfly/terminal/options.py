@@ -16,9 +16,9 @@ from planfly.terminal.arguments import (
     MISSION_SUFFIXES,
     complete_aircraft,
     complete_scenario,
-    files,
-    number,
-    wind,
+    file_completer,
+    number_parser,
+    parse_wind,
     with_completer,
 )
 from planfly.terminal.command_parser import CommandParser, OptionGroup
@@ -115,7 +115,7 @@ def fence_option(group: OptionGroup) -> None:
         help="also keep within this fence: .fence, .waypoints, .txt or .plan, or zones: .geojson, .json (of ED-269 and "
         "ED-318, too), .kml, .openair, .gpkg; repeatable",
     )
-    with_completer(option, files("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
+    with_completer(option, file_completer("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
 
 
 def time_option(group: OptionGroup) -> None:
@@ -144,13 +144,13 @@ def aircraft_and_wind_options(parser: CommandParser) -> None:
     group.add_argument(
         "--airspeed",
         metavar="M/S",
-        type=number("airspeed"),
+        type=number_parser("airspeed"),
         help="true airspeed until the mission sets one, m/s (default: the aircraft's cruise speed)",
     )
     group.add_argument(
         "--wind",
         metavar="SPEED,FROM",
-        type=wind,
+        type=parse_wind,
         help="steady wind: m/s, and the direction it blows from in degrees: 8,270 is 8 m/s from the west "
         "(default: the scenario's, or none)",
     )
@@ -176,7 +176,7 @@ def autopilot_options(parser: CommandParser) -> OptionGroup:
             "selects the autopilot if none is named"
         ),
     )
-    with_completer(option, files("param", "parm", "params"))
+    with_completer(option, file_completer("param", "parm", "params"))
     group.add_argument(
         "--autopilot",
         choices=CHOICES["autopilot"],
@@ -240,14 +240,14 @@ def flight_options(parser: CommandParser) -> None:
     limits.add_argument(
         "--max-hours",
         metavar="H",
-        type=number("max_hours"),
+        type=number_parser("max_hours"),
         default=6.0,
         help="stop after this many simulated hours (default: 6)",
     )
     limits.add_argument(
         "--max-log",
         metavar="MB",
-        type=number("max_log"),
+        type=number_parser("max_log"),
         default=256.0,
         help="stop when the log reaches this size, MB (default: 256; it grows by about 20 MB per hour)",
     )
@@ -269,11 +269,11 @@ def imported_log_options(parser: CommandParser) -> None:
     """Add the options for information that may be missing in a log of another program."""
     group = parser.group("an autopilot's log")
     option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
-    with_completer(option, files(*MISSION_SUFFIXES))
+    with_completer(option, file_completer(*MISSION_SUFFIXES))
     group.add_argument(
         "--flight",
         metavar="N",
-        type=number("flight"),
+        type=number_parser("flight"),
         help="number of the flight in the log (default: the longest in AUTO)",
     )
     group.add_argument(
@@ -285,7 +285,7 @@ def log_argument(
     parser: CommandParser, name: str = "log", metavar: str = "LOG.mcap", help_text: str = "a flight log"
 ) -> None:
     """Add the argument for a flight log to read."""
-    with_completer(parser.add_argument(name, metavar=metavar, help=help_text), files("mcap"))
+    with_completer(parser.add_argument(name, metavar=metavar, help=help_text), file_completer("mcap"))
 
 
 def scenario_argument(parser: CommandParser, **settings: object) -> None:

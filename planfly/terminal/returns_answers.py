@@ -281,10 +281,10 @@ def glides_entry(result: ReturnsFound) -> GlidesEntry:
                 left_m=_round_to_tenths(glides.altitude_left(glide)),
                 flat_east_m=_round_to_tenths(glide.flat_position[0]),
                 flat_north_m=_round_to_tenths(glide.flat_position[1]),
-                own=glide.own.end,
-                own_target=glide.own.target.name,
-                own_over_m=_round_to_tenths(glide.own.arrival_height),
-                own_short_m=_round_to_tenths(glide.own.shortfall),
+                own=glide.own_return.end,
+                own_target=glide.own_return.target.name,
+                own_over_m=_round_to_tenths(glide.own_return.arrival_height),
+                own_short_m=_round_to_tenths(glide.own_return.shortfall),
                 text=glide_range_text(glide_range, glides),
             )
         )

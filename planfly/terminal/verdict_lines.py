@@ -62,7 +62,7 @@ def _place_and_value(finding: Finding) -> str:
 def _rule_summary(rule: RuleFindings) -> str:
     """Count the findings of a rule, and describe the finding closest to its limit."""
     if not rule.judged:
-        return f"{'warning' if rule.words.warns else 'not judged'}: {rule.findings[0].reason}"
+        return f"{'warning' if rule.words.is_warning else 'not judged'}: {rule.findings[0].reason}"
     closest, margin = rule.closest, rule.words.margin
     if closest is None or closest.margin is None or margin is None:
         return rule.count_text
@@ -72,4 +72,4 @@ def _rule_summary(rule: RuleFindings) -> str:
     relation = "furthest beyond its limit" if closest.ok is False else "closest to its limit"
     place_text = "" if closest.place.kind == "flight" else f"{relation} at {closest.where}: "
     source_text = f", {closest.limit_source}" if closest.limit_source in _LIMIT_SOURCES else ""
-    return f"{rule.count_text}; {place_text}{margin.of} {value} (limit {limit}{source_text})"
+    return f"{rule.count_text}; {place_text}{margin.quantity} {value} (limit {limit}{source_text})"

@@ -110,7 +110,7 @@ def test_every_scale_that_ranks_flights_stands_on_its_page() -> None:
     rows = re.findall(r"^\| `(\w+)` \| (.*?) \| ([\d.]+) (.*?) \|$", text_of("campaigns.md"), re.MULTILINE)
     stated = {rule: (of, float(scale), unit) for rule, of, scale, unit in rows}
     margins = {rule.name: rule.margin for rule in RULE_WORDS.values() if rule.scale is not None}
-    assert stated == {name: (margin.of, margin.scale, margin.unit) for name, margin in margins.items() if margin}
+    assert stated == {name: (margin.quantity, margin.scale, margin.unit) for name, margin in margins.items() if margin}
 
 
 def test_every_elevation_format_stands_on_its_page() -> None:

@@ -89,15 +89,15 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
     lines = []
     for stretch in source.stretches:
         name = stretch.mode or "the flight (the log contains no modes)"
-        times = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+        time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
         legs = by_start.get(stretch.start)
         if legs is None:
-            lines.append(f"Judged: nothing of {times}: it passed no two waypoints in order")
+            lines.append(f"Judged: nothing of {time_text}: it passed no two waypoints in order")
             continue
         first, last = leg_numbers[legs.first], leg_numbers[legs.last - 1]
         partial_text = f", leg {last} in part" if legs.partial else ""
         start_time = float(legs.aligned.track.time[0])
-        lines.append(f"Judged: {times}, legs {first} to {last}{partial_text}, from {start_time:.1f} s on")
+        lines.append(f"Judged: {time_text}, legs {first} to {last}{partial_text}, from {start_time:.1f} s on")
     return lines
 
 
@@ -119,10 +119,10 @@ def heights_text(source: ImportedLog) -> str:
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
-    'POS, above mean sea level, according to the log; at the start GPS.Alt -0.1 m of it'
+    'POS, above mean sea level, according to the log; at the start GPS.Alt -0.1 m relative to it'
     """
     offsets = ", ".join(f"{height.name} {height.offset:+.1f} m" for height in source.heights.offsets)
-    offset_text = f"; at the start {offsets} of it" if offsets else ""
+    offset_text = f"; at the start {offsets} relative to it" if offsets else ""
     return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
 
 
@@ -195,8 +195,10 @@ def damage_text(damage: Damage) -> str:
     """
     texts = []
     if damage.places:
-        size = f" ({damage.size:,} bytes)" if damage.size else ""
-        texts.append(f"{damage.places} {'place' if damage.places == 1 else 'places'} in the file{size} cannot be read")
+        size_text = f" ({damage.size:,} bytes)" if damage.size else ""
+        texts.append(
+            f"{damage.places} {'place' if damage.places == 1 else 'places'} in the file{size_text} cannot be read"
+        )
     if damage.unreadable:
         texts.append(f"{damage.unreadable} messages contain nothing that can be used")
     if damage.cut:
@@ -244,19 +246,23 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     end_judges = [rule.judge_imported_end for rule in RULES.values() if rule.judge_imported_end is not None]
     findings = (*findings, *(judge(setup, flown_stretches, log_complete) for judge in end_judges))
     has_failed = any(finding.ok is False for finding in findings)
-    unjudged = "; ".join(
+    unjudged_text = "; ".join(
         filter(
             None,
-            [_missing_part_text(findings, source.missing), _unseen_text(flown_stretches), _uncertainty_text(findings)],
+            [_missing_part_text(findings, source.missing), _pauses_text(flown_stretches), _uncertainty_text(findings)],
         )
     )
-    flyable = bool(flown_stretches) and not has_failed and not unjudged
-    complete = not unjudged and all(finding.ok is True for finding in findings if finding.rule == "completion")
+    flyable = bool(flown_stretches) and not has_failed and not unjudged_text
+    complete = not unjudged_text and all(finding.ok is True for finding in findings if finding.rule == "completion")
     answer_texts = (
-        [headline(findings, flyable).replace("flyable", "flown as planned", 1)] if has_failed or not unjudged else []
+        [headline(findings, flyable).replace("flyable", "flown as planned", 1)]
+        if has_failed or not unjudged_text
+        else []
     )
-    answer_text = "; ".join([*answer_texts, *filter(None, [unjudged])])
-    own_answer = LevelAnswer(setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged) and not has_failed)
+    answer_text = "; ".join([*answer_texts, *filter(None, [unjudged_text])])
+    own_answer = LevelAnswer(
+        setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged_text) and not has_failed
+    )
     conditions = setup_conditions(setup)
     lines = imported_lines(findings, setup, own_answer, flown_stretches, conditions)
     return Verdict(
@@ -269,7 +275,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
         notes=setup.route.notes,
         leg_ends=_leg_ends(setup, flown_stretches),
         parameters=setup.autopilot.parameters,
-        unjudged=unjudged,
+        unjudged=unjudged_text,
         imported=True,
         conditions=conditions,
     )
@@ -283,8 +289,8 @@ def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None
     return f"not judged from end to end: {parts[0]}" if parts else ""
 
 
-def _unseen_text(flown_stretches: Sequence[FlownLegs]) -> str:
-    """Describe the pauses of the log that are too long to be judged; return "" if there are none."""
+def _pauses_text(flown_stretches: Sequence[FlownLegs]) -> str:
+    """Describe the pauses of the log that are too long to judge the flight; return "" if there are none."""
     pauses = []
     for legs in flown_stretches:
         time = legs.aligned.track.time
@@ -312,15 +318,15 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Judge one stretch, and number its legs and waypoints as in the whole route."""
     findings = []
     for finding in track_findings(legs.requirements, legs.aligned):
-        checked = _check_gaps(_check_data(setup, legs, finding), legs)
+        checked_finding = _check_gaps(_check_data(setup, legs, finding), legs)
         if legs.partial:
-            checked = _check_unreached(checked, legs)
-        findings.append(_at_route_place(checked, legs.first, setup))
+            checked_finding = _check_unreached(checked_finding, legs)
+        findings.append(_renumber_place(checked_finding, legs.first, setup))
     return [*findings, *_findings_without_data(setup, {finding.rule for finding in findings})]
 
 
 def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[Finding]:
-    """Return findings for rules with `LogNeeds.listed` that found nothing because the log lacks their data."""
+    """Return findings for rules with `LogNeeds.reports_missing` that found nothing because the log lacks their data."""
     findings = []
     for rule in RULES.values():
         missing_quantities = [
@@ -329,7 +335,7 @@ def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[F
             if setup.source is not None and quantity not in setup.source.holds
         ]
         margin = RULE_WORDS[rule.name].margin
-        if rule.log.listed and margin is not None and missing_quantities and rule.name not in judged_rules:
+        if rule.log.reports_missing and margin is not None and missing_quantities and rule.name not in judged_rules:
             reason = f"the log contains no {_QUANTITY_LABELS[missing_quantities[0]]}"
             findings.append(
                 make_finding(rule.name, FLIGHT, ok=None, reason=reason, source="aircraft", unit=margin.unit)
@@ -342,13 +348,13 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
     source = setup.source
     if source is None:
         return finding
-    reason, needs = "", RULES[finding.rule].log
-    for quantity in needs.quantities:
+    reason, log_needs = "", RULES[finding.rule].log
+    for quantity in log_needs.quantities:
         if quantity not in source.holds:
             reason = f"the log contains no {_QUANTITY_LABELS[quantity]}"
             break
         if quantity == "heights":
-            has_plan_heights = source.plan_heights or not needs.planned_heights
+            has_plan_heights = source.plan_heights or not log_needs.needs_planned_heights
             reason = _DATUM_REASONS.get(source.heights.datum, "") if has_plan_heights else "the plan states no heights"
         else:
             reason = _missing_values_text(legs, quantity)
@@ -356,7 +362,7 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
             break
     if reason:
         return _mark_unjudged(finding, reason)
-    if not source.aircraft_known and needs.aircraft and finding.limit_source != "scenario":
+    if not source.aircraft_known and log_needs.needs_aircraft and finding.limit_source != "scenario":
         return _mark_unjudged(finding, _UNNAMED_TEXT, keep_measurements=bool(finding.ok))
     return finding
 
@@ -390,7 +396,7 @@ def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
     last = min(len(rows) - 1, finding.place.index + 1)
     start, end = float(track.time[rows[first]]), float(track.time[rows[last]])
     for gap in gaps_between(legs, start, end):
-        if finding.place.kind == "leg" or RULES[finding.rule].log.no_gap:
+        if finding.place.kind == "leg" or RULES[finding.rule].log.needs_no_gap:
             reason = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
             return _mark_unjudged(finding, reason, keep_measurements=True)
     return finding
@@ -403,7 +409,7 @@ def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
     is_last_leg = finding.place.kind == "leg" and finding.place.index == leg
     if is_unreached:
         return _mark_unjudged(finding, stretch_end_text(legs.stretch))
-    if is_last_leg and RULES[finding.rule].log.full_leg:
+    if is_last_leg and RULES[finding.rule].log.needs_full_leg:
         return (
             _mark_unjudged(finding, f"flown in part: {stretch_end_text(legs.stretch)}")
             if finding.ok is not False
@@ -412,7 +418,7 @@ def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
     return finding
 
 
-def _at_route_place(finding: Finding, first: int, setup: FlightSetup) -> Finding:
+def _renumber_place(finding: Finding, first: int, setup: FlightSetup) -> Finding:
     """Return a finding of a stretch with its place numbered in the whole route.
 
     first: number of the stretch's first waypoint in the route.

@@ -153,7 +153,7 @@ def compare_with_model(
         first=stretch_legs.first,
         legs=legs,
         turns=turns,
-        spreads=_spreads(flown_profile, model_profile),
+        spreads=_make_spreads(flown_profile, model_profile),
         stands_in=stands_in,
     )
 
@@ -172,14 +172,14 @@ def _flight_profile(
         rows = aligned.leg_rows(leg)
         along, across = along_across(requirements, leg, track.position[rows])
         # If a flight goes back, as on a loiter, the first pass applies.
-        forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
-        line = requirements.points[leg, 2] + along * math.tan(requirements.slopes[leg])
-        height_error = track.position[rows, 2] - line
+        is_forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
+        line_altitude = requirements.points[leg, 2] + along * math.tan(requirements.slopes[leg])
+        height_error = track.position[rows, 2] - line_altitude
         columns = (across, height_error, speed[rows], bank[rows], energy[rows])
         parts.append(
             np.array(
                 [
-                    np.interp(along_leg, along[forward], column[forward], left=math.nan, right=math.nan)
+                    np.interp(along_leg, along[is_forward], column[is_forward], left=math.nan, right=math.nan)
                     for column in columns
                 ]
             )
@@ -244,7 +244,7 @@ def _turn_pair(
     )
 
 
-def _spreads(flown_profile: Profile, model_profile: Profile) -> tuple[Spread, ...]:
+def _make_spreads(flown_profile: Profile, model_profile: Profile) -> tuple[Spread, ...]:
     spreads = []
     for name, unit, factor in (
         ("cross_track", "m", 1.0),

@@ -44,14 +44,14 @@ def _segment_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Float
 class SphereVisits(NamedTuple):
     """Visits of a path to m spheres, (m,) each.
 
-    inside: s.
+    time_inside: s.
     exposure: integral of (scale/d)^4 over the time inside, s.
     closest: minimum distance to the center, m; inf for a sphere of radius 0.
     closest_time: s.
     entry_time: s, of the first entry; NaN if the path never enters.
     """
 
-    inside: Floats
+    time_inside: Floats
     exposure: Floats
     closest: Floats
     closest_time: Floats
@@ -73,7 +73,7 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
 
     >>> line, time = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]), np.array([0.0, 10.0])
     >>> visits = path_spheres(line, time, np.array([[50.0, 30.0, 0.0]]), np.array([50.0]), np.array([10.0]))
-    >>> float(visits.closest[0]), round(float(visits.inside[0]), 6)
+    >>> float(visits.closest[0]), round(float(visits.time_inside[0]), 6)
     (30.0, 8.0)
     """
     arrays = (read_only(np.ascontiguousarray(array)) for array in (points, time, centres, radii, scales))
@@ -124,7 +124,7 @@ def _block_boxes(points: Floats) -> _Boxes:
     boxes = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
     for block in range(count):
         first, last = block * _BLOCK_SEGMENTS, min(segments, (block + 1) * _BLOCK_SEGMENTS)
-        diagonal2 = 0.0
+        diagonal_square = 0.0
         for axis in range(3):
             min_coordinate, max_coordinate = math.inf, -math.inf
             for row in range(first, last + 1):
@@ -133,8 +133,8 @@ def _block_boxes(points: Floats) -> _Boxes:
                     max(max_coordinate, points[row, axis]),
                 )
             boxes.low[block, axis], boxes.high[block, axis] = min_coordinate, max_coordinate
-            diagonal2 += (max_coordinate - min_coordinate) ** 2
-        boxes.diagonal[block] = math.sqrt(diagonal2)
+            diagonal_square += (max_coordinate - min_coordinate) ** 2
+        boxes.diagonal[block] = math.sqrt(diagonal_square)
     return boxes
 
 
@@ -144,10 +144,10 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
     min_square = 0.0
     max_square = 0.0
     for axis in range(3):
-        below, above = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
-        outside = max(0.0, below, above)
-        min_square += outside * outside
-        max_offset = max(abs(below), abs(above))
+        lower_offset, upper_offset = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
+        outside_distance = max(0.0, lower_offset, upper_offset)
+        min_square += outside_distance * outside_distance
+        max_offset = max(abs(lower_offset), abs(upper_offset))
         max_square += max_offset * max_offset
     return math.sqrt(min_square), math.sqrt(max_square)
 
@@ -192,7 +192,7 @@ def _add_stay(
             if math.isnan(visits.entry_time[m]):
                 _, entry_fraction, _ = sphere_window(points[k], points[end], centre, radius)
                 visits.entry_time[m] = time[k] + entry_fraction * duration
-            visits.inside[m] += fraction * duration
+            visits.time_inside[m] += fraction * duration
             visits.exposure[m] += mean_exposure * duration
         k = end
 

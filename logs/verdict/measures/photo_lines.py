@@ -136,13 +136,13 @@ def measure_line(
         missed_photos=missed,
         lateral_tolerance=lateral_tolerance(requirements, survey),
         min_height_tolerance=float(rows.height_tolerance.min(initial=math.inf)),
-        lost_spans=_set_runs(~is_good, step),
+        lost_spans=_runs_of_set_steps(~is_good, step),
     )
 
 
-def _set_runs(cells: Flags, step: float) -> tuple[tuple[float, float], ...]:
-    """Return the start and end of each run of set cells, m."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], cells.astype(int), [0]]))) * step
+def _runs_of_set_steps(is_set: Flags, step_length: float) -> tuple[tuple[float, float], ...]:
+    """Return the start and end of each run of steps with `is_set`, m."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], is_set.astype(int), [0]]))) * step_length
     return tuple((float(start), float(end)) for start, end in zip(edges[::2], edges[1::2], strict=True))
 
 
@@ -307,15 +307,15 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
         spacing = np.maximum(line.photo, camera.interval * strip.speeds)[strip.is_usable]
         heights = strip.heights[strip.is_usable]
         overlaps = 1.0 - spacing / (camera.along * np.maximum(heights, 1e-9))
-        lowest = int(np.argmin(overlaps))
-        if measure.front is None or overlaps[lowest] < measure.front:
-            metres, is_slow = float(spacing[lowest]), bool(spacing[lowest] > line.photo)
+        lowest_index = int(np.argmin(overlaps))
+        if measure.front is None or overlaps[lowest_index] < measure.front:
+            lowest_spacing, is_slow = float(spacing[lowest_index]), bool(spacing[lowest_index] > line.photo)
             measure = replace(
                 measure,
-                front=float(overlaps[lowest]),
+                front=float(overlaps[lowest_index]),
                 line=number,
-                photo_spacing=metres,
-                height=float(heights[lowest]),
+                photo_spacing=lowest_spacing,
+                height=float(heights[lowest_index]),
                 is_camera_limited=is_slow,
             )
     return measure
@@ -341,10 +341,10 @@ def _with_side_overlap(
         if strip is not None and strip.is_usable.any():
             point_along, across, _ = axis.of(strip.positions)
             is_forward = along[-1] >= along[0]
-            cells = _line_steps(
+            is_flown_usably = _line_steps(
                 (point_along - min_along) if is_forward else length - (point_along - min_along), strip.is_usable, length
             )
-            is_used = on_line & (cells if is_forward else cells[::-1])
+            is_used = on_line & (is_flown_usably if is_forward else is_flown_usably[::-1])
             order = np.argsort(point_along[strip.is_usable])
             for row, values in enumerate((across, strip.heights)):
                 line_values = np.interp(
@@ -354,15 +354,15 @@ def _with_side_overlap(
         gaps, heights = np.abs(this_line[0] - previous_line[0]), 0.5 * (this_line[1] + previous_line[1])
         overlaps = 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9))
         if np.isfinite(overlaps).any():
-            lowest = int(np.nanargmin(overlaps))
-            if measure.side is None or overlaps[lowest] < measure.side:
-                pair = (int(previous_line[3, lowest]), number)
+            lowest_index = int(np.nanargmin(overlaps))
+            if measure.side is None or overlaps[lowest_index] < measure.side:
+                pair = (int(previous_line[3, lowest_index]), number)
                 measure = replace(
                     measure,
-                    side=float(overlaps[lowest]),
+                    side=float(overlaps[lowest_index]),
                     line_pair=pair,
-                    line_spacing=float(gaps[lowest]),
-                    side_height=float(heights[lowest]),
+                    line_spacing=float(gaps[lowest_index]),
+                    side_height=float(heights[lowest_index]),
                 )
         previous_line[:, on_line] = this_line[:, on_line]
     return measure

@@ -247,13 +247,15 @@ def _sharpest_fly_over_turn(radii: float) -> float:
 
     radii: the length in turn radii.
     """
-    fitting, too_sharp = 0.0, math.pi
-    if fly_over_run(too_sharp) <= radii:
-        return too_sharp
+    fitting_turn, too_sharp_turn = 0.0, math.pi
+    if fly_over_run(too_sharp_turn) <= radii:
+        return too_sharp_turn
     for _ in range(50):
-        middle = 0.5 * (fitting + too_sharp)
-        fitting, too_sharp = (middle, too_sharp) if fly_over_run(middle) <= radii else (fitting, middle)
-    return fitting
+        middle_turn = 0.5 * (fitting_turn + too_sharp_turn)
+        fitting_turn, too_sharp_turn = (
+            (middle_turn, too_sharp_turn) if fly_over_run(middle_turn) <= radii else (fitting_turn, middle_turn)
+        )
+    return fitting_turn
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,14 +277,14 @@ class FlownGround:
     """Ground phases of a flight: its take-off and its landing.
 
     procedures: the planned ground phases.
-    whole: requirements of the whole route, with take-off and landing.
+    whole_route: requirements of the whole route, with take-off and landing.
     track: track of the whole flight.
     takeoff_end_row: row of the track at which the take-off ended; 0 without a take-off.
     landing_start_row: row of the track at which the landing began; the last row without a landing.
     """
 
     procedures: GroundWays
-    whole: "RouteRequirements"
+    whole_route: "RouteRequirements"
     track: Track
     takeoff_end_row: int
     landing_start_row: int
@@ -312,8 +314,8 @@ class RouteRequirements:
     turns, min_radius, radius, length_before, length_after, reversal: as in `TurnRequirements`.
     blend: (w,) m of leg beyond each turn on which the slope still changes.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
-    turn_limit: (w,) rad, as `TurnRequirements.limit`; inf if the envelope is left out.
-    climb, dive: (w - 1,) rad over the ground, the least along the leg, inf if the envelope is left out.
+    turn_limit: (w,) rad, as `TurnRequirements.limit`; inf if the envelope is omitted.
+    climb, dive: (w - 1,) rad over the ground, the minimum along the leg; inf if the envelope is omitted.
     certain_climb, certain_dive: (w - 1,) the certain part of these limits if the aircraft model is uncertain.
     ground_speed: (w - 1,) m/s, NaN if the wind leaves no ground speed.
     envelope: True if the aircraft's limits apply; otherwise only the ability shown by the flight applies.

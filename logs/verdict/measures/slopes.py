@@ -230,8 +230,8 @@ def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -
         is_inside = (along >= span_start) & (along <= span_end)
         if not is_inside.any():
             return None, True
-    line = requirements.points[leg, 2] + along[is_inside] * math.tan(requirements.slopes[leg])
-    height_errors = position[is_inside, 2] - line
+    line_altitudes = requirements.points[leg, 2] + along[is_inside] * math.tan(requirements.slopes[leg])
+    height_errors = position[is_inside, 2] - line_altitudes
     return float(height_errors[np.argmax(np.abs(height_errors))]), is_short
 
 
@@ -253,32 +253,32 @@ def _saturation_times(
     if rows.stop - rows.start < 2:
         return 0.0, 0.0, 0.0, 0.0
     tick = aligned.tick
-    at_full, at_idle = _rows_at_limits(requirements, aligned, rows)
+    is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
     commanded = float(requirements.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
     gust_free_error = _speed_in_mean_wind(requirements, aligned, rows) - commanded
-    width = max(1, round(SATURATED_TIME_S / tick))
+    row_count = max(1, round(SATURATED_TIME_S / tick))
     lift_gain = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
-    slower = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
-    faster = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
+    speed_deficit = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
+    speed_excess = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
     # A log may lack the airspeed at some rows.
-    is_known = np.isfinite(slower) & np.isfinite(faster)
-    speed_loss = _max_mean_within(at_full & is_known, np.where(is_known, slower, 0.0), width)
-    speed_gain = _max_mean_within(at_idle & is_known, np.where(is_known, faster, 0.0), width)
-    return float(at_full.sum() * tick), float(at_idle.sum() * tick), speed_loss, speed_gain
+    is_known = np.isfinite(speed_deficit) & np.isfinite(speed_excess)
+    speed_loss = _max_mean_within(is_at_full & is_known, np.where(is_known, speed_deficit, 0.0), row_count)
+    speed_gain = _max_mean_within(is_at_idle & is_known, np.where(is_known, speed_excess, 0.0), row_count)
+    return float(is_at_full.sum() * tick), float(is_at_idle.sum() * tick), speed_loss, speed_gain
 
 
 def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
     """Return masks of the rows with full throttle and of the rows with idle throttle."""
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
-    full = throttle >= FULL_THROTTLE_FRACTION
-    idle = throttle <= IDLE_THROTTLE_FRACTION
+    is_full = throttle >= FULL_THROTTLE_FRACTION
+    is_idle = throttle <= IDLE_THROTTLE_FRACTION
     # An aircraft that burns fuel draws no current at all.
     if not requirements.setup.envelope.motor_braking and track.current.any():
-        idle |= (track.current[rows] <= ZERO_CURRENT_A) & ~full
-    return full, idle
+        is_idle |= (track.current[rows] <= ZERO_CURRENT_A) & ~is_full
+    return is_full, is_idle
 
 
 def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> Ability | None:
@@ -293,11 +293,11 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
     track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     if rows.stop - rows.start < 3:
         return None
-    at_full, at_idle = _rows_at_limits(requirements, aligned, rows)
-    at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
+    is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
+    is_at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
     along, _ = along_across(requirements, leg, track.position[rows])
     span_start, span_end = straight_span(requirements, leg, 0.0)
-    is_measured = _rows_after_run(at_full if sign > 0.0 else at_idle, round(ABILITY_SETTLING_S / aligned.tick))
+    is_measured = _rows_after_run(is_at_full if sign > 0.0 else is_at_idle, round(ABILITY_SETTLING_S / aligned.tick))
     is_measured &= (along >= span_start) & (along <= span_end)
     velocity = track.velocity[rows].astype(np.float64)
     air_velocity = velocity - track.wind[rows]
@@ -308,9 +308,9 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         return None
     acceleration = np.gradient(velocity, track.time[rows], axis=0)
     climb_rate = (air_velocity[:, 2] + (air_velocity * acceleration).sum(axis=1) / GRAVITY)[is_measured]
-    commanded, altitude = float(requirements.route.airspeed[leg]), track.position[rows, 2][is_measured]
+    commanded_speed, altitude = float(requirements.route.airspeed[leg]), track.position[rows, 2][is_measured]
     top_altitude = float(altitude.max())
-    excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded
+    excess_speed = np.sqrt((air_velocity[is_measured] ** 2).sum(axis=1)) - commanded_speed
     fit = _plane_at_origin(
         climb_rate, excess_speed, 0.01 * (altitude - top_altitude), duration / ABILITY_SAMPLE_INTERVAL_S
     )
@@ -318,7 +318,7 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         return None
     tailwind, crosswind = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), top_altitude)
     slopes = [
-        ground_slope(math.asin(min(1.0, max(-1.0, value / commanded))), commanded, tailwind, crosswind)
+        ground_slope(math.asin(min(1.0, max(-1.0, value / commanded_speed))), commanded_speed, tailwind, crosswind)
         for value in (fit[0], fit[0] + fit[1])
     ]
     error = abs(slopes[1] - slopes[0])

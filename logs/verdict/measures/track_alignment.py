@@ -183,8 +183,10 @@ def _advance_target_to_arrival(
     points, final_row, target = requirements.points, len(track) - 1, progress.target
     first_row, last_row = progress.first.copy(), progress.last.copy()
     while target + 1 < len(points):
-        outside = np.flatnonzero(np.hypot(*(track.position[:, :2] - points[target, :2]).T) > arrival_radius[target])
-        entry_row = int(outside[-1]) + 1 if outside.size else 0
+        rows_outside = np.flatnonzero(
+            np.hypot(*(track.position[:, :2] - points[target, :2]).T) > arrival_radius[target]
+        )
+        entry_row = int(rows_outside[-1]) + 1 if rows_outside.size else 0
         if entry_row > final_row:
             break
         target += 1
@@ -242,20 +244,20 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
     an imported log are checked here; each rule checks the other data that it needs.
     """
     is_usable = np.isfinite(track.time)
-    plausible: tuple[tuple[str, float], ...] = (
+    plausible_bounds: tuple[tuple[str, float], ...] = (
         ("position", MAX_PLAUSIBLE_POSITION_M),
         ("velocity", MAX_PLAUSIBLE_SPEED_MPS),
     )
     if is_own:
         for name in ("airspeed", "current", "energy"):
             is_usable &= np.isfinite(getattr(track, name))
-        plausible = (
-            *plausible,
+        plausible_bounds = (
+            *plausible_bounds,
             ("attitude", MAX_PLAUSIBLE_VALUE),
             ("controls", MAX_PLAUSIBLE_VALUE),
             ("wind", MAX_PLAUSIBLE_VALUE),
         )
-    for name, bound in plausible:
+    for name, bound in plausible_bounds:
         # A NaN is not within any bound.
         is_usable &= (np.abs(getattr(track, name)) <= bound).all(axis=1)
     time = np.where(is_usable, track.time, -math.inf)
@@ -277,14 +279,14 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; waypoints after the last one that was met lie at the end.
-    captured = np.flatnonzero(~is_missed)
-    final = int(captured[-1]) if captured.size else -1
+    captured_waypoints = np.flatnonzero(~is_missed)
+    last_captured = int(captured_waypoints[-1]) if captured_waypoints.size else -1
     previous_row = 0
     for i in range(count):
-        if i > final and i > 0:
+        if i > last_captured and i > 0:
             start, end = last_row, last_row
         elif is_missed[i]:
-            later_captured = captured[captured > i]
+            later_captured = captured_waypoints[captured_waypoints > i]
             start, end = (
                 previous_row,
                 min(last_row, (int(chords[later_captured[0]]) + 1) * step) if later_captured.size else last_row,

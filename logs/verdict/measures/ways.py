@@ -83,7 +83,7 @@ def first_hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> s
         sphere_visits = path_spheres(
             path.points, path.distance, threats.position, threats.kill_radius, threats.kill_scale
         )
-        for missile in np.flatnonzero(sphere_visits.inside > 0.0).tolist():
+        for missile in np.flatnonzero(sphere_visits.time_inside > 0.0).tolist():
             return place_text(Place("missile", missile, name=scenario.spec.threats[missile].name or ""))
     zone_numbers = [
         zone_number for zone_number, zone in enumerate(airspace.zones) if zone.kind == "exclusion" or zone.floor is None

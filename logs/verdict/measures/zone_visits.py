@@ -24,22 +24,22 @@ from world.terrain import Terrain, ground_height
 # Parts of a move near a zone, compiled: how far beyond the zone's limit they can be between their ends.
 
 
-# A part of a move.  first, last: fractions of the move at its ends.  east, north: position of its start, m.  away, off:
-# distances of the start outside the zone's outline and altitude band, m.  edge: the zone's edge nearest to the start.
-# to_east to to_edge: the same for its end.
+# A part of a move.  first, last: fractions of the move at its ends.  east, north: position of its start, m.
+# outline_distance, band_distance: distances of the start outside the zone's outline and altitude band, m.  edge: the
+# zone's edge nearest to the start.  end_east to end_edge: the same for the part's end.
 PART = record_dtype(
     "first",
     "last",
     "east",
     "north",
-    "away",
-    "off",
+    "outline_distance",
+    "band_distance",
     ("edge", np.int64),
-    "to_east",
-    "to_north",
-    "to_away",
-    "to_off",
-    ("to_edge", np.int64),
+    "end_east",
+    "end_north",
+    "end_outline_distance",
+    "end_band_distance",
+    ("end_edge", np.int64),
 )
 
 
@@ -79,9 +79,18 @@ def beyond_limit(exclusion: bool, outline_distance: float, band_distance: float)
 def copy_move_part(source: Record, target: Record) -> None:
     """Copy one part of a move into another record."""
     target.first, target.last = source.first, source.last
-    target.east, target.north, target.away, target.off = source.east, source.north, source.away, source.off
-    target.to_east, target.to_north, target.to_away = source.to_east, source.to_north, source.to_away
-    target.to_off, target.edge, target.to_edge = source.to_off, source.edge, source.to_edge
+    target.east, target.north, target.outline_distance, target.band_distance = (
+        source.east,
+        source.north,
+        source.outline_distance,
+        source.band_distance,
+    )
+    target.end_east, target.end_north, target.end_outline_distance = (
+        source.end_east,
+        source.end_north,
+        source.end_outline_distance,
+    )
+    target.end_band_distance, target.edge, target.end_edge = source.end_band_distance, source.edge, source.end_edge
 
 
 @inlined
@@ -94,7 +103,10 @@ def depth_bounds(
     distance beyond the zone's outline, m.
     """
     sign = -1.0 if exclusion else 1.0
-    outline_sum, band_sum = sign * (part.away + part.to_away), sign * (part.off + part.to_off)
+    outline_sum, band_sum = (
+        sign * (part.outline_distance + part.end_outline_distance),
+        sign * (part.band_distance + part.end_band_distance),
+    )
     outline_min, outline_max = 0.5 * (outline_sum - length), min(max_distance, 0.5 * (outline_sum + length))
     if band_sum != band_sum:
         # Over unknown ground at one end only the outline can decide: it can show that the part is not inside an
@@ -120,17 +132,17 @@ def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Reco
         return math.inf
     if not zone.round:
         min_distance = math.inf
-        for edge_index in (part.edge, part.to_edge):
+        for edge_index in (part.edge, part.end_edge):
             edge = records.edges[edge_index]
             start_distance, end_distance = (
                 distance_to_edge(edge, part.east, part.north),
-                distance_to_edge(edge, part.to_east, part.to_north),
+                distance_to_edge(edge, part.end_east, part.end_north),
             )
             min_distance = min(min_distance, max(start_distance, end_distance))
         return min_distance + bow
     if not zone.exclusion:
-        return float(max(part.away, part.to_away) + bow)
-    step_e, step_n = part.to_east - part.east, part.to_north - part.north
+        return float(max(part.outline_distance, part.end_outline_distance) + bow)
+    step_e, step_n = part.end_east - part.east, part.end_north - part.north
     offset_e, offset_n = zone.centre_east - part.east, zone.centre_north - part.north
     length_square = step_e * step_e + step_n * step_n
     fraction = (
@@ -294,17 +306,17 @@ def _add_block(
 ) -> None:
     """Add consecutive moves to a visit.  round_number: round of `_fill_visit`, 0 to 2."""
     part = parts[0]
-    part.to_east, part.to_north, up = move_point(moves[0], 0.0)
-    part.to_away, part.to_off, part.to_edge = distances_outside_zone(
-        records, z, heights, to_pixel, part.to_east, part.to_north, up
+    part.end_east, part.end_north, up = move_point(moves[0], 0.0)
+    part.end_outline_distance, part.end_band_distance, part.end_edge = distances_outside_zone(
+        records, z, heights, to_pixel, part.end_east, part.end_north, up
     )
     for k in range(moves.shape[0]):
         part.first, part.last = 0.0, 1.0
-        part.east, part.north, part.away = part.to_east, part.to_north, part.to_away
-        part.off, part.edge = part.to_off, part.to_edge
-        part.to_east, part.to_north, up = move_point(moves[k], 1.0)
-        part.to_away, part.to_off, part.to_edge = distances_outside_zone(
-            records, z, heights, to_pixel, part.to_east, part.to_north, up
+        part.east, part.north, part.outline_distance = part.end_east, part.end_north, part.end_outline_distance
+        part.band_distance, part.edge = part.end_band_distance, part.end_edge
+        part.end_east, part.end_north, up = move_point(moves[k], 1.0)
+        part.end_outline_distance, part.end_band_distance, part.end_edge = distances_outside_zone(
+            records, z, heights, to_pixel, part.end_east, part.end_north, up
         )
         if round_number == 0:
             _update_depth(moves[k], part, records.zones[z].exclusion, visit)
@@ -364,11 +376,17 @@ def _bisect_move(
         earlier.last = part.first = middle
         east, north, up = move_point(move, middle)
         outline_distance, band_distance, edge = distances_outside_zone(records, z, heights, to_pixel, east, north, up)
-        part.east, part.north, part.away, part.off, part.edge = east, north, outline_distance, band_distance, edge
-        earlier.to_east, earlier.to_north, earlier.to_away = east, north, outline_distance
-        earlier.to_off, earlier.to_edge = band_distance, edge
-        if not in_order and beyond_limit(exclusion, part.to_away, part.to_off) > beyond_limit(
-            exclusion, earlier.away, earlier.off
+        part.east, part.north, part.outline_distance, part.band_distance, part.edge = (
+            east,
+            north,
+            outline_distance,
+            band_distance,
+            edge,
+        )
+        earlier.end_east, earlier.end_north, earlier.end_outline_distance = east, north, outline_distance
+        earlier.end_band_distance, earlier.end_edge = band_distance, edge
+        if not in_order and beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance) > beyond_limit(
+            exclusion, earlier.outline_distance, earlier.band_distance
         ):
             # Put the half that may be deeper on top: its result may make the other half unnecessary.
             copy_move_part(part, parts[_MAX_PARTS - 1])
@@ -381,8 +399,8 @@ def _bisect_move(
 def _is_unknown(exclusion: bool, part: Record) -> bool:
     """Return True if both ends depend on unknown ground: the whole part between them is then unknown."""
     start_depth, end_depth = (
-        beyond_limit(exclusion, part.away, part.off),
-        beyond_limit(exclusion, part.to_away, part.to_off),
+        beyond_limit(exclusion, part.outline_distance, part.band_distance),
+        beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance),
     )
     return start_depth != start_depth and end_depth != end_depth
 
@@ -391,9 +409,9 @@ def _is_unknown(exclusion: bool, part: Record) -> bool:
 def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Update the deepest point of a visit with a part's ends, and note unknown ground."""
     for end in range(2):
-        depth = beyond_limit(exclusion, part.away, part.off)
+        depth = beyond_limit(exclusion, part.outline_distance, part.band_distance)
         if end:
-            depth = beyond_limit(exclusion, part.to_away, part.to_off)
+            depth = beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance)
         if depth > visit.depth:
             fraction = part.last if end else part.first
             visit.depth, visit.at_time, visit.at_leg = depth, move.time + fraction * move.lasts, move.leg
@@ -405,8 +423,8 @@ def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) ->
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
     """Add a part of a move that violates, complies, or crosses the limit once, to a visit."""
     start_depth, end_depth = (
-        beyond_limit(exclusion, part.away, part.off),
-        beyond_limit(exclusion, part.to_away, part.to_off),
+        beyond_limit(exclusion, part.outline_distance, part.band_distance),
+        beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance),
     )
     if not (start_depth > 0.0 or end_depth > 0.0):
         return

@@ -119,8 +119,8 @@ def drawn_returns(
 
     starts: the places from which they were judged.
     """
-    least_altitudes = min_safe_altitudes(world, starts if returns.each else starts.subset(np.zeros(0, dtype=np.intp)))
-    return DrawnReturns(returns, worst_returns(world, starts, returns), least_altitudes, glides)
+    min_altitudes = min_safe_altitudes(world, starts if returns.each else starts.subset(np.zeros(0, dtype=np.intp)))
+    return DrawnReturns(returns, worst_returns(world, starts, returns), min_altitudes, glides)
 
 
 def draw_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:

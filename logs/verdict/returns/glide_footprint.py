@@ -39,35 +39,36 @@ class Band(NamedTuple):
 class GlideFootprint:
     """Map on which glides were looked up.
 
-    made: its cells.
-    chosen: (n, e) least altitude, m AMSL, from which home, a rally point or a landing place is reached; inf if none is.
-    flat: (n, e) True for a cell on which a landing is possible.
+    grid: its cells.
+    min_altitude: (n, e) minimum altitude, m AMSL, from which home, a rally point or a landing place is reached; inf if
+        none is.
+    is_landable: (n, e) True for a cell on which a landing is possible.
     """
 
-    made: GlideMap
-    chosen: Floats
-    flat: Flags
+    grid: GlideMap
+    min_altitude: Floats
+    is_landable: Flags
 
     def bands(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Band, ...]:
         """Return the bands of needed height above ground, lowest first, within ranges of the map, m."""
-        grid = self.made
-        needed_heights = np.where(np.isfinite(grid.ground), self.chosen - grid.ground, math.inf)
-        cells = _Cells.within(grid, east, north)
-        block_heights = cells.merged(needed_heights)
-        edges = (-math.inf, *BANDS)
+        grid = self.grid
+        needed_heights = np.where(np.isfinite(grid.ground), self.min_altitude - grid.ground, math.inf)
+        blocks = _CellBlocks.from_map(grid, east, north)
+        block_heights = blocks.max_by_block(needed_heights)
+        band_limits = (-math.inf, *BANDS)
         bands = (
-            Band(max(0.0, lower), upper, cells.parts((block_heights > lower) & (block_heights <= upper)))
-            for lower, upper in zip(edges, BANDS, strict=False)
+            Band(max(0.0, lower), upper, blocks.outlines((block_heights > lower) & (block_heights <= upper)))
+            for lower, upper in zip(band_limits, BANDS, strict=False)
         )
         return tuple(band for band in bands if band.parts)
 
     def landings(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Part, ...]:
         """Return the outlines of ground that is flat by the elevation file, within ranges of the map, m."""
-        blocks = _Cells.within(self.made, east, north)
-        return blocks.parts(blocks.merged(self.flat.astype(np.float64)) > 0.0)
+        blocks = _CellBlocks.from_map(self.grid, east, north)
+        return blocks.outlines(blocks.max_by_block(self.is_landable.astype(np.float64)) > 0.0)
 
 
-class _Cells(NamedTuple):
+class _CellBlocks(NamedTuple):
     """Square blocks of map cells, in rows to the north.
 
     west, south: corner of the first block, m.  side: side of a block, m.  block: number of cells along a side.
@@ -82,7 +83,7 @@ class _Cells(NamedTuple):
     shape: tuple[int, int]
 
     @classmethod
-    def within(cls, grid: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_Cells":
+    def from_map(cls, grid: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_CellBlocks":
         """Return the blocks of a map that lie within ranges, m."""
         rows, columns = grid.floor.shape
         sides = ((north, grid.south, rows), (east, grid.west, columns))
@@ -95,14 +96,14 @@ class _Cells(NamedTuple):
             west, south, block * grid.cell, block, (first[0], first[1]), (counts[0] // block, counts[1] // block)
         )
 
-    def merged(self, values: Floats) -> Floats:
+    def max_by_block(self, values: Floats) -> Floats:
         """Return the greatest value in each block."""
         (row, column), (rows, columns) = self.first, self.shape
         values_within = values[row : row + rows * self.block, column : column + columns * self.block]
         blocks = values_within.reshape(rows, self.block, columns, self.block)
         return np.asarray(blocks.max(axis=(1, 3)))
 
-    def parts(self, is_chosen: Flags) -> tuple[Part, ...]:
+    def outlines(self, is_chosen: Flags) -> tuple[Part, ...]:
         """Return the outlines of chosen blocks, with their holes."""
         if not is_chosen.any():
             return ()

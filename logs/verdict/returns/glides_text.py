@@ -50,7 +50,7 @@ def glides_headline(glides: Glides) -> str:
     reach_text = ", ".join(
         _COUNT_TEXTS[reach].format(count=count) for reach, count in counts if count or reach == "home"
     )
-    if any(glide.own.end == "not flown" for glide in glides.each):
+    if any(glide.own_return.end == "not flown" for glide in glides.each):
         own_text = "ArduPlane's own return, which would follow the terrain, is not simulated"
     else:
         own_text = f"ArduPlane's own return arrives from {glides.arrivals}"
@@ -84,35 +84,37 @@ def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
 
 def _reach_text(glide_range: GlideRange, glides: Glides) -> str:
     glide = glide_range.lowest_glide
-    spare = glides.altitude_left(glide)
+    altitude_left = glides.altitude_left(glide)
     time_text = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"
     match glide.reach:
         case "home" | "site":
-            return f"{site_text(glides.sites[glide_range.site])}, {spare:.0f} m left over{time_text}"
+            return f"{site_text(glides.sites[glide_range.site])}, {altitude_left:.0f} m left over{time_text}"
         case "flat":
             east, north, up = glide.flat_position
             position_text = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
-            return f"only flat ground, {position_text}, {spare:.0f} m left over{time_text}"
+            return f"only flat ground, {position_text}, {altitude_left:.0f} m left over{time_text}"
         case "nothing":
-            shortfall_text = "no path leads anywhere" if math.isinf(spare) else f"{-spare:.0f} m are missing at most"
+            shortfall_text = (
+                "no glide path exists" if math.isinf(altitude_left) else f"{-altitude_left:.0f} m are missing at most"
+            )
             return f"nothing, {shortfall_text}"
         case "unknown":
             return "unknown, because it lies outside the elevation data"
 
 
 def _own_return_text(glide: Glide) -> str:
-    name = glide.own.target.name
-    match glide.own.end:
+    name = glide.own_return.target.name
+    match glide.own_return.end:
         case "arrives":
             return f"; ArduPlane's own return arrives over {name}"
         case "low":
-            min_height = min(glide.own.arrival_height, glide.own.clearance)
+            min_height = min(glide.own_return.arrival_height, glide.own_return.clearance)
             return (
-                f"; ArduPlane's own return comes down to {min_height:.0f} m above ground, below the required"
+                f"; ArduPlane's own return descends to {min_height:.0f} m above ground, below the required"
                 f" {MARGIN:.0f} m"
             )
         case "ground":
-            return f"; ArduPlane's own return comes down {glide.own.shortfall / 1000.0:.1f} km from {name}"
+            return f"; ArduPlane's own return comes down {glide.own_return.shortfall / 1000.0:.1f} km from {name}"
         case "threat":
             return "; ArduPlane's own return enters a missile's sphere"
         case "unknown":

@@ -39,7 +39,7 @@ from world.kernels import Record
 # and the elevation file has its own error.
 MARGIN = 30.0
 
-_NOWHERE = (math.nan, math.nan, math.nan)
+_NO_POSITION = (math.nan, math.nan, math.nan)
 
 SiteKind = Literal["home", "rally", "landing"]
 # The best destination in reach from a place, best first: home; a rally point or a landing place of the mission; flat
@@ -91,7 +91,7 @@ class Glide:
     """Destinations in reach from one place.
 
     time: s of the flight.  start: (3,) m.
-    own: outcome of ArduPlane's return.
+    own_return: outcome of ArduPlane's return.
     altitudes_left: for each of `Glides.sites`, the altitude left on arrival, m; negative if the altitude is too low,
         -inf without a path.
     flat_altitude_left: the same for flat ground.
@@ -101,7 +101,7 @@ class Glide:
 
     time: float
     start: tuple[float, float, float]
-    own: EngineOutReturn
+    own_return: EngineOutReturn
     altitudes_left: tuple[float, ...]
     flat_altitude_left: float
     flat_position: tuple[float, float, float]
@@ -151,7 +151,7 @@ class Glides:
     @property
     def arrivals(self) -> int:
         """Number of ArduPlane's own returns that arrive."""
-        return sum(glide.own.end == "arrives" for glide in self.each)
+        return sum(glide.own_return.end == "arrives" for glide in self.each)
 
     @property
     def always_reaches_ground(self) -> bool | None:
@@ -170,7 +170,9 @@ class Glides:
     def ranges(self) -> tuple[GlideRange, ...]:
         """All glides in time ranges, by time."""
         ranges = []
-        for (site, *_), group in groupby(self.each, lambda glide: (self.best_site(glide), glide.reach, glide.own.end)):
+        for (site, *_), group in groupby(
+            self.each, lambda glide: (self.best_site(glide), glide.reach, glide.own_return.end)
+        ):
             group_glides = list(group)
             ranges.append(
                 GlideRange(
@@ -239,7 +241,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     each = []
     for k, row in enumerate(rows):
         site_altitudes_left = tuple(float(altitudes[k]) for altitudes in altitudes_left)
-        flat_place = cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NOWHERE
+        flat_place = cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NO_POSITION
         start = (float(row["east"]), float(row["north"]), float(row["up"]))
         reach = _best_reach(site_altitudes_left, float(flat_altitudes_left[k])) if is_known[k] else "unknown"
         each.append(
@@ -295,7 +297,7 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
     """
     targets = [world.target(row) for row in starts.rows]
     if "terrain" in world.unjudged_parts:
-        return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NOWHERE, math.nan) for target in targets]
+        return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
     radius = ArduPlane(world.parameters).return_rules.radius
     return_circles = [
         None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
@@ -317,7 +319,7 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
 
 def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:
     clearance = float(result["clearance_before"])
-    arrival_height, shortfall, impact = math.nan, math.nan, _NOWHERE
+    arrival_height, shortfall, impact = math.nan, math.nan, _NO_POSITION
     if result["ended"] == RETURN_ARRIVED and world.scenario.terrain is not None:
         arrival_height = float(result["circle_up"] - world.scenario.terrain.height(*target.position[:2]))
     if result["ended"] == RETURN_GROUND_IMPACT:

@@ -67,7 +67,7 @@ Ending = Literal["circle", "on to land", "straight to land"]
 # Reasons that leave returns undecided, whatever their simulation shows: they follow the terrain; the autopilot has
 # another control law; mode AUTOLAND lands by a pattern of its own; they follow the mission's return path (RTL_AUTOLAND
 # 4); or the landing sequence begins with the landing itself.
-Open = Literal["terrain", "law", "autoland", "return path", "landing"]
+UnjudgedPart = Literal["terrain", "law", "autoland", "return path", "landing"]
 
 # Distance to a limit within which the point mass could be wrong, m: it is within 7 m of 38 flights of ArduPlane.
 POINT_MASS_ERROR_M = 10.0
@@ -142,7 +142,7 @@ class ReturnRange:
 
 # Point of no return by energy: none; after some place; before the first place; or unknown, because the battery or the
 # energy used is unknown, because the aircraft's power is too uncertain, or because no return arrives.
-NoReturn = Literal["never", "later", "at once", "battery", "used", "power", "arrives"]
+NoReturnKind = Literal["never", "later", "at once", "battery", "used", "power", "arrives"]
 
 
 class PointOfNoReturn(NamedTuple):
@@ -154,7 +154,7 @@ class PointOfNoReturn(NamedTuple):
     skipped: number of earlier returns that do not arrive, so that their energy is unknown.
     """
 
-    kind: NoReturn
+    kind: NoReturnKind
     time: float = math.nan
     left: float = math.nan
     skipped: int = 0
@@ -188,7 +188,7 @@ class Returns:
     flown: bool
     jsbsim_differences: tuple[float, ...] = ()
     stands_in: bool = False
-    unjudged_parts: tuple[Open, ...] = ()
+    unjudged_parts: tuple[UnjudgedPart, ...] = ()
     autoland: int | None = None
     landings: tuple[LandingStart, ...] = ()
     omitted_count: int = 0
@@ -332,9 +332,9 @@ class ReturnWorld:
         return (self.ending, "straight to land") if has_landing else (self.ending,)
 
     @property
-    def unjudged_parts(self) -> tuple[Open, ...]:
+    def unjudged_parts(self) -> tuple[UnjudgedPart, ...]:
         """Parts of the returns that cannot be judged."""
-        reasons: dict[Open, bool] = {
+        reasons: dict[UnjudgedPart, bool] = {
             "terrain": self.parameters.rtl_follows_terrain,
             "law": self.has_other_law,
             "autoland": any(cause.does == "autoland" for cause in self.causes),
@@ -623,8 +623,8 @@ def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
     moves["length"], moves["climb"], moves["lasts"] = lengths, steps[:, 2], 1.0
     moves["time"] = np.arange(len(steps))
     visits = path_zones(moves, world.airspace.records, world.scenario.terrain)
-    deepest = int(np.argmax(visits["depth"]))
-    return deepest if visits[deepest]["depth"] > 0.0 else -1
+    zone = int(np.argmax(visits["depth"]))
+    return zone if visits[zone]["depth"] > 0.0 else -1
 
 
 # ----------------------------------------------------------------------

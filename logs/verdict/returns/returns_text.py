@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from flight.autopilots.arduplane.failsafes import Cause
 from flight.mission.return_path import ReturnPlace
-from logs.verdict.returns.judge_returns import KINDS, Kind, Open, ReturnRange, Returns, SimulatedReturn
+from logs.verdict.returns.judge_returns import KINDS, Kind, ReturnRange, Returns, SimulatedReturn, UnjudgedPart
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
@@ -60,7 +60,7 @@ _ACTION_TEXTS = {
     "landed": "has landed",
     "never": "set, but no threshold triggers it",
 }
-_OPEN_TEXTS: dict[Open, str] = {
+_UNJUDGED_PART_TEXTS: dict[UnjudgedPart, str] = {
     "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
     "law": "the autopilot's own return is not simulated; ArduPlane's return stands in",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
@@ -121,7 +121,7 @@ def headline(returns: Returns) -> str:
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
     'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
-    reasons = "; ".join(_OPEN_TEXTS[reason] for reason in returns.unjudged_parts)
+    reasons = "; ".join(_UNJUDGED_PART_TEXTS[reason] for reason in returns.unjudged_parts)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no place to return from"
     landing = "; the landing is not judged" if returns.lands else ""

@@ -84,12 +84,12 @@ class _ReturnLimits:
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
     """Return the limits plus a margin, or each start's own values less the turn's height loss if they are smaller."""
     rows = starts.rows
-    outside = np.full(len(starts), math.inf)
+    sphere_distances = np.full(len(starts), math.inf)
     start_heights = np.nan_to_num(heights_above_ground(world, starts), nan=math.inf)
     positions = np.stack([rows["east"], rows["north"], rows["up"]], axis=1)
     for center, radius in zip(world.environment.spheres, world.environment.radii, strict=True):
         if radius > 0.0:
-            outside = np.minimum(outside, np.linalg.norm(positions - center, axis=1) - radius)
+            sphere_distances = np.minimum(sphere_distances, np.linalg.norm(positions - center, axis=1) - radius)
     min_heights = required_heights(world, starts)
     return _ReturnLimits(
         np.where(
@@ -97,46 +97,48 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
             min_heights,
             np.minimum(world.limit + margin, np.maximum(min_heights, start_heights - TURN_HEIGHT_LOSS_M)),
         ),
-        np.minimum(margin, np.maximum(0.0, outside - TURN_HEIGHT_LOSS_M)),
+        np.minimum(margin, np.maximum(0.0, sphere_distances - TURN_HEIGHT_LOSS_M)),
     )
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
     """Flag each RTL return that keeps within the limits, without margin, by only the point-mass simulation, (n,)."""
-    return _returns_meeting(world, starts, _return_limits(world, starts, 0.0), _meets_all)
+    return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all)
 
 
-def _clears_ground(_world: ReturnWorld, results: Records, needs: _ReturnLimits) -> Flags:
+def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
     """Flag each return that stays above its required height above ground, and arrives, (n,)."""
-    return np.asarray((results["ended"] == RETURN_ARRIVED) & (results["clearance"] >= needs.clearance))
+    return np.asarray((results["ended"] == RETURN_ARRIVED) & (results["clearance"] >= limits.clearance))
 
 
-def _meets_all(world: ReturnWorld, results: Records, needs: _ReturnLimits) -> Flags:
+def _meets_all(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
     """Flag each return that stays above its required height, arrives, and stays outside spheres, (n,).
 
-    `_targets_meeting` checks zones and energy.
+    `_meets_criterion` checks zones and energy.
     """
-    return np.asarray(_clears_ground(world, results, needs) & (results["outside"] >= needs.sphere_distance))
+    return np.asarray(_clears_ground(world, results, limits) & (results["outside"] >= limits.sphere_distance))
 
 
 Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 
 
-def _returns_meeting(world: ReturnWorld, starts: ReturnStarts, needs: _ReturnLimits, criterion: Criterion) -> Flags:
+def _rtls_meet_criterion(
+    world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, criterion: Criterion
+) -> Flags:
     """Flag each return that meets the requirements, (n,); with `_meets_all`, check zones and energy too."""
-    return _targets_meeting(world, starts, [world.target(row) for row in starts.rows], needs, criterion)
+    return _meets_criterion(world, starts, [world.target(row) for row in starts.rows], limits, criterion)
 
 
-def _targets_meeting(
+def _meets_criterion(
     world: ReturnWorld,
     starts: ReturnStarts,
     targets: Sequence[ReturnTarget],
-    needs: _ReturnLimits,
+    limits: _ReturnLimits,
     criterion: Criterion,
 ) -> Flags:
-    outside = needs.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
-    results, paths = fly_home(world, starts, targets, (needs.clearance, outside))
-    is_met = criterion(world, results, needs)
+    sphere_distances = limits.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
+    results, paths = fly_home(world, starts, targets, (limits.clearance, sphere_distances))
+    is_met = criterion(world, results, limits)
     if criterion is not _meets_all:
         return is_met
     if world.setup.envelope.power_level.size and world.is_battery_known:
@@ -150,15 +152,15 @@ def _targets_meeting(
 class _ReturnTrial:
     """Trial of a world from all starts, beginning with the starts that failed before."""
 
-    def __init__(self, starts: ReturnStarts, needs: _ReturnLimits) -> None:
-        self._starts, self._needs = starts, needs
+    def __init__(self, starts: ReturnStarts, limits: _ReturnLimits) -> None:
+        self._starts, self._limits = starts, limits
         self._order = list(range(len(starts)))[::-1]
 
     def passes(self, world: ReturnWorld, criterion: Criterion) -> bool:
         """Return True if every return meets the requirements."""
         for position, k in enumerate(self._order):
             index = np.array([k])
-            if not _returns_meeting(world, self._starts.subset(index), self._needs.subset(index), criterion)[0]:
+            if not _rtls_meet_criterion(world, self._starts.subset(index), self._limits.subset(index), criterion)[0]:
                 self._order.insert(0, self._order.pop(position))
                 return False
         return True
@@ -169,8 +171,8 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 
     Altitudes are tried one by one, because a higher altitude may lead through a sphere and so be less safe.
     """
-    needs = _return_limits(world, starts)
-    trial = _ReturnTrial(starts, needs)
+    limits = _return_limits(world, starts)
+    trial = _ReturnTrial(starts, limits)
     if trial.passes(world, _meets_all):
         return []
     remedies = []
@@ -250,9 +252,9 @@ def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | N
 
     Add points greedily, given the autopilot's own choice between them, then swap points, then remove superfluous ones.
     """
-    needs, start_count = _return_limits(world, starts), len(starts)
+    limits, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
-    home_is_good = _returns_meeting(world.with_rally(()), starts, needs, _meets_all)
+    home_is_good = _rtls_meet_criterion(world.with_rally(()), starts, limits, _meets_all)
     if home_is_good.all() or not start_count or world.ending == "straight to land":
         return None
     searched_starts = np.unique(np.linspace(0, start_count - 1, min(start_count, _MAX_STARTS)).round().astype(int))
@@ -261,9 +263,9 @@ def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | N
     for _ in range(_GRIDS):
         if not candidates:
             break
-        search = _RallySearch(world, starts, needs, candidates, home_is_good)
+        search = _RallySearch(world, starts, limits, candidates, home_is_good)
         good_count, points, unsafe_starts = _search_in_rounds(
-            search, world, starts, needs, searched_starts, len(best_set[1])
+            search, world, starts, limits, searched_starts, len(best_set[1])
         )
         best_set = max(best_set, (good_count, points), key=lambda result: (result[0], -len(result[1])))
         if not unsafe_starts.size:
@@ -282,7 +284,7 @@ def _search_in_rounds(
     search: "_RallySearch",
     world: ReturnWorld,
     starts: ReturnStarts,
-    needs: _ReturnLimits,
+    limits: _ReturnLimits,
     searched_starts: NDArray[np.intp],
     initial_count: int,
 ) -> tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]]:
@@ -296,7 +298,7 @@ def _search_in_rounds(
         points = tuple(
             search.places[candidate] for candidate in search.find(searched_starts, list(range(initial_count)))
         )
-        is_good = _returns_meeting(world.with_rally(points), starts, needs, _meets_all)
+        is_good = _rtls_meet_criterion(world.with_rally(points), starts, limits, _meets_all)
         unsafe_starts = np.flatnonzero(~is_good)
         if int(is_good.sum()) > best_result[0]:
             best_result = int(is_good.sum()), points, unsafe_starts
@@ -367,9 +369,9 @@ class _RallySearch:
     """
 
     def __init__(
-        self, world: ReturnWorld, starts: ReturnStarts, needs: _ReturnLimits, places: list[ReturnPlace], home: Flags
+        self, world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, places: list[ReturnPlace], home: Flags
     ) -> None:
-        self._world, self._starts, self._needs, self.places, self._home = world, starts, needs, places, home
+        self._world, self._starts, self._limits, self.places, self._home = world, starts, limits, places, home
         positions = np.array([(place.east, place.north) for place in places])
         rows = starts.rows
         self._distances = np.hypot(
@@ -419,9 +421,9 @@ class _RallySearch:
         targets = [
             self._world.with_landing(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in candidate_places
         ]
-        starts, needs = self._starts.subset(start_indices), self._needs.subset(start_indices)
-        self._is_good[start_indices, candidate_indices] = _targets_meeting(
-            self._world, starts, targets, needs, _meets_all
+        starts, limits = self._starts.subset(start_indices), self._limits.subset(start_indices)
+        self._is_good[start_indices, candidate_indices] = _meets_criterion(
+            self._world, starts, targets, limits, _meets_all
         )
 
     def _count_good(self, searched: NDArray[np.intp], point_set: list[int]) -> int:

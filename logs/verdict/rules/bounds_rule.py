@@ -74,7 +74,7 @@ RULE = Rule(
     name="bounds",
     tolerances=("ROUNDING_M",),
     judge=bounds_findings,
-    whole=True,
+    judges_whole_flight=True,
     suggest=suggest_staying_inside,
     log=LogNeeds(("heights",)),
 )

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flight.mission.items import OVER_HOME, Command
-from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -81,7 +81,7 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
         brief, ", and no terrain data confirms that the ground there is so low (--terrain names an elevation file)"
     )
     lowest_waypoint = requirements.waypoint(k)
-    return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
+    return [make_finding("clearance", lowest_waypoint, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
 
 
 def _home_above_ground_findings(
@@ -112,7 +112,7 @@ def _home_above_ground_findings(
         f": an autopilot that is armed on that ground flies lower by as much, down to {min_height:.0f} m above ground"
     )
     fault = message(brief, explanation)
-    return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_WAY)]
+    return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
 
 
 class _Requirement(NamedTuple):
@@ -272,7 +272,7 @@ def _flown_clearance(
         terrain = requirements.setup.scenario.terrain
         reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)
     if is_planned_short:
-        reason += f"; the planned path comes down to {planned_height:.1f} m"
+        reason += f"; the planned path descends to {planned_height:.1f} m"
     return make_finding(
         "clearance",
         requirements.leg(leg),

@@ -30,36 +30,40 @@ def corridor_findings(
 
 def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     limit, source = corridor_limit(requirements, leg)
-    planned, flown, ok = float(corner_depths(requirements)[leg : leg + 2].max()), math.nan, None
+    planned_distance, flown_distance, ok = float(corner_depths(requirements)[leg : leg + 2].max()), math.nan, None
     faults, facts = [], []
     if geometric:
-        ok = planned <= limit + ROUNDING_M
-        facts.append(f"its turns are planned within {planned:.1f} m of the legs")
+        ok = planned_distance <= limit + ROUNDING_M
+        facts.append(f"its turns are planned within {planned_distance:.1f} m of the legs")
         if not ok:
-            faults.append(message(f"its turns lead {planned:.0f} m off the legs", f"; the corridor is {limit:.0f} m"))
+            faults.append(
+                message(f"its turns lead {planned_distance:.0f} m off the legs", f"; the corridor is {limit:.0f} m")
+            )
     elif aligned is None or not aligned.has_flown(leg):
         facts.append("the leg was not flown")
     else:
         rows = _rows_after_takeoff(requirements, aligned, leg, limit)
         nearby_legs = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
-        flown, row = farthest_from_legs(aligned.track.position[rows], requirements.points[nearby_legs])
-        ok = flown <= limit
+        flown_distance, row = farthest_from_legs(aligned.track.position[rows], requirements.points[nearby_legs])
+        ok = flown_distance <= limit
         time_and_place = _time_and_place_text(aligned, rows.start + row)
-        facts.append(f"within {flown:.1f} m of the legs, the farthest {time_and_place}")
+        facts.append(f"within {flown_distance:.1f} m of the legs, the farthest {time_and_place}")
         if not ok:
-            faults.append(message(f"{flown:.0f} m off the legs {time_and_place}", f"; the corridor is {limit:.0f} m"))
+            faults.append(
+                message(f"{flown_distance:.0f} m off the legs {time_and_place}", f"; the corridor is {limit:.0f} m")
+            )
     return make_finding(
         "corridor",
         requirements.leg(leg),
         ok=ok,
         reason=finding_reason(faults) if faults else finding_reason([], facts),
         faults=faults,
-        planned=planned,
-        flown=flown,
+        planned=planned_distance,
+        flown=flown_distance,
         limit=limit,
         source=source,
         tolerance=ROUNDING_M if geometric else 0.0,
-        margin=limit - (planned if geometric else flown),
+        margin=limit - (planned_distance if geometric else flown_distance),
         unit="m",
         method="the turns' own arcs" if geometric else "greatest distance from the leg and its neighbours, each row",
     )

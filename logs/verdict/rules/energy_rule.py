@@ -142,7 +142,7 @@ RULE = Rule(
     name="energy",
     tolerances=("ENERGY_RESERVE_FRACTION", "UNDECIDED_FRACTION"),
     judge=energy_findings,
-    whole=True,
+    judges_whole_flight=True,
     suggest=suggest_using_less_energy,
-    log=LogNeeds(("battery",), aircraft=True),
+    log=LogNeeds(("battery",), needs_aircraft=True),
 )

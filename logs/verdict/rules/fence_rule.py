@@ -90,10 +90,12 @@ def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) ->
     return [_zone_finding(requirements, int(numbers[k]), planned[k], None) for k in touched_indices.tolist()]
 
 
-def _compliance_finding(requirements: RouteRequirements, planned: Records, flown: Records | None) -> Finding:
+def _compliance_finding(
+    requirements: RouteRequirements, planned_visits: Records, flown_visits: Records | None
+) -> Finding:
     """Report that no judged zone is violated."""
     airspace, corridor = requirements.airspace, requirements.setup.corridor
-    count, visits = len(airspace.zones), planned if flown is None else flown
+    count, visits = len(airspace.zones), planned_visits if flown_visits is None else flown_visits
     nearest_zone = int(visits["depth"].argmax())
     margin = -float(visits[nearest_zone].depth)
     reason = f"none of {count} zones is violated" if count > 1 else "the zone is not violated"
@@ -111,8 +113,8 @@ def _compliance_finding(requirements: RouteRequirements, planned: Records, flown
         FLIGHT,
         ok=True,
         reason=reason,
-        planned=max(0.0, float(planned["depth"].max())),
-        flown=None if flown is None else max(0.0, float(flown["depth"].max())),
+        planned=max(0.0, float(planned_visits["depth"].max())),
+        flown=None if flown_visits is None else max(0.0, float(flown_visits["depth"].max())),
         limit=0.0,
         source="zones",
         tolerance=ROUNDING_M,

@@ -22,7 +22,7 @@ from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
 from flight.mission.placing import home_place, landing_sequence, landing_starts
 from flight.mission.return_path import LandingStart
-from logs.verdict.findings import GROUND_WAY, Fact, Finding, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Fact, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -154,7 +154,7 @@ def go_around_findings(
     A go-around that is too low is a warning.  If the scenario requires go-arounds, it fails, and an unjudged go-around
     leaves the verdict undecided.
     """
-    requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole
+    requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
     setup = requirements.setup
     returns, terrain, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
     is_required = returns is not None and "go_around" in returns.require
@@ -172,7 +172,7 @@ def go_around_findings(
         "a go-around is not judged",
         ": this requires the simulated ArduPlane, a home, terrain data and a glide to the landing point",
     )
-    return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_WAY)]
+    return [make_finding("go_around", FLIGHT, ok=None, reason=reason.text, faults=[reason], check=GROUND_PATH)]
 
 
 def _find_landing(
@@ -267,7 +267,7 @@ def _go_around_finding(
     if worst is None or (unknown_text and worst.is_free):
         unknown_text = unknown_text or "its glide is below the ground, or the terrain below it is unknown"
         unjudged = message("a go-around is not judged", f": {climb_text}; {unknown_text}")
-        check = GROUND_WAY if is_required else ""
+        check = GROUND_PATH if is_required else ""
         return make_finding(
             "go_around", place, ok=None, reason=unjudged.text, faults=[unjudged], unit="m", check=check, facts=[climb]
         )
@@ -417,9 +417,11 @@ def _judge_go_around(
     return_heights = np.where(np.isnan(heights[rows:]), math.inf, heights[rows:])
     if not return_heights.size:
         return go_around._replace(min_climb_height=climb)
-    lowest = int(np.argmin(return_heights - required))
+    lowest_row = int(np.argmin(return_heights - required))
     return go_around._replace(
-        min_climb_height=climb, lowest_height=float(return_heights[lowest]), required_height=float(required[lowest])
+        min_climb_height=climb,
+        lowest_height=float(return_heights[lowest_row]),
+        required_height=float(required[lowest_row]),
     )
 
 
@@ -499,7 +501,7 @@ def _outcome_text(worst: _GoAround) -> str:
     elif worst.is_lost:
         outcome = "does not return to the line-up"
     else:
-        outcome = f"comes down to {worst.lowest_height:.0f} m above ground on the way back"
+        outcome = f"descends to {worst.lowest_height:.0f} m above ground on the way back"
     return f"{abort_text}{turn_text} and {outcome}" if turn_text else f"{abort_text} {outcome}"
 
 
@@ -513,5 +515,5 @@ RULE = Rule(
         "MIN_LEG_LENGTH_M",
     ),
     judge=go_around_findings,
-    of_route=True,
+    is_same_for_plan=True,
 )

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 from flight.mission.items import Command
 from flight.mission.placing import SAME_PLACE
-from logs.verdict.findings import GROUND_WAY, Finding, Message, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import (
@@ -162,7 +162,7 @@ def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: boo
     title = "climb-out" if rule == "climbout" else rule
     fault = message(f"the {title} at {place_text(place)} is not judged: {reason}")
     return make_finding(
-        rule, place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY if is_undecided else ""
+        rule, place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_PATH if is_undecided else ""
     )
 
 
@@ -253,7 +253,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
         )
     else:
         fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
-        return _path_finding("climbout", place, obstacles, None, fault, GROUND_WAY)
+        return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
 
@@ -285,7 +285,7 @@ def _launch_finding(
         other_courses_text = _free_courses_text(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other_courses_text)
         return _path_finding(
-            "climbout", place, obstacles, False if is_known else None, fault, "" if is_known else GROUND_WAY
+            "climbout", place, obstacles, False if is_known else None, fault, "" if is_known else GROUND_PATH
         )
     min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
     if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered_hazard:
@@ -299,7 +299,7 @@ def _launch_finding(
             obstacles,
             None,
             obstacles_at_min_climb.obstacle_message(min_climb_text, "from home"),
-            GROUND_WAY,
+            GROUND_PATH,
         )
     return _path_finding(
         "climbout",
@@ -407,12 +407,12 @@ def approach_findings(
             f"the landing point of {item_text} is {ground_altitude - point_altitude:.0f} m below the ground",
             f": {obstacle_message.text}",
         )
-        return [_path_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+        return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
     if point_altitude - ground_altitude > LANDING_POINT_ERROR_M:
         fault = message(
             f"the landing point of {item_text} is {point_altitude - ground_altitude:.0f} m above the ground"
         )
-        return [_path_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+        return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
     judged_end = length - glide.flare_distance - max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
     clearance = min_path_clearance(terrain, path.between(0.0, judged_end))[0] if judged_end > 0.0 else math.inf
     if clearance < GLIDE_PATH_TOLERANCE_M:
@@ -420,7 +420,7 @@ def approach_findings(
             f"{subject} clears the ground by only {clearance:.1f} m",
             f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than laid out",
         )
-        return [_path_finding("approach", place, obstacles, None, fault, GROUND_WAY)]
+        return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
     reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"
     if glide.flare_distance > 0.0:
         reason += (

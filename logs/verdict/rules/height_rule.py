@@ -149,7 +149,7 @@ def _leg_finding(
         and planned_maximum is not judged_maximum
         and planned_maximum.height > limit + HEIGHT_TOLERANCE_M
     ):
-        facts.append(f"the planned path comes up to {planned_maximum.height:.1f} m")
+        facts.append(f"the planned path rises to {planned_maximum.height:.1f} m")
     return make_finding(
         "height",
         requirements.leg(leg),
@@ -172,5 +172,5 @@ RULE = Rule(
     tolerances=("HEIGHT_TOLERANCE_M",),
     judge=height_findings,
     suggest=suggest_flying_lower,
-    log=LogNeeds(("heights",), planned_heights=True),
+    log=LogNeeds(("heights",), needs_planned_heights=True),
 )

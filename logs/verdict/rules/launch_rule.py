@@ -12,7 +12,7 @@ import numpy as np
 
 from flight.mission.ground_ways import TakeOff
 from flight.simulation.track import Track
-from logs.verdict.findings import GROUND_WAY, Fact, Finding, finding_reason, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Fact, Finding, finding_reason, make_finding, message
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.ways import GroundPath, first_hazard_on_path, min_path_clearance, track_path
@@ -88,7 +88,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         margin=clearance - LAUNCH_CLEARANCE_M,
         unit="m",
         method="exact along the flown track",
-        check=GROUND_WAY if undecided_messages else "",
+        check=GROUND_PATH if undecided_messages else "",
         facts=(Fact("height lost", height_lost, "m"), Fact("runway left", runway_left, "m")),
     )
 

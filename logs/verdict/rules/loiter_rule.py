@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flight.mission.itinerary import loiter_of
-from logs.verdict.findings import UNKNOWN_WAY, Finding, Message, badness, finding_reason, make_finding, message
+from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, badness, finding_reason, make_finding, message
 from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
@@ -36,14 +36,14 @@ class LoiterCircle:
     first, last: waypoints of the first and last corner; neither is an end of the route.
     center: center, m, (2,).
     radius: m.
-    turns: number of laps.
+    laps: number of laps.
     """
 
     first: int
     last: int
     center: Floats
     radius: float
-    turns: float
+    laps: float
 
 
 def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
@@ -57,13 +57,15 @@ def loiter_circles(requirements: RouteRequirements) -> list[LoiterCircle]:
             last += 1
         if arcs[i] > 0.0:
             angle = float(np.abs(requirements.turns[i : last + 1]).sum())
-            loiters.append(LoiterCircle(i, last, _center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
+            loiters.append(
+                LoiterCircle(i, last, _circle_center(requirements, i), float(arcs[i]), angle / (2.0 * math.pi))
+            )
             i = last
         i += 1
     return loiters
 
 
-def _center(requirements: RouteRequirements, i: int) -> Floats:
+def _circle_center(requirements: RouteRequirements, i: int) -> Floats:
     """Return the center of the circle to which the arc of corner `i` belongs, m, (2,)."""
     ux, uy = requirements.leg_unit(i - 1)
     turn_sign = math.copysign(1.0, requirements.turns[i])
@@ -106,7 +108,7 @@ def merge_loiter_findings(
             merged[k] = None
         if corner_findings:
             merged[corner_findings[0][0]] = _loiter_finding(
-                requirements, aligned, circle, [item for _, item in corner_findings]
+                requirements, aligned, circle, [finding for _, finding in corner_findings]
             )
         legs = [requirements.leg(leg) for leg in range(circle.first, circle.last)]
         for rule in ("slope", "speed", "clearance", "corridor"):
@@ -122,7 +124,7 @@ def merge_loiter_findings(
                     merged[k] = None
                 reason = f"{worst.reason}; the worst of the circle's {len(rule_findings)} legs"
                 merged[worst_index] = replace(worst, reason=reason)
-    return tuple(item for item in merged if item is not None)
+    return tuple(finding for finding in merged if finding is not None)
 
 
 def end_findings(
@@ -146,7 +148,7 @@ def end_findings(
             ok=None if descriptions else True,
             reason=reason,
             method="the area that its circles may reach, at the height of the last waypoint",
-            check=UNKNOWN_WAY if descriptions else "",
+            check=UNKNOWN_PATH if descriptions else "",
         )
     ]
 
@@ -154,32 +156,37 @@ def end_findings(
 def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
-    inner = slice(circle.first, circle.last + 1)
-    is_known = bool(np.isfinite(requirements.turn_limit[inner]).all())
-    min_radius = float(requirements.min_radius[inner].max()) if is_known else math.nan
+    corners = slice(circle.first, circle.last + 1)
+    is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
+    min_radius = float(requirements.min_radius[corners].max()) if is_known else math.nan
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
     joins_at_center = requirements.setup.autopilot.loiter_rules.at_middle
     uses_parameter = _uses_parameter_radius(requirements, circle)
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
         failed_corners = []
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
-    facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
-    open_text, name = "", requirements.setup.autopilot.loiter_rules.radius_name
+    facts = [f"{circle.laps:.2f} turns with {circle.radius:.0f} m"]
+    hazards_text, parameter_name = "", requirements.setup.autopilot.loiter_rules.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
-            facts.append(f"{name} is smaller than the {min_radius:.0f} m that the bank limit allows: flown wider")
+            facts.append(
+                f"{parameter_name} is smaller than the {min_radius:.0f} m that the bank limit allows: flown wider"
+            )
             faults = []
-            open_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
+            hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
         else:
-            facts.append(f"{name}, held with {math.degrees(bank):.0f}° of bank")
+            facts.append(f"{parameter_name}, held with {math.degrees(bank):.0f}° of bank")
     if aligned is not None and failed_corners:
         faults.append(_unheld_corners_message(circle, failed_corners))
     elif failed_corners and not faults:
-        first = failed_corners[0]
-        text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
-        faults.append(Message(text, _corner_text(first.place), placed))
+        first_corner = failed_corners[0]
+        reason_text, placed = (
+            f"{place_text(first_corner.place)}: {first_corner.reason}",
+            first_corner.place == requirements.waypoint(circle.first),
+        )
+        faults.append(Message(reason_text, _corner_text(first_corner.place), placed))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
     if radii.size:
@@ -187,7 +194,7 @@ def _loiter_finding(
         if (
             joins_at_center
             and not uses_parameter
-            and circle.turns >= 1.0
+            and circle.laps >= 1.0
             and mean_radius > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
         ):
             faults.append(message(f"flown with {mean_radius:.0f} m where {circle.radius:.0f} m is required"))
@@ -195,9 +202,9 @@ def _loiter_finding(
     if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
         facts.append("the flight did not reach its end")
-    if ok and open_text:
+    if ok and hazards_text:
         ok = None
-        facts.append(open_text)
+        facts.append(hazards_text)
     return make_finding(
         "loiter",
         requirements.waypoint(circle.first),
@@ -213,7 +220,7 @@ def _loiter_finding(
         margin=circle.radius - min_radius,
         unit="m",
         method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
-        check=UNKNOWN_WAY if ok is None and open_text else "",
+        check=UNKNOWN_PATH if ok is None and hazards_text else "",
     )
 
 
@@ -315,5 +322,5 @@ RULE = Rule(
     ),
     judge=end_findings,
     merge=merge_loiter_findings,
-    log=LogNeeds(aircraft=True),
+    log=LogNeeds(needs_aircraft=True),
 )

@@ -356,7 +356,11 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     k = int(np.argmax(distances))
     if distances[k] > PX4_WAYPOINT_SPACING_M:
         reason = f"{distances[k]:.0f} m between waypoints; PX4 releases with MIS_DIST_WPS refuse more than"
-        yield True, flown_items[k + 1].seq, f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, today's have no limit"
+        yield (
+            True,
+            flown_items[k + 1].seq,
+            f"{reason} {PX4_WAYPOINT_SPACING_M:.0f} m by default, newer ones have no limit",
+        )
 
 
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:

@@ -53,11 +53,11 @@ def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         limit = max(limit, LEVEL_SLOPE_RAD)
     faults, facts = [], [f"slope {math.degrees(planned_slope):+.2f}°"]
     if abs(planned_slope) > limit + PLAN_TOLERANCE_RAD:
-        rise = step_height(requirements, leg)
-        if rise is None:
+        step = step_height(requirements, leg)
+        if step is None:
             faults.append(_steep_leg_message(requirements, leg, limit, source))
         else:
-            facts.append(f"a step of {rise:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
+            facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
     faults += _steep_arc_faults(requirements, leg)
     fit: LegFit | None = None
     method = "route"
@@ -342,5 +342,5 @@ RULE = Rule(
     ),
     judge=slope_findings,
     suggest=suggest_gentler_slope,
-    log=LogNeeds(("heights",), planned_heights=True, aircraft=True, full_leg=True),
+    log=LogNeeds(("heights",), needs_planned_heights=True, needs_aircraft=True, needs_full_leg=True),
 )

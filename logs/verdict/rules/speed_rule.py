@@ -67,36 +67,38 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
     margin = min(commanded - min_speed, max_speed - commanded)
     at_least = commanded - min_speed <= max_speed - commanded
     limit = min_speed if at_least else max_speed
-    mean, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
+    mean_speed, tolerance, facts, source = math.nan, 0.0, [], "aircraft"
     is_unflown = not geometric and (aligned is None or not aligned.has_flown(leg))
     if is_unflown:
         notes.append("the leg was not flown")
     elif aligned is not None:
         measurement = _measure_airspeed(requirements, aligned, leg)
         if measurement is None:
-            mean = _nearest_mean(aligned, leg, commanded)
-            notes.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
+            mean_speed = _nearest_mean(aligned, leg, commanded)
+            notes.append(f"{mean_speed:.1f} m/s reached; the leg is too short to hold it")
         else:
-            mean, tolerance, min_mean = measurement
-            error = abs(mean - commanded)
-            notes.append(f"flown {mean:.2f} m/s on average, {min_mean:.1f} m/s at the slowest second")
+            mean_speed, tolerance, min_mean = measurement
+            error = abs(mean_speed - commanded)
+            notes.append(f"flown {mean_speed:.2f} m/s on average, {min_mean:.1f} m/s at the slowest second")
             if error > MEAN_SPEED_TOLERANCE_MPS + tolerance and not _is_caused_by_air(
-                requirements, aligned, leg, mean - commanded
+                requirements, aligned, leg, mean_speed - commanded
             ):
-                text = f"flown {mean:.1f} m/s on average, {error:.1f} m/s off the commanded {commanded:.1f} m/s"
-                notes += [text] if requirements.envelope else []
-                faults += [] if requirements.envelope else [message(text)]
+                error_text = (
+                    f"flown {mean_speed:.1f} m/s on average, {error:.1f} m/s off the commanded {commanded:.1f} m/s"
+                )
+                notes += [error_text] if requirements.envelope else []
+                faults += [] if requirements.envelope else [message(error_text)]
             flown_command = _flown_command(requirements, leg)
             if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, flown_command)):
                 # From here on the flown speed is judged by the command, instead of the command by the envelope.
-                mean, allowed_error, source = held_speed.speed, held_speed.allowed_error, "mission"
+                mean_speed, allowed_error, source = held_speed.speed, held_speed.allowed_error, "mission"
                 limit, at_least = (
-                    flown_command + math.copysign(allowed_error, mean - flown_command),
-                    mean < flown_command,
+                    flown_command + math.copysign(allowed_error, mean_speed - flown_command),
+                    mean_speed < flown_command,
                 )
-                margin, tolerance = allowed_error - abs(mean - flown_command), held_speed.tolerance
-                faults.append(message(f"{mean:.1f} m/s held of the commanded {flown_command:.1f} m/s"))
-        facts.append(Fact("speed error", mean - commanded, "m/s"))
+                margin, tolerance = allowed_error - abs(mean_speed - flown_command), held_speed.tolerance
+                faults.append(message(f"{mean_speed:.1f} m/s held of the commanded {flown_command:.1f} m/s"))
+        facts.append(Fact("speed error", mean_speed - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
     if not faults and (uncertainty := _uncertainty_text(requirements, leg, commanded, max_speed)):
@@ -109,7 +111,7 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         reason=finding_reason(faults, notes),
         faults=faults,
         planned=commanded,
-        flown=mean,
+        flown=mean_speed,
         limit=limit,
         at_least=at_least,
         source=source,
@@ -330,5 +332,5 @@ RULE = Rule(
     ),
     judge=speed_findings,
     suggest=suggest_level_flight_speed,
-    log=LogNeeds(("airspeed",), aircraft=True, full_leg=True),
+    log=LogNeeds(("airspeed",), needs_aircraft=True, needs_full_leg=True),
 )

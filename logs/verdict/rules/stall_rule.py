@@ -132,12 +132,12 @@ def _window_means(values: NDArray[np.floating], width: int) -> Floats:
     return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
-def _stall_finding(margin: _Margin, where: str, tolerance: float, *, geometric: bool) -> Finding:
-    stall = (
-        f"{margin.speed:.1f} m/s {where}, stall {margin.stall_speed:.1f} m/s in"
+def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *, geometric: bool) -> Finding:
+    stall_text = (
+        f"{margin.speed:.1f} m/s {time_or_place_text}, stall {margin.stall_speed:.1f} m/s in"
         f" {math.degrees(margin.bank):.0f}° of bank"
     )
-    fault = message(stall, f" (level {margin.level_stall_speed:.1f} m/s; true airspeeds)")
+    fault = message(stall_text, f" (level {margin.level_stall_speed:.1f} m/s; true airspeeds)")
     return make_finding(
         "stall",
         FLIGHT,
@@ -160,7 +160,7 @@ RULE = Rule(
     name="stall",
     tolerances=("STALL_AVERAGING_TIME_S", "STALL_TOLERANCE_MPS", "GUST_SPEED_FRACTION"),
     judge=stall_findings,
-    whole=True,
+    judges_whole_flight=True,
     suggest=suggest_flying_faster,
-    log=LogNeeds(("airspeed", "attitude"), aircraft=True, listed=True),
+    log=LogNeeds(("airspeed", "attitude"), needs_aircraft=True, reports_missing=True),
 )

@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from flight.mission.surveys import PhotoLine, Survey
-from logs.verdict.findings import UNKNOWN_WAY, Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.findings import UNKNOWN_PATH, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.circle_reach import find_hazards
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure, measure_line, measure_overlap
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
@@ -135,7 +135,7 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
                 "flight shows whether it is safe"
             )
             place, method = requirements.leg(first), "its surroundings"
-            findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_WAY, method=method))
+            findings.append(make_finding("survey", place, ok=None, reason=reason, check=UNKNOWN_PATH, method=method))
     return findings
 
 
@@ -279,5 +279,5 @@ RULE = Rule(
         *("PHOTO_STEP_M", "PHOTO_OVERLAP_FRACTION", "TURN_AROUND_RADII"),
     ),
     judge=survey_findings,
-    log=LogNeeds(("attitude",), planned_heights=True, full_leg=True),
+    log=LogNeeds(("attitude",), needs_planned_heights=True, needs_full_leg=True),
 )

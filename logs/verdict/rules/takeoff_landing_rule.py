@@ -11,7 +11,7 @@ import math
 
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
 from flight.mission.return_path import RETURN_NOT_FLOWN_ON
-from logs.verdict.findings import GROUND_WAY, Finding, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
@@ -166,14 +166,14 @@ def _slope_finding(
         margin=math.degrees(limit - abs(slope)),
         unit="deg",
         method="mission items",
-        check=GROUND_WAY if ok is None else "",
+        check=GROUND_PATH if ok is None else "",
     )
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
     """Return a finding on an unjudged take-off or landing, which leaves the verdict undecided."""
     fault = message(f"the {_PHASE_TITLES[rule]} at {place_text(place)} is not judged")
-    return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_WAY)
+    return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_PATH)
 
 
 def _slope_limit(

@@ -76,11 +76,11 @@ def _sphere_sizes(threats: Threats, kind: SphereKind) -> tuple[Floats, Floats]:
 class _Visit:
     """Visit to one sphere; all values are NaN if nothing was flown.
 
-    inside, exposure, closest_time: s.
+    time_inside, exposure, closest_time: s.
     closest: minimum distance to the sphere's center, m.
     """
 
-    inside: float = math.nan
+    time_inside: float = math.nan
     exposure: float = math.nan
     closest: float = math.nan
     closest_time: float = math.nan
@@ -89,7 +89,7 @@ class _Visit:
 def _sphere_visit(visits: SphereVisits | None, m: int) -> _Visit:
     if visits is None:
         return _Visit()
-    columns = (visits.inside, visits.exposure, visits.closest, visits.closest_time)
+    columns = (visits.time_inside, visits.exposure, visits.closest, visits.closest_time)
     return _Visit(*(float(column[m]) for column in columns))
 
 
@@ -128,8 +128,8 @@ def _no_entry_finding(
         if navigation_error > 0.0:
             facts.append(Fact("navigation error", navigation_error, "m"))
             reason += (
-                f", {nearest_distance - navigation_error:.1f} m less the {navigation_error:.1f} m that"
-                " navigation may be off"
+                f", or {nearest_distance - navigation_error:.1f} m after the navigation error of"
+                f" {navigation_error:.1f} m is subtracted"
             )
     return make_finding(
         "threat",
@@ -149,25 +149,25 @@ def _no_entry_finding(
 
 
 def _sphere_finding(
-    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, where: str
+    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, place_text: str
 ) -> Finding:
     judged_visit = planned_visit if flown_visit is None else flown_visit
     is_missing = math.isnan(judged_visit.closest)
-    facts = f"planned {planned_visit.inside:.1f} s inside {radius:.0f} m, exposure {planned_visit.exposure:.3g} s"
+    facts = f"planned {planned_visit.time_inside:.1f} s inside {radius:.0f} m, exposure {planned_visit.exposure:.3g} s"
     if flown_visit is not None and not is_missing:
         facts += (
-            f"; flown {flown_visit.inside:.1f} s, exposure {flown_visit.exposure:.3g} s, nearest"
+            f"; flown {flown_visit.time_inside:.1f} s, exposure {flown_visit.exposure:.3g} s, nearest"
             f" {flown_visit.closest:.0f} m"
         )
-        facts += f" at {flown_visit.closest_time:.1f} s{where}"
-    flown_time = None if flown_visit is None else flown_visit.inside
+        facts += f" at {flown_visit.closest_time:.1f} s{place_text}"
+    flown_time = None if flown_visit is None else flown_visit.time_inside
     if place.kind == "radar":
         return make_finding(
             "threat",
             place,
             ok=True,
             reason=f"for information only, detection is not limited: {facts}",
-            planned=planned_visit.inside,
+            planned=planned_visit.time_inside,
             flown=flown_time,
             unit="s",
             method=_METHOD,
@@ -178,12 +178,12 @@ def _sphere_finding(
         place,
         ok=ok,
         reason=facts if ok is not False else f"inside the missile's reach: {facts}",
-        planned=planned_visit.inside,
+        planned=planned_visit.time_inside,
         flown=flown_time,
         limit=0.0,
         source="scenario",
         tolerance=0.0,
-        margin=-judged_visit.inside,
+        margin=-judged_visit.time_inside,
         unit="s",
         method=_METHOD,
         facts=[Fact("nearest", judged_visit.closest - radius, "m")] if ok is False else (),

@@ -14,7 +14,7 @@ import numpy as np
 
 from flight.mission.ground_ways import Approach
 from flight.simulation.track import Track
-from logs.verdict.findings import GROUND_WAY, Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.findings import GROUND_PATH, Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -71,20 +71,20 @@ def touchdown_findings(
         return (
             []
             if planned_approach is None
-            else _planned_findings(requirements.waypoint(planned_approach.leg + 1), planned_approach)
+            else _short_strip_findings(requirements.waypoint(planned_approach.leg + 1), planned_approach)
         )
     approach = ground_phases.procedures.approach
-    place = ground_phases.whole.waypoint(approach.leg + 1)
+    place = ground_phases.whole_route.waypoint(approach.leg + 1)
     track, terrain = ground_phases.landing, requirements.setup.scenario.terrain
     if ground_phases.landing_start_row >= len(ground_phases.track) - 1:
         reason = "the flight did not reach its landing"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
-        return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
+        return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_PATH)]
     point_height = math.nan if terrain is None else float(approach.point[2] - terrain.height(*approach.point[:2]))
     if terrain is None or math.isnan(point_height):
         reason = "the terrain at the landing point is unknown"
         fault = message(f"the touchdown at {place_text(place)} is not judged: {reason}")
-        return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_WAY)]
+        return [make_finding("touchdown", place, ok=None, reason=reason, faults=[fault], unit="m", check=GROUND_PATH)]
     touchdown_row = _touchdown_row(track, terrain)
     if touchdown_row is None:
         fault = message("the aircraft did not touch down", f" at {_landing_point_text(approach)}")
@@ -99,12 +99,12 @@ def touchdown_findings(
     return [_landing_finding(place, approach, landing, faults, has_gusts=has_gusts)]
 
 
-def _planned_findings(place: Place, approach: Approach) -> list[Finding]:
+def _short_strip_findings(place: Place, approach: Approach) -> list[Finding]:
     """Before a flight, return a finding if the strip is too short to judge the touch-down."""
     messages = _short_strip_messages(approach)
     reason = finding_reason(messages)
     return (
-        [make_finding("touchdown", place, ok=None, reason=reason, faults=messages, check=GROUND_WAY)]
+        [make_finding("touchdown", place, ok=None, reason=reason, faults=messages, check=GROUND_PATH)]
         if messages
         else []
     )
@@ -156,7 +156,7 @@ def _landing_finding(
         margin=limit - max_distance,
         unit="m",
         method="contact of skids or wheels with the ground, from the flown track",
-        check=GROUND_WAY if undecided_messages else "",
+        check=GROUND_PATH if undecided_messages else "",
         facts=(
             Fact("along", landing.along, "m"),
             Fact("aside", landing.lateral_offset, "m"),

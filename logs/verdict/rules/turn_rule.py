@@ -121,7 +121,7 @@ def _unflown_turn_text(
     return (
         f"{requirements.setup.autopilot.title} was on {place_text_within(requirements.leg(leg))} of"
         f" {leg_length:.0f} m for"
-        f" {active_time:.1f} s, because it counts a waypoint as reached from {radius:.0f} m"
+        f" {active_time:.1f} s, because it considers a waypoint reached within {radius:.0f} m"
     )
 
 
@@ -136,7 +136,7 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
     lateral = radius * (1.0 - math.cos(turn))
     return [
         f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
-        f" that leads up to {lateral:.0f} m off the next leg"
+        f" the turn then swings up to {lateral:.0f} m off the next leg"
     ]
 
 
@@ -293,5 +293,5 @@ RULE = Rule(
     ),
     judge=turn_findings,
     suggest=suggest_gentler_turn,
-    log=LogNeeds(aircraft=True, no_gap=True),
+    log=LogNeeds(needs_aircraft=True, needs_no_gap=True),
 )

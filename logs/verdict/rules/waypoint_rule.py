@@ -43,7 +43,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         faults.append(
             message(
                 f"the arc of its {turn:.0f}° corner passes it at {offset:.0f} m",
-                f" (radius {radius:.0f} m), and {condition.radius:.0f} m count as reached",
+                f" (radius {radius:.0f} m); it counts as reached within {condition.radius:.0f} m",
             )
         )
     return make_finding(
@@ -70,7 +70,7 @@ def _turn_text(requirements: RouteRequirements, i: int, condition: AcceptanceCon
         turn_distance = autopilot.turn_distance(turn, float(requirements.points[i, 2]))
         unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
     return (
-        f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before it, or where it is past it{unread_text}"
+        f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before it, or once it is past it{unread_text}"
     )
 
 
@@ -138,8 +138,8 @@ def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: 
 def _acceptance_text(condition: AcceptanceCondition) -> str:
     """Describe the acceptance distance and its source."""
     owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(condition.source, "the path's")
-    error_text = f", and {condition.tolerance:.1f} m for navigation and gusts," if condition.tolerance else ""
-    return f"{condition.radius:.0f} m{error_text} count as reached ({owner})"
+    error_text = f" plus {condition.tolerance:.1f} m for navigation and gusts" if condition.tolerance else ""
+    return f"it counts as reached within {condition.radius:.0f} m{error_text} ({owner})"
 
 
 def _closest_approach(
@@ -154,9 +154,13 @@ def _closest_approach(
         offset = aligned.track.position[-1] - requirements.points[i]
         return math.hypot(offset[0], offset[1]), float(offset[2])
     # Among equally close rows take the one nearest in altitude.
-    near = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
-    up = position[near, 2] + fraction[near] * (position[near + 1, 2] - position[near, 2]) - level
-    return float(distance.min()), float(up[np.argmin(np.abs(up))])
+    nearest_rows = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
+    heights = (
+        position[nearest_rows, 2]
+        + fraction[nearest_rows] * (position[nearest_rows + 1, 2] - position[nearest_rows, 2])
+        - level
+    )
+    return float(distance.min()), float(heights[np.argmin(np.abs(heights))])
 
 
 RULE = Rule(

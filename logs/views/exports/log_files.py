@@ -75,16 +75,16 @@ def parquet_bytes(log: FlightLog) -> bytes:
     from pyarrow import parquet
 
     scenario = log.setup.scenario
-    about = {
+    metadata = {
         "planfly.scenario": scenario.name,
         "planfly.origin_lat_deg": repr(scenario.origin.lat_deg),
         "planfly.origin_lon_deg": repr(scenario.origin.lon_deg),
         "planfly.ended": log.ended or "",
     }
-    table = pa.table(flight_columns(log)).replace_schema_metadata(about)
-    sink = io.BytesIO()
-    parquet.write_table(table, sink, compression="zstd")
-    return sink.getvalue()
+    table = pa.table(flight_columns(log)).replace_schema_metadata(metadata)
+    buffer = io.BytesIO()
+    parquet.write_table(table, buffer, compression="zstd")
+    return buffer.getvalue()
 
 
 # ----------------------------------------------------------------------
@@ -110,11 +110,11 @@ _MISSION = 3
 # vehicle_status: fixed wing.
 _FIXED_WING = 2
 # Interval of topics with a message for every row, s.
-_EVERY_ROW_S = 0.0
+_EVERY_ROW_INTERVAL_S = 0.0
 # Interval of slower topics, s.
-_SLOW = 0.1
+_SLOW_INTERVAL_S = 0.1
 # Interval of topics with one message a second, s.
-_SECOND = 1.0
+_LONG_INTERVAL_S = 1.0
 # Standard atmosphere: the ratio of air density to density at sea level is (1 - lapse h) ** power; 1/m.
 _DENSITY_LAPSE_PER_M = 2.25577e-5
 # Exponent of that formula.
@@ -131,7 +131,7 @@ class _Topic(NamedTuple):
 
 
 def px4_log_bytes(log: FlightLog) -> bytes:
-    r"""Return the bytes of the `.ulg`; rows without a position are left out.
+    r"""Return the bytes of the `.ulg`; rows without a position are omitted.
 
     >>> from logs.recording.example_log import example_log
     >>> px4_log_bytes(example_log())[:7]
@@ -151,18 +151,18 @@ def px4_log_bytes(log: FlightLog) -> bytes:
         head += _encode_message(b"P", bytes([len(name)]) + name + struct.pack("<f", parameter.value))
     for number, topic in enumerate(topics):
         head += _encode_message(b"A", struct.pack("<BH", 0, number) + topic.name.encode())
-    stamps, pieces = [], []
+    stamps, messages = [], []
     for number, topic in enumerate(topics):
         times, records = _topic_records(number, topic)
         stamps += times
-        pieces += records
+        messages += records
     for event in log.events:
         stamp = round(event.time * 1e6)
         body = _LEVELS.get(event.level, b"6") + struct.pack("<Q", stamp) + event.text.encode()
         stamps.append(stamp)
-        pieces.append(_encode_message(b"L", body))
+        messages.append(_encode_message(b"L", body))
     order = np.argsort(np.array(stamps, dtype=np.int64), kind="stable")
-    return bytes(head) + b"".join(pieces[k] for k in order.tolist())
+    return bytes(head) + b"".join(messages[k] for k in order.tolist())
 
 
 def _encode_message(letter: bytes, body: bytes) -> bytes:
@@ -203,20 +203,22 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     east, north, up = track.position[rows].T
     lat, lon = (np.asarray(values) for values in to_geo(origin, east, north))
     v_east, v_north, v_up = track.velocity[rows].T
-    ones, ground = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
-    true, height = track.airspeed[rows].astype(np.float64), track.clearance[rows]
-    calibrated = true * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
+    ones, ground_altitude = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
+    true_airspeed, height_above_ground = track.airspeed[rows].astype(np.float64), track.clearance[rows]
+    calibrated_airspeed = true_airspeed * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)
     wind, battery = track.wind[rows], _battery_values(log, rows)
 
     def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
     topics = [
-        topic("vehicle_attitude", _EVERY_ROW_S, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])),
-        topic("vehicle_angular_velocity", _EVERY_ROW_S, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
+        topic(
+            "vehicle_attitude", _EVERY_ROW_INTERVAL_S, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])
+        ),
+        topic("vehicle_angular_velocity", _EVERY_ROW_INTERVAL_S, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
         topic(
             "vehicle_local_position",
-            _SLOW,
+            _SLOW_INTERVAL_S,
             [
                 *((name, "<f4") for name in ("x", "y", "z", "vx", "vy", "vz", "heading", "ref_alt", "dist_bottom")),
                 ("ref_lat", "<f8"),
@@ -237,13 +239,13 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             ],
             x=north,
             y=east,
-            z=ground - up,
+            z=ground_altitude - up,
             vx=v_north,
             vy=v_east,
             vz=-v_up,
             heading=track.attitude[rows, YAW],
-            ref_alt=np.full(len(rows), ground),
-            dist_bottom=height,
+            ref_alt=np.full(len(rows), ground_altitude),
+            dist_bottom=height_above_ground,
             ref_lat=np.full(len(rows), origin.lat_deg),
             ref_lon=np.full(len(rows), origin.lon_deg),
             ref_timestamp=np.zeros(len(rows)),
@@ -253,43 +255,43 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
             v_z_valid=ones,
             xy_global=ones,
             z_global=ones,
-            dist_bottom_valid=np.isfinite(height),
+            dist_bottom_valid=np.isfinite(height_above_ground),
         ),
         topic(
             "vehicle_global_position",
-            _SLOW,
+            _SLOW_INTERVAL_S,
             [("lat", "<f8"), ("lon", "<f8"), ("alt", "<f4"), ("terrain_alt", "<f4"), ("terrain_alt_valid", "?")],
             lat=lat,
             lon=lon,
             alt=up,
-            terrain_alt=up - height,
-            terrain_alt_valid=np.isfinite(height),
+            terrain_alt=up - height_above_ground,
+            terrain_alt_valid=np.isfinite(height_above_ground),
         ),
         topic(
             "airspeed_validated",
-            _SLOW,
+            _SLOW_INTERVAL_S,
             [(f"{name}_airspeed_m_s", "<f4") for name in ("indicated", "calibrated", "true")],
-            indicated_airspeed_m_s=calibrated,
-            calibrated_airspeed_m_s=calibrated,
-            true_airspeed_m_s=true,
+            indicated_airspeed_m_s=calibrated_airspeed,
+            calibrated_airspeed_m_s=calibrated_airspeed,
+            true_airspeed_m_s=true_airspeed,
         ),
         topic(
             "wind",
-            _SLOW,
+            _SLOW_INTERVAL_S,
             [("windspeed_north", "<f4"), ("windspeed_east", "<f4")],
             windspeed_north=wind[:, 1],
             windspeed_east=wind[:, 0],
         ),
         topic(
             "vehicle_thrust_setpoint",
-            _SLOW,
+            _SLOW_INTERVAL_S,
             [("xyz", "<f4", 3)],
             xyz=track.commands[rows][:, [THROTTLE]] * np.array([1.0, 0.0, 0.0]),
         ),
-        topic("battery_status", _SLOW, [(name, "<f4") for name in battery], **battery),
+        topic("battery_status", _SLOW_INTERVAL_S, [(name, "<f4") for name in battery], **battery),
         topic(
             "vehicle_status",
-            _SECOND,
+            _LONG_INTERVAL_S,
             [(name, "u1") for name in ("arming_state", "nav_state", "vehicle_type")],
             arming_state=_ARMED * ones,
             nav_state=_MISSION * ones,
@@ -324,21 +326,23 @@ def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
     read as lost items.
     """
     track, items = log.track, {item.seq: item for item in log.setup.mission.items}
-    legs, firsts = np.unique(track.leg[rows], return_index=True)
+    legs, first_rows = np.unique(track.leg[rows], return_index=True)
     targets = [(0.0, int(log.setup.route.items[0]))]
     targets += [
         (float(track.time[rows[first]]), int(log.setup.route.items[leg + 1]))
-        for leg, first in zip(legs.tolist(), firsts.tolist(), strict=True)
+        for leg, first in zip(legs.tolist(), first_rows.tolist(), strict=True)
         if 0 <= leg < len(log.setup.route.items) - 1
     ]
-    aims = targets if len(rows) else []
-    flown: list[tuple[float, MissionItem]] = []
-    for time, seq in aims:
+    reached_targets = targets if len(rows) else []
+    active_items: list[tuple[float, MissionItem]] = []
+    for time, seq in reached_targets:
         if seq in items and items[seq].has_position:
-            before = flown[-1][1].seq if flown else 0
-            flown += [(time, items[k]) for k in range(before + 1, seq) if k in items] + [(time, items[seq])]
-    radii = [item.params[1] for _, item in flown]
-    kinds = {
+            previous_seq = active_items[-1][1].seq if active_items else 0
+            active_items += [(time, items[k]) for k in range(previous_seq + 1, seq) if k in items] + [
+                (time, items[seq])
+            ]
+    radii = [item.params[1] for _, item in active_items]
+    field_types = {
         "sequence_current": "<u2",
         "nav_cmd": "<u2",
         "acceptance_radius": "<f4",
@@ -348,17 +352,17 @@ def _mission_item_topic(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
         "altitude_is_relative": "u1",
     }
     values = {
-        "timestamp": np.array([round(time * 1e6) for time, _ in flown], dtype=np.uint64),
+        "timestamp": np.array([round(time * 1e6) for time, _ in active_items], dtype=np.uint64),
         # PX4 numbers mission items from 0.
-        "sequence_current": np.array([item.seq - 1 for _, item in flown]),
-        "nav_cmd": np.array([item.command for _, item in flown]),
+        "sequence_current": np.array([item.seq - 1 for _, item in active_items]),
+        "nav_cmd": np.array([item.command for _, item in active_items]),
         "acceptance_radius": np.nan_to_num(np.array(radii)),
-        "latitude": np.nan_to_num(np.array([item.lat_deg for _, item in flown])),
-        "longitude": np.nan_to_num(np.array([item.lon_deg for _, item in flown])),
-        "altitude": np.nan_to_num(np.array([item.alt for _, item in flown])),
-        "altitude_is_relative": np.array([item.frame in OVER_HOME for _, item in flown]),
+        "latitude": np.nan_to_num(np.array([item.lat_deg for _, item in active_items])),
+        "longitude": np.nan_to_num(np.array([item.lon_deg for _, item in active_items])),
+        "altitude": np.nan_to_num(np.array([item.alt for _, item in active_items])),
+        "altitude_is_relative": np.array([item.frame in OVER_HOME for _, item in active_items]),
     }
-    return _Topic("navigator_mission_item", _EVERY_ROW_S, list(kinds.items()), values)
+    return _Topic("navigator_mission_item", _EVERY_ROW_INTERVAL_S, list(field_types.items()), values)
 
 
 def attitude_quaternion(attitude: Any) -> Floats:

@@ -77,8 +77,8 @@ def track_line(setup: FlightSetup, track: Track) -> MapLine:
     ('example flown', 74, 200.0)
     """
     finite_rows = np.flatnonzero(np.isfinite(track.position).all(axis=1) & np.isfinite(track.time))
-    slots = np.floor(track.time[finite_rows] / POINT_INTERVAL_S + 1e-9)
-    is_kept = np.concatenate([[True], np.diff(slots) > 0.0])[: finite_rows.size]
+    intervals = np.floor(track.time[finite_rows] / POINT_INTERVAL_S + 1e-9)
+    is_kept = np.concatenate([[True], np.diff(intervals) > 0.0])[: finite_rows.size]
     is_kept[-1:] = True
     position = track.position[finite_rows[is_kept]]
     lat, lon = to_geo(setup.scenario.origin, position[:, 0], position[:, 1])
@@ -124,45 +124,48 @@ def map_zones(setup: FlightSetup) -> list[MapZone]:
 # Returns and glides, in colours.
 
 
-def return_lines(setup: FlightSetup, drawn: DrawnReturns) -> list[MapLine]:
+def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapLine]:
     """Return the path by outcome of returns, the worst returns, and the path by glide destination."""
-    limit, lines = drawn.returns.limit, []
-    for kind, segment in drawn.segments_by_outcome:
+    limit, lines = drawn_returns.returns.limit, []
+    for kind, segment in drawn_returns.segments_by_outcome:
         name = f"{segment[0].time:.0f} to {segment[-1].time:.0f} s: {segment_text(kind)}"
         lines.append(_make_line(setup, name, [ret.start for ret in segment], "returns to launch", f"return-{kind}"))
-    for number, worst in enumerate(drawn.worst, 1):
+    for number, worst in enumerate(drawn_returns.worst, 1):
         ret = worst.simulated
         name = f"{number}: from {ret.time:.0f} s to {ret.target.name}: {outcome_text(ret, limit)}"
         lines.append(_make_line(setup, name, worst.path, "the worst returns", "return-way"))
-    for reach, glides in drawn.segments_by_reach:
+    for reach, glides in drawn_returns.segments_by_reach:
         name = f"{glides[0].time:.0f} to {glides[-1].time:.0f} s: {reached_text(reach)}"
         lines.append(_make_line(setup, name, [ret.start for ret in glides], "without its engine", f"reach-{reach}"))
     return lines
 
 
-def _make_line(setup: FlightSetup, name: str, places: ArrayLike, folder: str, role: str) -> MapLine:
-    position = np.asarray(places, dtype=np.float64)
-    lat, lon = to_geo(setup.scenario.origin, position[:, 0], position[:, 1])
-    return MapLine(name, np.asarray(lat), np.asarray(lon), position[:, 2], folder=folder, role=role)
+def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str, role: str) -> MapLine:
+    points = np.asarray(positions, dtype=np.float64)
+    lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
+    return MapLine(name, np.asarray(lat), np.asarray(lon), points[:, 2], folder=folder, role=role)
 
 
-def glide_shapes(setup: FlightSetup, drawn: DrawnReturns) -> list[MapZone]:
+def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZone]:
     """Return the glide footprint: minimum heights above ground to reach a chosen place, and flat ground."""
-    footprint = drawn.glides.footprint
+    footprint = drawn_returns.glides.footprint
     if footprint is None:
         return []
 
     def shape(name: str, role: str, parts: tuple[Part, ...]) -> MapZone:
-        placed = tuple(tuple(_to_geographic(setup, ring) for ring in part) for part in parts)
-        return MapZone(name, placed, folder="the glide's footprint", role=role)
+        geographic_parts = tuple(tuple(_to_geographic(setup, ring) for ring in part) for part in parts)
+        return MapZone(name, geographic_parts, folder="the glide's footprint", role=role)
 
     shapes = [
         shape(f"home or another chosen place in reach from {band.up_to:.0f} m above ground", role, band.parts)
         for band in footprint.bands()
         for role in [BAND_ROLES[band.up_to]]
     ]
-    flat = footprint.landings()
-    return [*shapes, *([shape("flat ground according to the elevation file", "landable", flat)] if flat else [])]
+    flat_parts = footprint.landings()
+    return [
+        *shapes,
+        *([shape("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []),
+    ]
 
 
 def _to_geographic(setup: FlightSetup, ring: Floats) -> Floats:
@@ -241,9 +244,9 @@ def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
         mark = _add_element(folders.named(zone.folder), "Placemark")
         _add_element(mark, "name", zone.name)
         _add_style(mark, zone.role)
-        several = _add_element(mark, "MultiGeometry")
+        geometry = _add_element(mark, "MultiGeometry")
         for outline, *holes in zone.parts:
-            polygon = _add_element(several, "Polygon")
+            polygon = _add_element(geometry, "Polygon")
             if zone.height is not None:
                 _add_element(polygon, "extrude", "1")
                 _add_element(polygon, "altitudeMode", "relativeToGround" if zone.above_ground else "absolute")
@@ -260,7 +263,9 @@ def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZo
 
 def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
     element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
-    element.text = "".join(ch for ch in text if ch.isprintable() or ch == " ") if text else None
+    element.text = (
+        "".join(character for character in text if character.isprintable() or character == " ") if text else None
+    )
     return element
 
 
@@ -279,7 +284,7 @@ def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
     """
     gpx = gpxpy.gpx.GPX()
     gpx.creator = "planfly"
-    gpx.name = "".join(ch for ch in title if ch.isprintable())
+    gpx.name = "".join(character for character in title if character.isprintable())
     for line in lines:
         rows = [
             (round(float(lat), 8), round(float(lon), 8), round(float(up), 3))
@@ -296,11 +301,11 @@ def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
         else:
             track = gpxpy.gpx.GPXTrack(name=line.name)
             track.segments.append(
-                gpxpy.gpx.GPXTrackSegment([gpxpy.gpx.GPXTrackPoint(a, b, elevation=c) for a, b, c in rows])
+                gpxpy.gpx.GPXTrackSegment([gpxpy.gpx.GPXTrackPoint(lat, lon, elevation=up) for lat, lon, up in rows])
             )
             gpx.tracks.append(track)
     for zone in zones:
-        track = gpxpy.gpx.GPXTrack(name="".join(ch for ch in zone.name if ch.isprintable()))
+        track = gpxpy.gpx.GPXTrack(name="".join(character for character in zone.name if character.isprintable()))
         for ring in itertools.chain.from_iterable(zone.parts):
             points = [gpxpy.gpx.GPXTrackPoint(round(float(lat), 8), round(float(lon), 8)) for lat, lon in ring]
             track.segments.append(gpxpy.gpx.GPXTrackSegment(points))

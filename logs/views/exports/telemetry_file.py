@@ -53,12 +53,12 @@ def telemetry_bytes(log: FlightLog) -> bytes:
     (True, True)
     """
     senders = {sender_ids: mavlink.MAVLink(None, *sender_ids) for sender_ids in (_VEHICLE, _STATION)}
-    out = bytearray()
+    data = bytearray()
     for time, sender_ids, message in _timed_messages(log):
         sender = senders[sender_ids]
-        out += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
+        data += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
         sender.seq = (sender.seq + 1) % 256
-    return bytes(out)
+    return bytes(data)
 
 
 def _timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
@@ -84,40 +84,44 @@ def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
     home = setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
     status = Status(start, home, battery=setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
     status.total, items = len(setup.mission.items), setup.route.items
-    numbers = {item.seq: k for k, item in enumerate(setup.mission.items, 1)}
-    due = {"HEARTBEAT": 0.0, **dict.fromkeys(PERIODS, 0.0)}
-    events, texts, leg = list(log.events), 0, -1
+    number_by_seq = {item.seq: k for k, item in enumerate(setup.mission.items, 1)}
+    due_times = {"HEARTBEAT": 0.0, **dict.fromkeys(PERIODS, 0.0)}
+    events, text_count, active_leg = list(log.events), 0, -1
     rows = track_rows(track)
     for row, time in zip(rows, track.time.tolist(), strict=True):
         while events and events[0].time <= time:
-            texts += 1
+            text_count += 1
             event = events.pop(0)
-            for piece in status_texts(event.text, _SEVERITY.get(event.level, INFO), texts):
-                yield time, piece
-        due_names = [name for name, due_time in due.items() if time >= due_time - 1e-6]
-        if not due_names and int(row.leg) == leg:
+            for message in status_texts(event.text, _SEVERITY.get(event.level, INFO), text_count):
+                yield time, message
+        due_names = [name for name, due_time in due_times.items() if time >= due_time - 1e-6]
+        if not due_names and int(row.leg) == active_leg:
             continue
         snapshot = snapshots.snapshot(row)
         if not snapshot.finite:
             continue
         status.snapshot, status.boot, status.wall = snapshot, time, EPOCH_NS / 1e9 + time
-        if int(row.leg) != leg:
-            passed = items[max(0, leg + 1) : int(row.leg) + 1]
-            leg = int(row.leg)
+        if int(row.leg) != active_leg:
+            passed = items[max(0, active_leg + 1) : int(row.leg) + 1]
+            active_leg = int(row.leg)
             for item in passed[passed >= 0].tolist():
-                yield time, mavlink.MAVLink_mission_item_reached_message(numbers[item])
-            ahead = items[leg + 1 :]
-            status.current = numbers[int(ahead[ahead >= 0][0])] if np.any(ahead >= 0) else status.current
+                yield time, mavlink.MAVLink_mission_item_reached_message(number_by_seq[item])
+            remaining_items = items[active_leg + 1 :]
+            status.current = (
+                number_by_seq[int(remaining_items[remaining_items >= 0][0])]
+                if np.any(remaining_items >= 0)
+                else status.current
+            )
             yield time, telemetry_message("MISSION_CURRENT", status)
         for name in due_names:
-            due[name] += max(PERIODS.get(name, _HEARTBEAT_INTERVAL_S), 1e-3)
+            due_times[name] += max(PERIODS.get(name, _HEARTBEAT_INTERVAL_S), 1e-3)
             yield time, telemetry_message(name, status)
-    end = float(track.time[-1]) if len(track) else 0.0
+    end_time = float(track.time[-1]) if len(track) else 0.0
     for event in events:
-        texts += 1
-        for piece in status_texts(event.text, _SEVERITY.get(event.level, INFO), texts):
-            yield end, piece
+        text_count += 1
+        for message in status_texts(event.text, _SEVERITY.get(event.level, INFO), text_count):
+            yield end_time, message
     status.armed = status.flying = False
     status.mission_state = COMPLETE if log.ended == "completed" else ACTIVE
     for name in ("HEARTBEAT", "MISSION_CURRENT"):
-        yield end, telemetry_message(name, status)
+        yield end_time, telemetry_message(name, status)

@@ -63,7 +63,7 @@ class Instruments:
         left += [" " * (size.horizon + 2)] * (rows - len(left))
         right += [""] * (rows - len(right))
         lines = self._head_lines(k, columns)
-        lines += [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
+        lines += [f"{left_line}  {right_line}" for left_line, right_line in zip(left, right, strict=True)]
         lines += [
             "",
             *self._control_lines(k, size.bar),
@@ -74,22 +74,22 @@ class Instruments:
 
     def _head_lines(self, k: int, columns: int) -> list[str]:
         log, track = self.log, self.log.track
-        now, end = float(track.time[k]), log.end_time
+        time, end = float(track.time[k]), log.end_time
         title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
-        clock = f"{now:8.1f} of {end:.1f} s"
-        done = round((columns - 2) * (now - float(track.time[0])) / max(end - float(track.time[0]), 1e-9))
-        bar = "[" + "=" * done + " " * (columns - 2 - done) + "]"
+        clock = f"{time:8.1f} of {end:.1f} s"
+        filled_columns = round((columns - 2) * (time - float(track.time[0])) / max(end - float(track.time[0]), 1e-9))
+        bar = "[" + "=" * filled_columns + " " * (columns - 2 - filled_columns) + "]"
         leg = int(track.leg[k])
         route = log.setup.route
         step = route.waypoints[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
-        ahead = (
+        leg_text = (
             f"leg {leg} of {route.legs}, to {waypoint_name(route, leg + 1)},"
             f" {_metres_text(float(np.hypot(*step)))} to go"
         )
         if leg >= route.legs:
-            ahead = "behind the last waypoint"
-        free = max(1, columns - len(clock))
-        return [_without_control_characters(title)[: free - 1].ljust(free) + clock, bar, ahead]
+            leg_text = "behind the last waypoint"
+        title_width = max(1, columns - len(clock))
+        return [_without_control_characters(title)[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
 
     def _horizon_lines(self, k: int, columns: int) -> list[str]:
         """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the center."""
@@ -98,10 +98,10 @@ class Instruments:
         for row in range(_HORIZON_ROWS):
             cells = []
             for column in range(columns):
-                across = (column - columns // 2) / 2.0  # a letter is twice as high as wide
-                up = _HORIZON_ROWS // 2 - row
+                x = (column - columns // 2) / 2.0  # a letter is twice as high as wide
+                y = _HORIZON_ROWS // 2 - row
                 # Height of this cell above the rolled horizon, rows.
-                elevation = up * math.cos(roll) + across * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
+                elevation = y * math.cos(roll) + x * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
                 cells.append("-" if abs(elevation) <= 0.5 else " " if elevation > 0.0 else ":")
             rows.append(cells)
         middle = rows[_HORIZON_ROWS // 2]
@@ -115,10 +115,10 @@ class Instruments:
         east, north, up = (float(value) for value in track.velocity[k])
         roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[k])
         _, _, amsl = track.position[k].tolist()
-        above = amsl - float(self.ground[k])
+        height_above_ground = amsl - float(self.ground[k])
         wind_east, wind_north, _ = (float(value) for value in track.wind[k])
-        height = _metres_text(above) if math.isfinite(above) else "unknown"
-        airspeed, commanded, load, used, current = (
+        height = _metres_text(height_above_ground) if math.isfinite(height_above_ground) else "unknown"
+        airspeed, commanded, load_factor, energy_used, current = (
             float(column[k])
             for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
         )
@@ -127,52 +127,56 @@ class Instruments:
             f"ground speed {_number_text(math.hypot(east, north), 1)} m/s, climb {_number_text(up, 1, '+')} m/s",
             f"height       {_metres_text(amsl)} AMSL, {height} above ground",
             f"course       {_course_text(math.degrees(math.atan2(east, north)))}, heading {_course_text(yaw)}",
-            f"roll, pitch  {_number_text(roll, 1, '+')}°, {_number_text(pitch, 1, '+')}°, {_number_text(load, 2)} g",
+            f"roll, pitch  {_number_text(roll, 1, '+')}°, {_number_text(pitch, 1, '+')}°, "
+            f"{_number_text(load_factor, 2)} g",
             f"off the path {_number_text(float(track.cross_track[k]), 1, '+')} m right, "
             f"{_number_text(float(track.height_error[k]), 1, '+')} m high",
             f"wind         {_number_text(math.hypot(wind_east, wind_north), 1)} m/s from "
             f"{_course_text(math.degrees(math.atan2(-wind_east, -wind_north)))}",
-            f"battery      {_number_text(used, 1)} of {_number_text(setup.battery, 0)} Wh used,"
+            f"battery      {_number_text(energy_used, 1)} of {_number_text(setup.battery, 0)} Wh used,"
             f" {_number_text(current, 1)} A",
         ]
 
-    def _control_lines(self, k: int, bar: int) -> list[str]:
+    def _control_lines(self, k: int, bar_width: int) -> list[str]:
         """Draw one bar for each control, with its position (O) between its limits, and its command (|)."""
         lines = []
         controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
-        for (name, limit), stands, command in zip(self.limits, controls, commands, strict=True):
-            throttle = name == "throttle"
-            full = limit if math.isfinite(limit) else math.radians(30.0)
-            cells = list("." * bar)
-            if not throttle:
-                cells[bar // 2] = "+"
-            for value, mark in ((command, "|"), (stands, "O")):
+        for (name, limit), deflection, command in zip(self.limits, controls, commands, strict=True):
+            is_throttle = name == "throttle"
+            max_value = limit if math.isfinite(limit) else math.radians(30.0)
+            cells = list("." * bar_width)
+            if not is_throttle:
+                cells[bar_width // 2] = "+"
+            for value, symbol in ((command, "|"), (deflection, "O")):
                 if math.isfinite(value):
-                    position = value if throttle else 0.5 + 0.5 * value / full
-                    cells[round((bar - 1) * min(max(position, 0.0), 1.0))] = mark
-            state = (
-                f"{_number_text(100.0 * stands, 0)} %" if throttle else f"{_number_text(math.degrees(stands), 1, '+')}°"
+                    position = value if is_throttle else 0.5 + 0.5 * value / max_value
+                    cells[round((bar_width - 1) * min(max(position, 0.0), 1.0))] = symbol
+            state_text = (
+                f"{_number_text(100.0 * deflection, 0)} %"
+                if is_throttle
+                else f"{_number_text(math.degrees(deflection), 1, '+')}°"
             )
-            limit_text = "  AT ITS LIMIT" if (command >= 1.0 if throttle else abs(command) >= full) else ""
-            lines.append(f"{name:<9} [{''.join(cells)}] {state}{limit_text}")
+            limit_text = "  AT ITS LIMIT" if (command >= 1.0 if is_throttle else abs(command) >= max_value) else ""
+            lines.append(f"{name:<9} [{''.join(cells)}] {state_text}{limit_text}")
         return lines
 
     def _threat_text(self, k: int) -> str:
         threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
-        within = [
+        threats_in_reach = [
             f"{unit} {threats.names[m]} at {_metres_text(float(distances[m]))}"
             for unit, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
             for m in np.flatnonzero((radii > 0.0) & (distances <= radii)).tolist()
         ]
         return _without_control_characters(
-            "within reach of: " + "; ".join(within) if within else "within no unit's reach"
+            "within reach of: " + "; ".join(threats_in_reach) if threats_in_reach else "within no unit's reach"
         )
 
-    def _latest_entries(self, now: float) -> list[str]:
-        newest = bisect.bisect_right([entry.time for entry in self.entries], now + 1e-9)
+    def _latest_entries(self, time: float) -> list[str]:
+        entry_count = bisect.bisect_right([entry.time for entry in self.entries], time + 1e-9)
         return [
-            f"{entry.time:8.1f} s  {entry.text}" for entry in self.entries[max(0, newest - _LATEST_ENTRIES) : newest]
+            f"{entry.time:8.1f} s  {entry.text}"
+            for entry in self.entries[max(0, entry_count - _LATEST_ENTRIES) : entry_count]
         ]
 
 

@@ -79,8 +79,10 @@ def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
         for event in log.events
     ]
     entries += _end_entries(log)
-    clean = [TimelineEntry(entry.time, entry.kind, _without_control_characters(entry.text)) for entry in entries]
-    return sorted(clean, key=lambda entry: (entry.time, _ORDER.index(entry.kind)))
+    clean_entries = [
+        TimelineEntry(entry.time, entry.kind, _without_control_characters(entry.text)) for entry in entries
+    ]
+    return sorted(clean_entries, key=lambda entry: (entry.time, _ORDER.index(entry.kind)))
 
 
 def entry_lines(entry: TimelineEntry) -> list[str]:
@@ -105,18 +107,20 @@ def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
     edges = np.flatnonzero(np.diff(track.leg)) + 1
     starts = [0, *edges.tolist()]
     stops = [*edges.tolist(), len(track)]
-    parts = [_LegRows(int(track.leg[a]), a, b - 1) for a, b in zip(starts, stops, strict=True)]
+    parts = [_LegRows(int(track.leg[start]), start, stop - 1) for start, stop in zip(starts, stops, strict=True)]
     return [part for part in parts if 0 <= part.leg < route.legs]
 
 
 def _group_by_loiter(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
     """Group the parts in order; parts around the same loiter form one group."""
-    first: list[int] = []
+    first_legs: list[int] = []
     for leg in range(route.legs):
-        around = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
-        continues = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
-        first.append(first[-1] if continues else leg)
-    return [list(group) for _, group in itertools.groupby(parts, key=lambda part: first[part.leg])]
+        is_on_circle = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
+        continues_loiter = (
+            is_on_circle and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
+        )
+        first_legs.append(first_legs[-1] if continues_loiter else leg)
+    return [list(group) for _, group in itertools.groupby(parts, key=lambda part: first_legs[part.leg])]
 
 
 def waypoint_name(route: Route, index: int) -> str:
@@ -150,12 +154,12 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
         leg = part.leg
         if len(group) > 1:
             item, radius = int(route.items[leg]), route.arcs[leg]
-            what = (
+            item_text = (
                 f"return of item {item}"
                 if 0 <= route.return_from <= leg < route.return_until
                 else f"loiter of item {item}"
             )
-            text = f"{what}: leg {route.leg_numbers[leg]} goes on around its circle, radius {radius:.0f} m"
+            text = f"{item_text}: leg {route.leg_numbers[leg]} goes on around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue
         course = round(math.degrees(courses[leg])) % 360
@@ -174,17 +178,17 @@ def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     roll, _, _ = track.attitude.T
     bank = np.abs(roll.astype(np.float64))
     entries = []
-    for before, after in itertools.pairwise(parts):
+    for previous, following in itertools.pairwise(parts):
         # The corners of a loiter share the entry of the loiter; a loiter that is left at once has a turn.
-        same = route.items[max(0, after.leg - 1) : after.leg + 2] == route.items[after.leg]
-        if after.leg != before.leg + 1 or (route.arcs[after.leg] > 0.0 and same.sum() > 1):
+        is_same_item = route.items[max(0, following.leg - 1) : following.leg + 2] == route.items[following.leg]
+        if following.leg != previous.leg + 1 or (route.arcs[following.leg] > 0.0 and is_same_item.sum() > 1):
             continue
-        angle = math.degrees(turns[before.leg])
+        angle = math.degrees(turns[previous.leg])
         side = "right" if angle > 0.0 else "left"
-        window = bank[(before.first + before.last) // 2 : (after.first + after.last) // 2 + 1]
-        peak = math.degrees(float(np.nanmax(window))) if np.isfinite(window).any() else math.nan
-        text = f"turn {side} {abs(angle):.1f}° at {waypoint_name(route, after.leg)}, peak bank {peak:.1f}°"
-        entries.append(TimelineEntry(float(track.time[after.first]), "turn", text))
+        turn_bank = bank[(previous.first + previous.last) // 2 : (following.first + following.last) // 2 + 1]
+        peak_bank = math.degrees(float(np.nanmax(turn_bank))) if np.isfinite(turn_bank).any() else math.nan
+        text = f"turn {side} {abs(angle):.1f}° at {waypoint_name(route, following.leg)}, peak bank {peak_bank:.1f}°"
+        entries.append(TimelineEntry(float(track.time[following.first]), "turn", text))
     return entries
 
 
@@ -224,11 +228,11 @@ def _threat_entries(log: FlightLog) -> list[TimelineEntry]:
 
 
 def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
-    entered = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
-    inside = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
+    entry = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
+    stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
     if not stay.whole:
-        return [entered, TimelineEntry(stay.end, "threat", f"still inside the {unit} range of {name}: {inside}")]
-    return [entered, TimelineEntry(stay.end, "threat", f"outside the {unit} range of {name}: {inside}")]
+        return [entry, TimelineEntry(stay.end, "threat", f"still inside the {unit} range of {name}: {stay_text}")]
+    return [entry, TimelineEntry(stay.end, "threat", f"outside the {unit} range of {name}: {stay_text}")]
 
 
 def _throttle_entries(track: Track) -> list[TimelineEntry]:
@@ -240,24 +244,24 @@ def _throttle_entries(track: Track) -> list[TimelineEntry]:
     ):
         padded = np.concatenate([[False], is_held, [False]])
         edges = np.flatnonzero(padded[1:] != padded[:-1])
-        for first, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for first, end in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             start = float(track.time[first])
             # A command holds until the next row.
-            lasted = float(track.time[min(stop, len(track) - 1)]) - start
-            if lasted >= _MIN_SATURATION_TIME_S:
-                entries.append(TimelineEntry(start, "throttle", f"{name} for {lasted:.1f} s"))
+            duration = float(track.time[min(end, len(track) - 1)]) - start
+            if duration >= _MIN_SATURATION_TIME_S:
+                entries.append(TimelineEntry(start, "throttle", f"{name} for {duration:.1f} s"))
     return entries
 
 
 def _end_entries(log: FlightLog) -> list[TimelineEntry]:
     track = log.track
     steps = np.diff(track.position, axis=0)
-    flown = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))
-    how = log.ended if log.ended is not None else "not recorded"
-    used = float(track.energy[-1])
-    # An imported log may hold no battery.
-    drawn = f", {used:.1f} Wh from the battery" if math.isfinite(used) else ""
-    text = f"{how}; {log.end_time:.1f} s, {flown / 1000.0:.2f} km{drawn}"
+    distance = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))
+    end_reason = log.ended if log.ended is not None else "not recorded"
+    energy_used = float(track.energy[-1])
+    # An imported log may contain no battery data.
+    energy_text = f", {energy_used:.1f} Wh from the battery" if math.isfinite(energy_used) else ""
+    text = f"{end_reason}; {log.end_time:.1f} s, {distance / 1000.0:.2f} km{energy_text}"
     entries = [TimelineEntry(log.end_time, "end", text)]
     if not log.complete:
         entries.append(TimelineEntry(log.end_time, "log", f"the log is not complete: {log.problem}"))

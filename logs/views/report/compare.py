@@ -137,7 +137,7 @@ def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], f
             ("all radars", threats.detection_radius, threats.detection_scale),
         ):
             visits = path_spheres(position, time, threats.position, radii, scales)
-            values[f"time within reach, sum over {name}", "s"] = float(visits.inside.sum())
+            values[f"time within reach, sum over {name}", "s"] = float(visits.time_inside.sum())
             values[f"exposure, sum over {name}", "s"] = float(visits.exposure.sum())
     durations = np.append(np.diff(track.time), 0.0)
     for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
@@ -155,7 +155,7 @@ def _reduce_finite(reduce: Callable[[Floats], Any], values: NDArray[np.floating[
 
 def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
     """Return the number of failed findings, and the smallest margin of each rule; NaN if unknown."""
-    values = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
+    values = {("findings that fail", ""): float(sum(finding.ok is False for finding in verdict.findings))}
     for name, rule in RULE_WORDS.items():
         closest = closest_to_limit(finding for finding in verdict.findings if finding.rule == name)
         if closest is not None:
@@ -166,26 +166,26 @@ def _verdict_margins(verdict: Verdict) -> dict[tuple[str, str], float]:
 
 def _difference_notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
     """List the differences of the setups, and the distance between the tracks."""
-    a, b = first.setup, second.setup
+    first_setup, second_setup = first.setup, second.setup
     notes = []
-    for name, left, right in (
-        ("scenario", a.scenario.name, b.scenario.name),
-        ("aircraft", a.aircraft, b.aircraft),
-        ("seed", str(a.seed), str(b.seed)),
-        ("mission", *(mission_text(setup.mission, "waypoints") for setup in (a, b))),
-        ("wind", _wind_text(a), _wind_text(b)),
-        ("guidance", a.autopilot.store().guidance, b.autopilot.store().guidance),
-        ("navigation", a.nav, b.nav),
+    for name, first_value, second_value in (
+        ("scenario", first_setup.scenario.name, second_setup.scenario.name),
+        ("aircraft", first_setup.aircraft, second_setup.aircraft),
+        ("seed", str(first_setup.seed), str(second_setup.seed)),
+        ("mission", *(mission_text(setup.mission, "waypoints") for setup in (first_setup, second_setup))),
+        ("wind", _wind_text(first_setup), _wind_text(second_setup)),
+        ("guidance", first_setup.autopilot.store().guidance, second_setup.autopilot.store().guidance),
+        ("navigation", first_setup.nav, second_setup.nav),
     ):
-        if left != right:
-            notes.append(f"{name}: differs" if name == "mission" else f"{name}: {left} and {right}")
+        if first_value != second_value:
+            notes.append(f"{name}: differs" if name == "mission" else f"{name}: {first_value} and {second_value}")
     for log, name in zip((first, second), names, strict=True):
         if not np.isfinite(log.track.cross_track).any():
             notes.append(
                 f"cross-track and height error: guidance's own, which the log of {name} does not "
                 "contain; planfly refly measures an imported flight against its legs"
             )
-    if a.scenario.origin == b.scenario.origin:
+    if first_setup.scenario.origin == second_setup.scenario.origin:
         first_positions, second_positions = (
             log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second)
         )
@@ -230,19 +230,19 @@ def nearest_distances(points: Floats, track: Floats) -> Floats:
 
 def _wind_text(setup: FlightSetup) -> str:
     wind = setup.scenario.wind
-    source = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
-    return f"{wind.speed:g} m/s{source}, turbulence {wind.turbulence}"
+    direction_text = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
+    return f"{wind.speed:g} m/s{direction_text}, turbulence {wind.turbulence}"
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """List quantity, unit, first value, second value, and second less first, as text."""
-    first, second = (verdict.answer for verdict in comparison.verdicts)
-    rows: list[tuple[str, ...]] = [("verdict", "", first, second, "")]
-    for item in comparison.differences:
-        digits = None if item.unit else 0
-        change = number(item.second - item.first, signed=True, digits=digits)
-        both = (number(value, digits=digits) for value in (item.first, item.second))
-        rows.append((item.name, item.unit, *both, change))
+    first_answer, second_answer = (verdict.answer for verdict in comparison.verdicts)
+    rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]
+    for difference in comparison.differences:
+        digits = None if difference.unit else 0
+        change = number(difference.second - difference.first, signed=True, digits=digits)
+        values = (number(value, digits=digits) for value in (difference.first, difference.second))
+        rows.append((difference.name, difference.unit, *values, change))
     return rows
 
 
@@ -258,13 +258,13 @@ def difference_lines(comparison: Comparison) -> list[str]:
       not flyable  not flyable
              36.5         36.5        0.00
     """
-    head = ("", "", *(name[-24:] for name in comparison.names), "difference")
-    rows = [head, *difference_rows(comparison)]
-    rows = [(f"{name} ({unit})" if unit else name, *rest) for name, unit, *rest in rows]
+    header = ("", "", *(name[-24:] for name in comparison.names), "difference")
+    rows = [header, *difference_rows(comparison)]
+    rows = [(f"{name} ({unit})" if unit else name, *values) for name, unit, *values in rows]
     widths = [max(len(row[k]) for row in rows) for k in range(4)]
     lines = [
         "  ".join(
-            [row[0].ljust(widths[0]), *(cell.rjust(size) for cell, size in zip(row[1:], widths[1:], strict=True))]
+            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         ).rstrip()
         for row in rows
     ]
@@ -287,7 +287,7 @@ _PICTURES = {
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
     """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, created if missing.
 
-    svg: True to write the pictures as SVG, too.  The map is left out if the map origins of the flights differ.
+    svg: True to write the pictures as SVG, too.  The map is omitted if the map origins of the flights differ.
     Returns the paths written.  Raises OSError.
 
     >>> import tempfile

@@ -86,15 +86,19 @@ def shift_rows(estimate: Estimate, count: int = 3) -> list[tuple[str, str]]:
     sds = np.array([parameter.sd for parameter in PARAMETERS])
     for name, shift in estimate.shifts.items():
         order = np.argsort(-np.abs(shift / sds))[:count]
-        said = ", ".join(f"{PARAMETERS[k].title} {shift[k]:+.3f}" for k in order.tolist())
-        rows.append((name, said))
+        shift_text = ", ".join(f"{PARAMETERS[k].title} {shift[k]:+.3f}" for k in order.tolist())
+        rows.append((name, shift_text))
     return rows
 
 
 def prediction_rows(predicted: PredictedLog) -> list[tuple[str, str, list[str]]]:
     """Return quantity with unit, time ahead, and the root mean square error of each model, as text."""
     return [
-        (f"{name} ({unit})", f"{horizon:g} s", [f"{one.rms[horizon][k]:.3g}" for one in predicted.predictions])
+        (
+            f"{name} ({unit})",
+            f"{horizon:g} s",
+            [f"{prediction.rms[horizon][k]:.3g}" for prediction in predicted.predictions],
+        )
         for k, (name, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True))
         for horizon in HORIZONS_S
     ]
@@ -102,7 +106,7 @@ def prediction_rows(predicted: PredictedLog) -> list[tuple[str, str, list[str]]]
 
 def identification_page(facts: IdentificationFacts) -> str:
     """Return the whole page with its pictures, charts and scripts."""
-    charts = {f"fit-{k}": equation_chart(one) for k, one in enumerate(facts.estimate.equations)}
+    charts = {f"fit-{k}": equation_chart(equation) for k, equation in enumerate(facts.estimate.equations)}
     charts["predicted"] = prediction_chart(facts.predicted)
     pictures = draw_pictures(charts)
     script = script_text(CHART_SCRIPTS)
@@ -130,9 +134,9 @@ def _fit_charts(
     estimate: Estimate, charts: Mapping[str, Chart], pictures: Mapping[str, bytes]
 ) -> Sequence[tuple[str, str, str, str]]:
     """Return name, description and picture of each chart, and the quality of its fit."""
-    made = []
+    chart_rows = []
     for k, equation in enumerate(estimate.equations):
         name = f"fit-{k}"
-        said = f"R² {equation.explained:.3f}; its residuals are autocorrelated over {equation.correlation:.2g} s"
-        made.append((name, charts[name].title, picture_address(pictures[f"{name}.png"]), said))
-    return made
+        fit_text = f"R² {equation.explained:.3f}; its residuals are autocorrelated over {equation.correlation:.2g} s"
+        chart_rows.append((name, charts[name].title, picture_address(pictures[f"{name}.png"]), fit_text))
+    return chart_rows

@@ -28,7 +28,7 @@ from logs.verdict.verdict import Verdict
 from logs.views import figures
 from logs.views.charts import Chart
 from logs.views.failures import failures
-from logs.views.figures import FIGURES, Subject, View, figure_views, subject_of, view_json
+from logs.views.figures import FIGURES, Subject, View, figure_views, make_subject, view_json
 from logs.views.moments import aircraft_model, flight_moments
 from logs.views.report import tables
 from logs.views.report.text import (
@@ -243,11 +243,13 @@ def write_report(
     ['map.png', 'profile.png', 'report.html']
     """
     track = None if track is None or not len(track) else with_legs(track, verdict.leg_ends)
-    subject = subject_of(setup, track, verdict, returns)
+    subject = make_subject(setup, track, verdict, returns)
     views = figure_views(subject)
-    drawn = {entry.name for entry in FIGURES if every_picture or entry.still}
-    pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn}, svg=svg)
-    page = _page_html(setup, subject, views, pictures, ended=ended, versions=versions, command=command, events=events)
+    drawn_names = {entry.name for entry in FIGURES if every_picture or entry.still}
+    pictures = figures.draw_pictures({name: view for name, view in views.items() if name in drawn_names}, svg=svg)
+    page = _page_html(
+        setup, subject, views, pictures, end_reason=ended, versions=versions, command=command, events=events
+    )
     out_dir.mkdir(parents=True, exist_ok=True)
     files = {**pictures, "report.html": page.encode("utf-8")}
     for name, data in files.items():
@@ -261,7 +263,7 @@ def _page_html(
     views: Mapping[str, View],
     pictures: Mapping[str, bytes],
     *,
-    ended: str | None,
+    end_reason: str | None,
     versions: Mapping[str, str],
     command: str,
     events: Sequence["LogEvent"] = (),
@@ -269,7 +271,7 @@ def _page_html(
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)
-    shown = report_pictures(subject, page_charts(views), pictures)
+    shown_pictures = report_pictures(subject, page_charts(views), pictures)
     failing, lines, badge = failed_groups(verdict), verdict.lines or ("",), verdict_badge(verdict)
     return page_template("report.html").render(
         name=setup.scenario.name,
@@ -286,15 +288,15 @@ def _page_html(
         notes=[
             note for note in tables.mission_notes(setup) if not any(note in line for line in (*verdict.notes, *lines))
         ],
-        map=next((one for one in shown if one.identifier == "map"), None),
-        pictures=[one for one in shown if one.identifier != "map"],
+        map=next((picture for picture in shown_pictures if picture.identifier == "map"), None),
+        pictures=[picture for picture in shown_pictures if picture.identifier != "map"],
         leg_columns=tables.LEG_COLUMNS,
         legs=tables.leg_rows(setup, track, frozenset(failed.legs)),
         passage_columns=tables.PASSAGE_COLUMNS,
         passages=tables.passage_rows(setup, track),
         saturation=tables.saturation_rows(setup, track),
         scenario=tables.scenario_facts(setup),
-        flight=tables.flight_facts(setup, ended or ""),
+        flight=tables.flight_facts(setup, end_reason or ""),
         events=tables.event_rows(events),
         more_events=max(0, len(events) - tables.MAX_EVENTS),
         energy=tables.energy_facts(setup, track),
@@ -324,7 +326,7 @@ def _page_data(setup: FlightSetup, track: Track | None, views: Mapping[str, View
 
 
 def page_charts(views: Mapping[str, View]) -> dict[str, Any]:
-    """Return the charts that the scripts draw, by name of the figure; charts without panels are left out."""
+    """Return the charts that the scripts draw, by name of the figure; charts without panels are omitted."""
     return {name: view_json(view) for name, view in views.items() if not isinstance(view, Chart) or view.panels}
 
 
@@ -335,5 +337,5 @@ def report_flight(setup: FlightSetup, track: Track | None) -> dict[str, Any]:
     """
     flights = [] if track is None else [flight_moments(setup, track)]
     # A flight without a known position cannot be shown.
-    known = [flight for flight in flights if flight["time"]]
-    return {"flights": known, "model": aircraft_model()}
+    shown_flights = [flight for flight in flights if flight["time"]]
+    return {"flights": shown_flights, "model": aircraft_model()}

@@ -59,14 +59,14 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
     waypoints = setup.shown_waypoints
     runs, courses, slopes = leg_runs(waypoints), np.degrees(leg_courses(waypoints)), np.degrees(leg_slopes(waypoints))
     turns = np.degrees(signed_turns(waypoints))
-    above = ground_clearance(setup, track) if track is not None else None
+    heights_above_ground = ground_clearance(setup, track) if track is not None else None
     rows, numbers = [], setup.route.leg_numbers
     for leg in range(setup.route.legs):
         turn = NOTHING
         if leg < len(turns):
-            side = "right" if turns[leg] > 0.0 else "left"
-            turn = f"{number(abs(float(turns[leg])), digits=1)} {side}" if abs(turns[leg]) >= 0.05 else "0"
-        shape = (
+            direction = "right" if turns[leg] > 0.0 else "left"
+            turn = f"{number(abs(float(turns[leg])), digits=1)} {direction}" if abs(turns[leg]) >= 0.05 else "0"
+        planned_cells = (
             f"{numbers[leg]}",
             number(float(runs[leg]), digits=0),
             f"{round(float(courses[leg]), 1) % 360.0:05.1f}",
@@ -75,7 +75,7 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
             number(float(waypoints[leg + 1, 2]), digits=1),
             turn,
         )
-        rows.append(LegRow(shape + _flown_cells(track, above, leg), leg in failing))
+        rows.append(LegRow(planned_cells + _flown_cells(track, heights_above_ground, leg), leg in failing))
     return rows
 
 
@@ -87,7 +87,7 @@ def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
     return np.asarray(track.position[:, 2] - terrain.height(track.position[:, 0], track.position[:, 1]))
 
 
-def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[str, ...]:
+def _flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: int) -> tuple[str, ...]:
     rows = np.flatnonzero(track.leg == leg) if track is not None else np.zeros(0, dtype=np.intp)
     if track is None or rows.size == 0:
         return (NOTHING,) * 7
@@ -100,7 +100,7 @@ def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[s
         number(math.degrees(_max_magnitude(roll)), digits=1),
         number(_max_magnitude(track.cross_track[rows]), digits=2),
         number(_max_magnitude(track.height_error[rows]), digits=2),
-        number(_min_finite(above[rows]) if above is not None else None, digits=1),
+        number(_min_finite(heights_above_ground[rows]) if heights_above_ground is not None else None, digits=1),
         number(float(track.energy[last]) - float(track.energy[rows[0]]), digits=2),
     )
 
@@ -110,15 +110,23 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     if track is None:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
-    above = ground_clearance(setup, track)
-    landed = ground_phase_rows(track, setup.ground_ways)
-    low = NOTHING if above is None else number(_min_finite(above[~landed]), digits=0)
-    between = " between take-off and landing" if landed.any() else ""
-    height = f", never less than {low} m above ground{between}" if low != NOTHING else ""
-    energy = float(track.energy[-1])
-    # An imported log may hold no battery.
-    used = f", {number(energy, digits=0)} of {number(setup.battery, digits=0)} Wh" if math.isfinite(energy) else ""
-    return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height}{used}."
+    heights_above_ground = ground_clearance(setup, track)
+    is_ground_phase = ground_phase_rows(track, setup.ground_ways)
+    lowest_text = (
+        NOTHING
+        if heights_above_ground is None
+        else number(_min_finite(heights_above_ground[~is_ground_phase]), digits=0)
+    )
+    phase_text = " between take-off and landing" if is_ground_phase.any() else ""
+    height_text = f", never less than {lowest_text} m above ground{phase_text}" if lowest_text != NOTHING else ""
+    energy_used = float(track.energy[-1])
+    # An imported log may contain no battery data.
+    energy_text = (
+        f", {number(energy_used, digits=0)} of {number(setup.battery, digits=0)} Wh"
+        if math.isfinite(energy_used)
+        else ""
+    )
+    return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height_text}{energy_text}."
 
 
 def _max_magnitude(values: NDArray[np.float32]) -> float:
@@ -138,14 +146,14 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     facts: Facts = [("Scenario", scenario.name)]
     if scenario.spec.description:
         facts.append(("About", scenario.spec.description))
-    east, north = (float(np.ptp(side)) / 1000.0 for side in scenario.bounds)
+    east, north = (float(np.ptp(axis_range)) / 1000.0 for axis_range in scenario.bounds)
     facts.append(("Map origin", _position_text(scenario.origin.lat_deg, scenario.origin.lon_deg)))
     area = scenario.spec.area
-    floor = f"from {number(scenario.floor)} " if area is not None and area.floor_amsl_m is not None else ""
+    floor_text = f"from {number(scenario.floor)} " if area is not None and area.floor_amsl_m is not None else ""
     if not scenario.external:
         facts += [
             ("Area", f"{number(east)} km east–west, {number(north)} km north–south"),
-            ("Heights allowed", f"{floor}up to {number(scenario.ceiling)} m AMSL"),
+            ("Heights allowed", f"{floor_text}up to {number(scenario.ceiling)} m AMSL"),
         ]
     for name, point in (("Start", scenario.start), ("Destination", scenario.destination)):
         lat, lon = geographic(scenario, point)
@@ -153,11 +161,17 @@ def scenario_facts(setup: FlightSetup) -> Facts:
     if terrain is None:
         facts.append(("Terrain", "none was given, so the ground is not judged"))
     else:
-        error = f", stated error {quantity(terrain.vertical_error, 'm')}" if terrain.vertical_error is not None else ""
-        facts.append(("Terrain", f"{terrain.source}, every {quantity(terrain.spacing, 'm')}; {terrain.datum}{error}"))
-    missiles = int(np.count_nonzero(scenario.threats.kill_radius > 0.0))
-    radars = int(np.count_nonzero(scenario.threats.detection_radius > 0.0))
-    facts.append(("Threats", f"{len(scenario.threats)} units: {missiles} with missiles, {radars} with radars"))
+        error_text = (
+            f", stated error {quantity(terrain.vertical_error, 'm')}" if terrain.vertical_error is not None else ""
+        )
+        facts.append(
+            ("Terrain", f"{terrain.source}, every {quantity(terrain.spacing, 'm')}; {terrain.datum}{error_text}")
+        )
+    missile_count = int(np.count_nonzero(scenario.threats.kill_radius > 0.0))
+    radar_count = int(np.count_nonzero(scenario.threats.detection_radius > 0.0))
+    facts.append(
+        ("Threats", f"{len(scenario.threats)} units: {missile_count} with missiles, {radar_count} with radars")
+    )
     facts += _limit_facts(setup)
     return facts
 
@@ -175,8 +189,8 @@ def _limit_facts(setup: FlightSetup) -> Facts:
 
     wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
     if wind.gradient:
-        gain = number(100.0 * wind.gradient, signed=True)
-        wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gain} m/s per 100 m of height"
+        gradient_text = number(100.0 * wind.gradient, signed=True)
+        wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gradient_text} m/s per 100 m of height"
     return [
         (
             "Limits",
@@ -188,23 +202,23 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     ]
 
 
-def flight_facts(setup: FlightSetup, ended: str) -> Facts:
+def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
     """Return facts on aircraft, mission, route and plan."""
     bank = min(setup.max_bank, setup.envelope.max_bank)
-    braking = "may drive the motor" if setup.envelope.motor_braking else "does not drive the motor"
+    braking_text = "may drive the motor" if setup.envelope.motor_braking else "does not drive the motor"
     route = setup.route
     facts: Facts = [
         ("Aircraft", f"{setup.aircraft}, at {quantity(setup.airspeed, 'm/s')}, bank up to {quantity(bank, 'rad')}"),
-        ("Descent", f"the propeller {braking}"),
+        ("Descent", f"the propeller {braking_text}"),
         ("Mission", f"{setup.mission.source}: {len(setup.mission.items)} items, {route.legs} legs"),
         ("Route", f"{quantity(float(path_length(route.waypoints)) / 1000.0, 'km')} long"),
     ]
     if setup.plan is not None:
         plan = setup.plan
-        how = f"{plan.algorithm}, seed {plan.seed}, {plan.evaluations} paths tried"
-        facts.append(("Plan", f"{how}; {_plan_status(plan.feasible, plan.safe)}"))
-    if ended:
-        facts.append(("Flight ended", ended))
+        plan_text = f"{plan.algorithm}, seed {plan.seed}, {plan.evaluations} paths tried"
+        facts.append(("Plan", f"{plan_text}; {_plan_status(plan.feasible, plan.safe)}"))
+    if end_reason:
+        facts.append(("Flight ended", end_reason))
     return facts
 
 
@@ -228,19 +242,23 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
     """Summarize the energy that the flight drew from the battery, beyond the amount in `flight_sentence`."""
     if track is None or len(track) == 0:
         return []
-    used = float(track.energy[-1])
-    if not math.isfinite(used):
+    used_energy = float(track.energy[-1])
+    if not math.isfinite(used_energy):
         return []
     seconds = float(track.time[-1] - track.time[0])
     distance = float(path_length(track.position)) / 1000.0
     facts: Facts = [
-        ("Left", f"{quantity(setup.battery - used, 'Wh')}, {quantity(100.0 * (1.0 - used / setup.battery), '%')}"),
+        (
+            "Left",
+            f"{quantity(setup.battery - used_energy, 'Wh')},"
+            f" {quantity(100.0 * (1.0 - used_energy / setup.battery), '%')}",
+        ),
         ("Peak current", quantity(_max_magnitude(track.current), "A")),
     ]
     if seconds > 0.0:
-        facts.append(("Mean power", quantity(used * 3600.0 / seconds, "W")))
+        facts.append(("Mean power", quantity(used_energy * 3600.0 / seconds, "W")))
     if distance > 0.0:
-        facts.append(("Per kilometre", quantity(used / distance, "Wh")))
+        facts.append(("Per kilometre", quantity(used_energy / distance, "Wh")))
     return facts
 
 
@@ -283,7 +301,7 @@ def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...
             number(stay.closest, digits=0),
             number(radius, digits=0),
         )
-        for stay, name, unit, radius in sorted(stays, key=lambda item: item[0].start)
+        for stay, name, unit, radius in sorted(stays, key=lambda entry: entry[0].start)
     ]
 
 
@@ -291,21 +309,23 @@ def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, 
     """List each control with its limit, its largest command, and its time at the limit (s, %)."""
     if track is None or len(track) < 2:
         return []
-    lasts = np.append(np.diff(track.time), 0.0)
+    durations = np.append(np.diff(track.time), 0.0)
     rows: list[tuple[str, ...]] = []
     for k, ((name, limit), command) in enumerate(zip(control_limits(setup.aircraft), track.commands.T, strict=True)):
-        low = 0.0 if name == "throttle" else -limit
-        held = float(lasts[held_at_limit(track, k, low, limit)].sum())
+        min_command = 0.0 if name == "throttle" else -limit
+        saturation_time = float(durations[held_at_limit(track, k, min_command, limit)].sum())
         scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
-        peak = number(scale * _max_magnitude(command), digits=1)
+        peak_text = number(scale * _max_magnitude(command), digits=1)
         limit_text = number(scale * limit, digits=1)
         rows.append(
             (
                 name,
                 limit_text if limit_text == NOTHING else limit_text + unit,
-                peak + unit,
-                number(held, digits=1) if math.isfinite(limit) else NOTHING,
-                number(100.0 * held / max(float(lasts.sum()), 1e-9), digits=1) if math.isfinite(limit) else NOTHING,
+                peak_text + unit,
+                number(saturation_time, digits=1) if math.isfinite(limit) else NOTHING,
+                number(100.0 * saturation_time / max(float(durations.sum()), 1e-9), digits=1)
+                if math.isfinite(limit)
+                else NOTHING,
             )
         )
     return rows

@@ -80,13 +80,13 @@ def number(value: float | None, *, signed: bool = False, digits: int | None = No
     """
     if value is None or not math.isfinite(value):
         return NOTHING
-    size = abs(value)
+    magnitude = abs(value)
     if digits is None:
-        digits = 0 if size >= 1000 else 1 if size >= 10 else 2
-        if 5e-5 < size < 0.1:
-            digits = 4 if size < 0.01 else 3
+        digits = 0 if magnitude >= 1000 else 1 if magnitude >= 10 else 2
+        if 5e-5 < magnitude < 0.1:
+            digits = 4 if magnitude < 0.01 else 3
     text = f"{value:{'+' if signed else ''},.{digits}f}"
-    if not any(mark in "123456789" for mark in text):
+    if not any(character in "123456789" for character in text):
         text = text.lstrip("+-")
     # A thousands comma could be read as a decimal comma; a thin space cannot.
     return text.replace(",", "\u2009").replace("-", "−")
@@ -116,17 +116,17 @@ def finding_state(ok: bool | None, *, is_open: bool = False) -> str:
 def verdict_badge(verdict: Verdict) -> Badge:
     """Summarize the verdict in one word; a verdict whose only failure is completion is incomplete."""
     if verdict.flyable:
-        word = verdict.answer.capitalize() + ("" if verdict.level == "flown" else " on paper, not flown")
-        return Badge("pass", _SIGNS["pass"], word)
+        answer = verdict.answer.capitalize() + ("" if verdict.level == "flown" else " on paper, not flown")
+        return Badge("pass", _SIGNS["pass"], answer)
     if verdict.level == "plan":
         return Badge("fail", _SIGNS["fail"], "Not flyable: no feasible plan")
     if verdict.undecided:
         return Badge("open", _SIGNS["open"], "Not judged in full")
-    word = "not flown as planned" if verdict.imported else "not flyable"
-    broken = {finding.rule for finding in verdict.findings if finding.ok is False} - {"completion"}
-    if not broken and not verdict.complete:
-        return Badge("fail", "!", f"Incomplete, so {word}")
-    return Badge("fail", _SIGNS["fail"], word.capitalize() + ("" if verdict.complete else ", and incomplete"))
+    answer = "not flown as planned" if verdict.imported else "not flyable"
+    failed_rules = {finding.rule for finding in verdict.findings if finding.ok is False} - {"completion"}
+    if not failed_rules and not verdict.complete:
+        return Badge("fail", "!", f"Incomplete, so {answer}")
+    return Badge("fail", _SIGNS["fail"], answer.capitalize() + ("" if verdict.complete else ", and incomplete"))
 
 
 def headline_without_answer(badge: Badge, headline: str) -> str:
@@ -211,7 +211,7 @@ def count_sentence(rows: list[FindingRow]) -> str:
 
 def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
     state = finding_state(finding.ok, is_open=bool(undecided_findings([finding])))
-    planned, flown, margin = (
+    planned_value, flown_value, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
     )
     margin_with_tolerance = None if margin is None else margin + (in_unit(finding.tolerance, finding.unit)[0] or 0.0)
@@ -224,8 +224,8 @@ def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) ->
         sign=f"{_SIGNS[state]} {_WORDS[state]}",
         rule=rule_word(finding.rule),
         where=finding.where,
-        planned=number(planned, digits=digits),
-        flown=number(flown, digits=digits),
+        planned=number(planned_value, digits=digits),
+        flown=number(flown_value, digits=digits),
         limit=_limit_text(finding, digits),
         limit_source=finding.limit_source,
         margin=number(margin_with_tolerance, signed=True),
@@ -238,8 +238,8 @@ def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) ->
     )
 
 
-# Most decimals of a value and its limit.
-_MOST_DECIMALS = 6
+# Largest number of decimals of a value and its limit.
+_MAX_DECIMALS = 6
 
 
 def _needed_decimals(finding: Finding) -> int | None:
@@ -250,9 +250,9 @@ def _needed_decimals(finding: Finding) -> int | None:
     if value is None or limit is None or value == limit or number(value) != number(limit):
         return None
     sufficient_decimals = (
-        digits for digits in range(_MOST_DECIMALS) if number(value, digits=digits) != number(limit, digits=digits)
+        digits for digits in range(_MAX_DECIMALS) if number(value, digits=digits) != number(limit, digits=digits)
     )
-    return next(sufficient_decimals, _MOST_DECIMALS)
+    return next(sufficient_decimals, _MAX_DECIMALS)
 
 
 def _limit_text(finding: Finding, digits: int | None) -> str:
@@ -284,7 +284,7 @@ def _sentence(finding: Finding) -> str:
 
 
 def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
-    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is left out."""
+    """Count the findings by rule, in the order of `RULE_WORDS`; a rule without findings is omitted."""
     return [_rule_row(rule) for rule in findings_by_rule(findings)]
 
 
@@ -308,7 +308,12 @@ def _rule_row(rule: RuleFindings) -> RuleRow:
 # ----------------------------------------------------------------------
 # An imported flight compared with its simulation, in words: legs, turns, and how far the model can be trusted.
 
-_CALLED = {"cross_track": "cross-track", "height_error": "height", "ground_speed": "ground speed", "bank": "bank"}
+_QUANTITY_NAMES = {
+    "cross_track": "cross-track",
+    "height_error": "height",
+    "ground_speed": "ground speed",
+    "bank": "bank",
+}
 _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)", "energy (Wh)")
 
 
@@ -325,20 +330,20 @@ def refly_lines(again: Reflight) -> list[str]:
     >>> refly_lines(again)[0]
     'AUTO from 0.0 s to 36.5 s, legs 0 to 1: flown / simulated'
     """
-    legs: list[tuple[str, ...]] = [_HEAD]
+    leg_table: list[tuple[str, ...]] = [_HEAD]
     for pair in again.legs:
         numbers = (pair.cross_track, pair.height_error, pair.ground_speed, pair.bank, pair.energy)
-        legs.append((f"leg {pair.leg}", *map(_pair_text, numbers)))
-    turns: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
+        leg_table.append((f"leg {pair.leg}", *map(_pair_text, numbers)))
+    turn_table: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
     for turn in again.turns:
         name = f"waypoint {turn.waypoint} ({turn.turn:+.1f}°)"
-        turns.append((name, *map(_pair_text, (turn.overshoot, turn.bank, turn.passed))))
+        turn_table.append((name, *map(_pair_text, (turn.overshoot, turn.bank, turn.passed))))
     stretch = again.stretch
     stretch_text = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
     legs_text = f", legs {again.first} to {again.first + len(again.legs) - 1}"
-    lines = [f"{stretch_text}{legs_text}: flown / simulated", *_format_columns(legs)]
+    lines = [f"{stretch_text}{legs_text}: flown / simulated", *_format_columns(leg_table)]
     if again.turns:
-        lines += ["", *_format_columns(turns)]
+        lines += ["", *_format_columns(turn_table)]
     return [*lines, "", trust_line(again)]
 
 
@@ -349,31 +354,31 @@ def trust_line(again: Reflight) -> str:
     if not again.spreads:
         return f"Model and flight have no part in common: it is unknown how far {model_text} can be trusted"
     spread_texts = [
-        f"{_CALLED[spread.name]} {number(spread.median)} {spread.unit} ({number(spread.most)} {spread.unit})"
+        f"{_QUANTITY_NAMES[spread.name]} {number(spread.median)} {spread.unit} ({number(spread.most)} {spread.unit})"
         for spread in again.spreads
     ]
     end_text = "" if again.ended == "completed" else f"; the simulated flight ended early: {again.ended}"
     wind = again.setup.scenario.wind
-    gusts = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
-    wind_text = f" in {wind.speed:.1f} m/s of wind, {gusts}"
+    gust_text = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
+    wind_text = f" in {wind.speed:.1f} m/s of wind, {gust_text}"
     return f"Model {model_text}{wind_text}, against the flight, median (95 %): {', '.join(spread_texts)}{end_text}"
 
 
-def not_reflown_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
+def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[MissionStretch], max_count: int) -> list[str]:
     """List the stretches that were not flown again, with the reasons.
 
-    stretches: stretches of the imported flight.  flown_again: largest number of stretches to fly again.
+    stretches: stretches of the imported flight.  max_count: largest number of stretches to fly again.
 
     >>> not_reflown_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
     ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']
     """
-    compared = {again.stretch.start for again in agains}
+    compared_starts = {reflight.stretch.start for reflight in reflights}
     lines = []
     for stretch in stretches:
-        if stretch.start not in compared:
+        if stretch.start not in compared_starts:
             reason = "it passed no two waypoints in order"
-            if len(agains) >= flown_again:
-                reason += f", or {flown_again} longer ones were"
+            if len(reflights) >= max_count:
+                reason += f", or {max_count} longer ones were"
             name = stretch.mode or "the flight"
             lines.append(f"Not flown again: {name} from {stretch.start:.1f} s to {stretch.end:.1f} s: {reason}")
     return lines
@@ -387,7 +392,7 @@ def _format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
         "  ".join(
-            [row[0].ljust(widths[0]), *(cell.rjust(size) for cell, size in zip(row[1:], widths[1:], strict=True))]
+            [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
         )
         for row in rows
     ]

@@ -182,7 +182,7 @@ def test_rows_missing_at_the_end_are_counted(tmp_path: Path, log_file: Path) -> 
         return None if topic == "/state" and item.sequence >= 470 else item
 
     log = read_log(rewrite(log_file, tmp_path / "b.mcap", lose))
-    assert (log.complete, log.problem, log.ended) == (False, "470 of 480 rows are there", "completed")
+    assert (log.complete, log.problem, log.ended) == (False, "the log contains 470 of 480 rows", "completed")
 
 
 def test_a_log_prints_in_a_line_and_is_a_table_in_a_notebook(log_file: Path, tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def test_each_plan_stands_at_its_values_in_each_panel(front: Front) -> None:
 def test_a_plan_alone_stands_on_axes_that_show_what_matters(front: Front) -> None:
     """9 km, of whose hundredth 3 % are left on either side, and 1 s, m or Wh: no plan differs by less."""
     chart = front_chart(replace(front, plans=front.plans[:1]))
-    assert chart.reach == pytest.approx((9.0 - 0.0027, 9.0 + 0.0027))
+    assert chart.axis_range == pytest.approx((9.0 - 0.0027, 9.0 + 0.0027))
     assert [panel.min_span for panel in chart.panels] == [1.0] * 4
     assert [[layer.name for layer in panel.layers] for panel in chart.panels] == [["1: shortest"]] * 4
 

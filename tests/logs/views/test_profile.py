@@ -11,7 +11,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from logs.views.charts import Chart, Layer
-from logs.views.figures import figure_views, subject_of
+from logs.views.figures import figure_views, make_subject
 from logs.views.profile import profile_chart
 from tests.flight.autopilots.arduplane.flown_grounds import circuit
 from tests.logs.views.figure_data import ALL, ROUTE, drawn_profile, make_scenario, make_track, make_verdict
@@ -57,7 +57,7 @@ def test_a_leg_above_ground_is_drawn_above_the_ground() -> None:
 def test_the_flown_ends_of_a_flight_stand_on_the_ground() -> None:
     """Take-off to 60 m over level ground at 0 m; the landing's leg itself is level at 54 m."""
     setup = circuit(Launch("catapult", math.radians(90.0), 20.0), LandingStrip(500.0, 600.0))
-    chart = figure_views(subject_of(setup, None, judge_geometry(setup)))["profile"]
+    chart = figure_views(make_subject(setup, None, judge_geometry(setup)))["profile"]
     assert isinstance(chart, Chart)
     planned = next(layer for layer in chart.panels[0].layers if layer.name == "planned")
     # 1500 m ahead, 600 m aside, 400 m back, and 600 m to the landing point.
@@ -105,7 +105,7 @@ def test_heights_ground_and_clearance_are_those_of_plan_flight_and_terrain() -> 
     assert found["terrain"].y == pytest.approx(200.0)
     required = setup.scenario.limits.min_clearance_m
     (clearance,) = (layer for name, layer in found.items() if name.startswith("required clearance"))
-    assert clearance.low == pytest.approx(200.0)
+    assert clearance.lower_edge == pytest.approx(200.0)
     assert clearance.y == pytest.approx(200.0 + required)
     assert [mark for _, mark in chart.marks] == ["leg 0", "leg 1", "leg 2"]
 

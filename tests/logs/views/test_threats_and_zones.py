@@ -117,8 +117,8 @@ def bands(zone: Zone) -> tuple[list[Layer], list[Label]]:
 
 def box(layer: Layer) -> tuple[float, float, float, float]:
     where = np.isfinite(layer.y)
-    assert layer.low is not None
-    return layer.x[where].min(), layer.low[where].min(), layer.x[where].max(), layer.y[where].max()
+    assert layer.lower_edge is not None
+    return layer.x[where].min(), layer.lower_edge[where].min(), layer.x[where].max(), layer.y[where].max()
 
 
 def test_an_exclusion_takes_its_band_where_the_way_is_over_it() -> None:

@@ -29,13 +29,13 @@ def test_bank_and_height_above_ground_are_those_of_track_and_terrain() -> None:
     flown = line(bank, "flown")
     assert np.interp(41.0, flown.x, flown.y) == pytest.approx(-math.degrees(0.5))
     assert bank.limits == (
-        ("limit of planned turns; corrections may pass it", pytest.approx(30.0)),
+        ("limit of planned turns; corrections may bank beyond it", pytest.approx(30.0)),
         ("", pytest.approx(-30.0)),
     )
     above = line(panel(chart, "height above"), "from track and terrain")
     # The ground is level at 200 m; the route starts at 300 m and ends at 360 m.
     assert above.y[[0, -1]] == pytest.approx([100.0, 160.0])
-    assert line(panel(chart, "cross-track"), "as guidance saw it").y.min() == -3.25
+    assert line(panel(chart, "cross-track"), "according to guidance").y.min() == -3.25
     # Legs of 40, 32 and 25 rows, a row a second.
     assert chart.marks == ((0.0, "leg 0"), (40.0, "leg 1"), (72.0, "leg 2"))
     assert (chart.along, chart.unit, chart.timed) == ("time since the start", "s", True)
@@ -56,7 +56,7 @@ def test_controls_are_in_degrees_and_the_throttle_in_percent() -> None:
     elevator, aileron, _, throttle = chart.panels
     assert [panel.title for panel in chart.panels] == ["elevator", "aileron", "rudder", "throttle"]
     assert line(elevator, "commanded").y == pytest.approx(10.0, abs=1e-5)
-    assert line(elevator, "as it stood").y == pytest.approx(5.0, abs=1e-5)
+    assert line(elevator, "actual").y == pytest.approx(5.0, abs=1e-5)
     assert line(throttle, "commanded").y.max() == 100.0
     # Held at full throttle from 30 to 59 s, and again from 80 to 82 s.
     band = throttle.layers[0]
@@ -73,7 +73,7 @@ def test_power_and_energy_as_height_are_the_tracks() -> None:
     height = panel(chart, "energy as")
     # 25^2 / (2 9.80665) = 31.87 m above the height itself, at the start 300 m.
     assert line(height, "height and speed").y[0] == pytest.approx(300.0 + 31.866, abs=0.01)
-    assert line(height, "height alone").y[0] == 300.0
+    assert line(height, "height only").y[0] == 300.0
 
 
 def test_an_aircraft_without_a_battery_shows_the_heat_of_its_fuel_in_kilowatt_hours() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flight.simulation.track import TRACK_ROW, as_track
-from logs.verdict.findings import GROUND_WAY, UNKNOWN_AIRCRAFT, Finding, make_finding
+from logs.verdict.findings import GROUND_PATH, UNKNOWN_AIRCRAFT, Finding, make_finding
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from planfly.campaigns.campaign_base import CampaignBase
@@ -33,7 +33,7 @@ from tests.planfly.campaigns.made_campaigns import write_short
 from tests.setups import route_along
 from tests.synthetic import fly_path, make_setup
 
-CHECKS = (GROUND_WAY, UNKNOWN_AIRCRAFT)
+CHECKS = (GROUND_PATH, UNKNOWN_AIRCRAFT)
 
 # ----------------------------------------------------------------------
 # Narrow passes, by plain sums: a missile beside a straight track, and findings with little margin.

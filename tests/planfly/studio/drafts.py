@@ -71,7 +71,9 @@ def session_of(mission: Mission, name: str = "jacksboro") -> Session:
     """A session of a mission in a scenario's world."""
     scenario, airframe = world_of(name)
     setup = make_setup(scenario, airframe, mission, 1)
-    return Session.of(Document("drawn.waypoints", "drawn", setup, "waypoints"), MissionOptions(scenario=name))
+    return Session.from_document(
+        Document("drawn.waypoints", "drawn", setup, "waypoints"), MissionOptions(scenario=name)
+    )
 
 
 def drawn_session(seed: int, count: int, name: str = "jacksboro", *, jumps: bool = True) -> Session:

@@ -4,15 +4,15 @@ import re
 
 from flight.mission import edits
 from planfly.studio import messages
-from planfly.studio.changes import Figures, describe_changes, flight_figures
+from planfly.studio.changes import FlightResults, describe_changes, flight_results
 from planfly.studio.session import Session
 from tests.planfly.studio.drafts import drawn_session
 
 
-def figures_of(session: Session, seconds: float = 100.0) -> Figures:
+def figures_of(session: Session, seconds: float = 100.0) -> FlightResults:
     """Of the geometric verdict, whose findings are made as those of a flight are."""
     judged = session.judged
-    return flight_figures(judged.mission, judged.setup.route, judged.verdict.findings, seconds)
+    return flight_results(judged.mission, judged.setup.route, judged.verdict.findings, seconds)
 
 
 def test_a_height_that_fails_and_is_mended_is_said_with_its_leg_and_figures() -> None:

@@ -72,7 +72,7 @@ def test_progress_never_runs_backwards_and_is_told_to_new_pages(jobs: Jobs) -> N
 
 
 def test_a_scenario_is_planned_first_and_not_judged_meanwhile(jobs: Jobs) -> None:
-    session = Session.of(open_document("tight", MissionOptions()), MissionOptions())
+    session = Session.from_document(open_document("tight", MissionOptions()), MissionOptions())
     jobs.start_first_work(session)
     assert jobs.is_planning_first_path(session)
     (work,) = asked(jobs, LONG_WORKER)

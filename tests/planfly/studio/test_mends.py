@@ -105,7 +105,7 @@ def test_a_failed_undo_leaves_what_is_shown() -> None:
 
 def planned_session() -> Session:
     document = open_document("jacksboro", MissionOptions())
-    return Session.of(document, MissionOptions())
+    return Session.from_document(document, MissionOptions())
 
 
 def test_what_a_plan_of_waypoints_would_drop_is_refused() -> None:
@@ -279,7 +279,9 @@ def test_the_zones_of_a_named_fence_stand_in_the_next_world(tmp_path: Path) -> N
     fence = tmp_path / "z.geojson"
     fence.write_text(json.dumps({"type": "FeatureCollection", "features": [shape]}), encoding="utf-8")
     world = MissionOptions(terrain="jacksboro", fence=(str(fence),))
-    session = Session.of(open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), world), world)
+    session = Session.from_document(
+        open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), world), world
+    )
     assert len(session.context.scenario.zones) == 1
     k = edits.places(session.mission)[-1]
     east, north, _ = session.item_position(k)
@@ -373,7 +375,7 @@ def test_a_full_disk_is_said_once(tmp_path: Path) -> None:
         return sent(page)
 
     (fault,) = asyncio.run(run())
-    assert "edits are not being kept: " in fault["text"]
+    assert "edits are not being saved: " in fault["text"]
 
 
 def test_a_page_that_missed_a_frame_is_closed() -> None:
@@ -381,9 +383,9 @@ def test_a_page_that_missed_a_frame_is_closed() -> None:
         page = Page(NoSocket(), dark=False)  # type: ignore[arg-type]
         for _ in range(64):
             page.send({})
-        assert not page.full.is_set()
+        assert not page.has_overflowed.is_set()
         page.send({})
-        return page.full.is_set()
+        return page.has_overflowed.is_set()
 
     assert asyncio.run(run())
 

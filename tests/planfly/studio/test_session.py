@@ -325,7 +325,7 @@ def test_a_sphere_is_passed_with_what_navigation_may_be_off_to_spare() -> None:
 def test_a_scenario_opens_with_its_straight_line() -> None:
     document = open_document("jacksboro", MissionOptions())
     assert document.to_plan
-    session = Session.of(document, MissionOptions())
+    session = Session.from_document(document, MissionOptions())
     assert len(edits.places(session.mission)) == 2
     assert session.sheet()["verdict"]["state"] == "fail"
 
@@ -335,7 +335,7 @@ def test_a_mission_without_a_scenario_takes_its_world_along() -> None:
     document = open_dropped(
         "m.waypoints", mission_text(mission, "waypoints").encode(), MissionOptions(terrain="jacksboro")
     )
-    session = Session.of(document, MissionOptions(terrain="jacksboro"))
+    session = Session.from_document(document, MissionOptions(terrain="jacksboro"))
     k = edits.places(session.mission)[-1]
     east, north, _ = session.item_position(k)
     world = session.world_rev

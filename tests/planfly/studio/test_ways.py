@@ -20,7 +20,7 @@ def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatc
     asked: list[Work] = []
     monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.ask", lambda self, work: asked.append(work))
     session, jobs = (
-        Session.of(open_document("hard-07", MissionOptions()), MissionOptions()),
+        Session.from_document(open_document("hard-07", MissionOptions()), MissionOptions()),
         Jobs(lambda name, answer: None),
     )
     with pytest.raises(PlanflyError, match="algorithm"):

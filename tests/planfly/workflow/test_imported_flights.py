@@ -215,7 +215,7 @@ def test_notes_tell_what_a_person_should_know(tmp_path: Path) -> None:
     assert "Note: the log contains no parameters: ArduPlane's defaults are used" in flight.verdict.lines
     assert "Wind: 3.0 m/s on average, from 000°, by XKF2 of the log" in flight.verdict.lines
     assert (
-        "Heights: POS, above mean sea level, according to the log; at the start GPS.Alt +0.5 m of it"
+        "Heights: POS, above mean sea level, according to the log; at the start GPS.Alt +0.5 m relative to it"
         in flight.verdict.lines
     )
 

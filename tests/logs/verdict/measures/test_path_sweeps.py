@@ -21,7 +21,7 @@ def test_a_chord_has_its_length_its_time_and_its_exposure() -> None:
     visits = path_spheres(STRAIGHT, TIME, centre, radius, scale)
     half = math.sqrt(500.0**2 - away**2)
     exposure = 2 * (half / (2 * away**2 * (away**2 + half**2)) + math.atan(half / away) / (2 * away**3)) * 200.0**4
-    assert visits.inside[0] == pytest.approx(2.0 * half / 25.0)
+    assert visits.time_inside[0] == pytest.approx(2.0 * half / 25.0)
     assert visits.exposure[0] == pytest.approx(exposure / 25.0, rel=1e-3)
     assert (visits.closest[0], visits.closest_time[0]) == pytest.approx((away, 80.0))
     assert visits.entry_time[0] == pytest.approx((2000.0 - half) / 25.0)
@@ -30,7 +30,7 @@ def test_a_chord_has_its_length_its_time_and_its_exposure() -> None:
 def test_no_sphere_and_one_that_is_not_entered() -> None:
     centres = np.array([[2000.0, 0.0, 300.0], [2000.0, 900.0, 300.0]])
     visits = path_spheres(STRAIGHT, TIME, centres, np.array([0.0, 500.0]), np.array([100.0, 100.0]))
-    assert visits.inside.tolist() == visits.exposure.tolist() == [0.0, 0.0]
+    assert visits.time_inside.tolist() == visits.exposure.tolist() == [0.0, 0.0]
     assert visits.closest.tolist() == [math.inf, 900.0]
     assert np.isnan(visits.entry_time).all()
 
@@ -46,7 +46,7 @@ def test_blocks_of_segments_add_up_to_the_segments() -> None:
         share, mean = segment_exposure(points[k], points[k + 1], centre, radius, scale)
         inside += share * (time[k + 1] - time[k])
         exposure += mean * (time[k + 1] - time[k])
-    assert visits.inside[0] == pytest.approx(inside)
+    assert visits.time_inside[0] == pytest.approx(inside)
     assert visits.exposure[0] == pytest.approx(exposure)
 
 

@@ -251,9 +251,11 @@ def whole(one: Record, records: ZoneRecords) -> Record:
     part: Record = np.zeros(1, PART).view(PART)[0]
     part.first, part.last = 0.0, 1.0
     part.east, part.north, up = move_point(one, 0.0)
-    part.away, part.off, part.edge = looked(records, (part.east, part.north, up))
-    part.to_east, part.to_north, up = move_point(one, 1.0)
-    part.to_away, part.to_off, part.to_edge = looked(records, (part.to_east, part.to_north, up))
+    part.outline_distance, part.band_distance, part.edge = looked(records, (part.east, part.north, up))
+    part.end_east, part.end_north, up = move_point(one, 1.0)
+    part.end_outline_distance, part.end_band_distance, part.end_edge = looked(
+        records, (part.end_east, part.end_north, up)
+    )
     return part
 
 
@@ -316,7 +318,12 @@ def test_a_copy_is_the_same() -> None:
 def ends(away: float, to_away: float, off: float, to_off: float) -> Record:
     """A part by what is asked of its ends alone."""
     part: Record = np.zeros(1, PART).view(PART)[0]
-    part.away, part.to_away, part.off, part.to_off = away, to_away, off, to_off
+    part.outline_distance, part.end_outline_distance, part.band_distance, part.end_band_distance = (
+        away,
+        to_away,
+        off,
+        to_off,
+    )
     return part
 
 
@@ -359,7 +366,9 @@ def test_an_arc_is_bounded_by_its_bow_up_to_a_radian(turned: float, bounded: boo
     part = whole(way[0], records)
     found = farthest_from_outline(records, 0, way[0], part, length)
     bow = 0.125 * turned / length * length**2
-    assert found == (pytest.approx(max(part.away, part.to_away) + bow) if bounded else math.inf)
+    assert found == (
+        pytest.approx(max(part.outline_distance, part.end_outline_distance) + bow) if bounded else math.inf
+    )
 
 
 @pytest.mark.parametrize(

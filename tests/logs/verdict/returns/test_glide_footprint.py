@@ -66,6 +66,6 @@ def test_only_what_is_asked_for_is_shown() -> None:
 
 def test_where_no_way_leads_or_the_ground_is_not_known_there_is_no_band() -> None:
     found = cone()
-    found.chosen[:, :100] = np.inf
-    found.made.ground[:, 101:] = np.nan
+    found.min_altitude[:, :100] = np.inf
+    found.grid.ground[:, 101:] = np.nan
     assert all(shape(band.parts).area < 2.0 * 200.0 * CELL * CELL * 2.0 for band in found.bands())

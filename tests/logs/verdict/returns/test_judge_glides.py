@@ -85,21 +85,21 @@ def test_arduplanes_own_return_ends_where_its_law_says(tmp_path: Path) -> None:
     """It glides straight home, into the hill from behind it, and gets there from before it."""
     found = judged(hill_setup(tmp_path), 4.0)
     before = [one for one in found.each if 500.0 < one.start[0] < 2500.0]
-    assert {one.own.end for one in before} == {"arrives"}
-    assert all(one.own.arrival_height > 100.0 for one in before)
+    assert {one.own_return.end for one in before} == {"arrives"}
+    assert all(one.own_return.arrival_height > 100.0 for one in before)
     behind = [one for one in found.each if one.start[0] > 5600.0]
-    assert {one.own.end for one in behind} == {"ground"}
+    assert {one.own_return.end for one in behind} == {"ground"}
     for one in behind:
-        assert one.own.shortfall == pytest.approx(math.dist(one.own.impact[:2], (0.0, 0.0)), abs=1.0)
-        assert one.own.shortfall > 600.0
-        assert math.isnan(one.own.arrival_height)
+        assert one.own_return.shortfall == pytest.approx(math.dist(one.own_return.impact[:2], (0.0, 0.0)), abs=1.0)
+        assert one.own_return.shortfall > 600.0
+        assert math.isnan(one.own_return.arrival_height)
     # Over the hill, and not by 30 m.
-    low = [one.own for one in judged(hill_setup(tmp_path), 1.0).each if one.own.end == "low"]
+    low = [one.own_return for one in judged(hill_setup(tmp_path), 1.0).each if one.own_return.end == "low"]
     assert low
     assert all(0.0 < one.clearance < 30.0 for one in low)
-    assert found.arrivals == sum(one.own.end == "arrives" for one in found.each) > len(before)
+    assert found.arrivals == sum(one.own_return.end == "arrives" for one in found.each) > len(before)
     # It is never better than the best there is, but for what the turn gives back of its speed.
-    assert all(one.altitudes_left[0] > -25.0 for one in found.each if one.own.end == "arrives")
+    assert all(one.altitudes_left[0] > -25.0 for one in found.each if one.own_return.end == "arrives")
 
 
 def test_a_sphere_on_the_way_home_stops_its_own_return_and_is_flown_around(tmp_path: Path) -> None:
@@ -108,7 +108,7 @@ def test_a_sphere_on_the_way_home_stops_its_own_return_and_is_flown_around(tmp_p
     )
     found = judged(hill_setup(tmp_path, threat), 4.0)
     ones = [one for one in found.each if 2400.0 < one.start[0] < 3800.0]
-    assert {one.own.end for one in ones} == {"threat"}
+    assert {one.own_return.end for one in ones} == {"threat"}
     assert {one.reach for one in ones} == {"home"}
 
 
@@ -125,7 +125,7 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
         "not judged: the model has no trim with the throttle closed"
     )
     follows = judged(setup, 20.0, TERRAIN_FOLLOW=1)
-    assert {one.own.end for one in follows.each} == {"not flown"}
+    assert {one.own_return.end for one in follows.each} == {"not flown"}
     assert {one.reach for one in follows.each} == {"home", "flat"}
     assert "is not simulated" in glides_headline(follows)
     starts = planned_starts(setup, 20.0)

@@ -13,7 +13,7 @@ from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import GROUND_WAY, Finding
+from logs.verdict.findings import GROUND_PATH, Finding
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import of
@@ -115,7 +115,7 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
         found, verdict = judged("climbout", wall(500.0, top), *TAKEOFF)
         assert found.ok is ok, top
         # The take-off item states no course, which leaves the verdict open by itself.
-        assert [item.rule for item in verdict.findings if item.check == GROUND_WAY and item.ok is None] == [
+        assert [item.rule for item in verdict.findings if item.check == GROUND_PATH and item.ok is None] == [
             "takeoff",
             *(["climbout"] if ok is None else []),
         ]

@@ -54,7 +54,7 @@ def test_a_flight_is_judged_by_its_track() -> None:
     low = edited(track, position=track.position - np.array([0.0, 0.0, 60.0]))
     items = findings(setup, low)
     assert [item.ok for item in items] == [True] * 4
-    assert "the planned path comes up to 3" in items[1].reason
+    assert "the planned path rises to 3" in items[1].reason
 
 
 def test_the_scenarios_ceiling_counts_on_each_leg() -> None:
@@ -174,4 +174,4 @@ def test_a_plan_above_the_limit_is_told_beside_a_flight_that_is_not(over: float,
     low = edited(track, position=track.position - np.array([0.0, 0.0, 9.0]))
     (item,) = findings(setup, low)
     assert item.ok is True
-    assert ("the planned path comes up to" in item.reason) is told
+    assert ("the planned path rises to" in item.reason) is told

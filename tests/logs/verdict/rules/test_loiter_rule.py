@@ -23,7 +23,7 @@ def test_a_circle_has_its_item_radius_and_turns() -> None:
     (circle,) = loiter_circles(route_requirements(setup))
     assert set(setup.route.items[circle.first : circle.last + 1].tolist()) == {2}
     assert circle.radius == 200.0
-    assert circle.turns == pytest.approx(2.0, abs=0.5)
+    assert circle.laps == pytest.approx(2.0, abs=0.5)
 
 
 def test_one_finding_a_loiter_and_none_of_its_corners() -> None:

@@ -54,7 +54,7 @@ def test_a_circle_is_joined_and_left_on_tangents(radius: float) -> None:
     joined, left = math.asin(abs(radius) / 2000.0), math.asin(abs(radius) / 2500.0)
     # Clockwise it is left towards the east after a quarter of a turn more, the other way round after three.
     quarter = 0.25 if radius > 0.0 else 0.75
-    assert circle.turns == pytest.approx(2.0 + quarter + (joined + left) / (2.0 * math.pi), abs=1e-4)
+    assert circle.laps == pytest.approx(2.0 + quarter + (joined + left) / (2.0 * math.pi), abs=1e-4)
     assert circle.center == pytest.approx(MIDDLE, abs=0.01)
     assert circle.radius == abs(radius)
 
@@ -74,14 +74,14 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     setup = loiter()
     requirements, aligned, circle = laid(setup, wider)
     item = of(judge(setup, aligned.track), "loiter")
-    way = 2.0 * math.pi * 200.0 * circle.turns
+    way = 2.0 * math.pi * 200.0 * circle.laps
     share = (math.sqrt(2000.0**2 - 200.0**2) + way - WIDER_FROM) / way
     assert item.flown == pytest.approx(200.0 + share * wider, abs=0.05)
     assert item.planned == 200.0
     low, high = (float(word) for word in item.reason.split("flown with ")[1].split(" m")[0].split(" to "))
     assert low == pytest.approx(200.0 + min(wider, 0.0), abs=0.06)
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
-    assert f"{circle.turns:.2f} turns with 200 m" in item.reason
+    assert f"{circle.laps:.2f} turns with 200 m" in item.reason
     assert item.margin == pytest.approx(200.0 - float(requirements.min_radius[circle.first : circle.last + 1].max()))
 
 

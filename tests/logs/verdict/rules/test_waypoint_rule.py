@@ -170,7 +170,9 @@ def test_a_waypoints_margin_is_what_is_left_of_its_radius(aside: float, ok: bool
     setup = accepting(make_setup(STRAIGHT), 20.0)
     item = of(judge(setup, fly_path(setup, across=bump(3000.0, aside, 150.0))), "waypoint", waypoint(1))
     assert (item.ok, item.margin) == (ok, pytest.approx(margin, abs=0.02))
-    assert ("20 m, and 0.6 m for navigation and gusts, count as reached (the mission's)" in item.reason) is not ok
+    assert (
+        "it counts as reached within 20 m plus 0.6 m for navigation and gusts (the mission's)" in item.reason
+    ) is not ok
 
 
 def test_past_the_line_beside_it_there_is_no_margin() -> None:
@@ -187,8 +189,8 @@ def test_px4_turns_by_its_own_radius_and_says_so() -> None:
     )
     planned = of(judge_geometry(setup), "waypoint", waypoint(1)).reason
     assert planned == (
-        "PX4 turns to the next leg 10 m before it, or where it is past it; PX4 does not read the mission's 120 m"
+        "PX4 turns to the next leg 10 m before it, or once it is past it; PX4 does not read the mission's 120 m"
     )
     own = replace(setup, route=replace(setup.route, acceptance=np.zeros(3)))
     told = of(judge_geometry(own), "waypoint", waypoint(1)).reason
-    assert told == "PX4 turns to the next leg 10 m before it, or where it is past it"
+    assert told == "PX4 turns to the next leg 10 m before it, or once it is past it"

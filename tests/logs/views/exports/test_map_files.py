@@ -166,6 +166,6 @@ def test_returns_have_the_colours_of_what_they_come_to(tmp_path: Path) -> None:
     # Where nothing is flat there is no shape of it.
     footprint = drawn.glides.footprint
     assert footprint is not None
-    steep = dataclasses.replace(footprint, flat=np.zeros_like(footprint.flat))
+    steep = dataclasses.replace(footprint, is_landable=np.zeros_like(footprint.is_landable))
     glides = dataclasses.replace(drawn.glides, footprint=steep)
     assert len(glide_shapes(setup, dataclasses.replace(drawn, glides=glides))) == len(shapes) - 1

@@ -18,7 +18,7 @@ from plotly.offline import get_plotlyjs
 import logs.views.figures
 from logs.verdict.places import Change, Place
 from logs.verdict.verdict import Verdict
-from logs.views.figures import FIGURES, View, figure_views, subject_of
+from logs.views.figures import FIGURES, View, figure_views, make_subject
 from logs.views.report.page import (
     CHART_SCRIPTS,
     VIEW_SCRIPTS,
@@ -47,7 +47,7 @@ from tests.soak import SOAK
 NAMES = [entry.name for entry in FIGURES]
 STILLS = ("map", "profile")
 TURN = Place("waypoint", 1, 2)
-FLOWN = subject_of(make_setup(), make_track(), VERDICT)
+FLOWN = make_subject(make_setup(), make_track(), VERDICT)
 DRAWN = {f"{name}.png": name.encode() for name in NAMES}
 
 
@@ -78,7 +78,7 @@ def test_a_plan_alone_is_not_said_to_have_been_flown() -> None:
     setup = make_setup(terrain={"kind": "none"}, threats=[])
     names = ("map", "profile", "scene")
     flown = report_pictures(FLOWN, names, DRAWN)
-    planned = report_pictures(subject_of(setup, None, VERDICT), names, DRAWN)
+    planned = report_pictures(make_subject(setup, None, VERDICT), names, DRAWN)
     assert all("flown" in picture.alternative for picture in flown)
     assert not any("flown" in picture.alternative for picture in planned)
     # Three legs and one unit over terrain; the other has neither.
@@ -91,7 +91,7 @@ def test_there_is_a_chart_for_every_figure_with_data() -> None:
     # The flight is exposed to nothing.
     assert set(charts) == {"map", "profile", "scene", "turns", "envelope", "time", "controls", "energy"}
     json.dumps(charts, allow_nan=False)
-    planned = page_charts(figure_views(subject_of(make_setup(), None, VERDICT)))
+    planned = page_charts(figure_views(make_subject(make_setup(), None, VERDICT)))
     assert set(planned) == {"map", "profile", "scene", "turns", "envelope"}
 
 

@@ -19,7 +19,7 @@ def test_exposure_on_circles_is_the_circles_own_to_a_thousandth(away: float) -> 
     visits = path_spheres(points, np.arange(257.0), np.zeros((1, 3)), np.array([2.0 * away]), np.array([away]))
     around = 2.0 * math.pi * np.arange(10_000) / 10_000
     squared = (away + 60.0 * np.cos(around)) ** 2 + (60.0 * np.sin(around)) ** 2
-    assert visits.inside[0] == pytest.approx(256.0)
+    assert visits.time_inside[0] == pytest.approx(256.0)
     assert visits.exposure[0] == pytest.approx(256.0 * float((away**4 / squared**2).mean()), rel=1e-3)
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logs.verdict.findings import GROUND_WAY, Finding
+from logs.verdict.findings import GROUND_PATH, Finding
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.rules.touchdown_rule import _detect_faults, _Landing, _landing_finding, _undecided_messages
 from tests.flight.autopilots.arduplane.flown_grounds import circuit
@@ -91,7 +91,7 @@ def test_a_strip_that_is_too_short_is_said_before_the_flight(length: float, open
     flown = flown_circuit()
     setup = flown.setup.in_scenario(replace(flown.setup.scenario, landing=replace(STRIP, length=length)))
     said = [one for one in judge_geometry(setup).findings if one.rule == "touchdown"]
-    assert [one.check for one in said] == ([GROUND_WAY] if open_ else [])
+    assert [one.check for one in said] == ([GROUND_PATH] if open_ else [])
 
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
@@ -132,7 +132,7 @@ def test_a_final_within_three_metres_of_the_ground_is_left_open(up: float, ok: b
     one = with_low_final(400.0, up)
     assert one.ok is ok, one.reason
     if ok is None:
-        assert (one.check, one.brief) == (GROUND_WAY, "the final approach clears the ground by only 3.0 m")
+        assert (one.check, one.brief) == (GROUND_PATH, "the final approach clears the ground by only 3.0 m")
 
 
 @pytest.mark.parametrize(("more", "ok"), [(2.0, None), (-2.0, True)])
@@ -152,7 +152,7 @@ def test_a_landing_point_is_within_ten_metres_of_the_ground(point: float, ok: bo
     setup = circuit(RAIL, STRIP, point=point, TKOFF_THR_MINACC=15.0)
     one = found(setup, flown_circuit().track, "touchdown")
     assert one.ok is ok, one.reason
-    assert (one.check == GROUND_WAY) is (ok is None)
+    assert (one.check == GROUND_PATH) is (ok is None)
     if ok is not True:
         assert one.brief == f"the landing point of item 5 is 10 m {'above' if point > 0.0 else 'below'} the ground"
 
@@ -167,5 +167,5 @@ def test_a_sink_beyond_all_that_was_seen_is_left_open(sink: float, ok: bool | No
     one = found(flown.setup, replace(track, velocity=velocity), "touchdown")
     assert one.ok is ok, one.reason
     if ok is None:
-        assert one.check == GROUND_WAY
+        assert one.check == GROUND_PATH
         assert one.brief == "sinks at 5.0 m/s towards the ground at touchdown"
