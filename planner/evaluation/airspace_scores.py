@@ -109,12 +109,12 @@ def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Re
 def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
     """Return the maximum height above ground along a piece and on both sides of it, m, or NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
-    run, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
+    horizontal_length, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
     for side in (0.0, -1.0, 1.0):
         for end, point, lateral in ((a, piece.begin, piece.lateral_begin), (b, piece.end, piece.lateral_end)):
-            end[0] = point[0] + side * lateral * dy / run
-            end[1] = point[1] - side * lateral * dx / run
+            end[0] = point[0] + side * lateral * dy / horizontal_length
+            end[1] = point[1] - side * lateral * dx / horizontal_length
             end[2] = -(point[2] + piece.above)
         mirrored, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
         max_height = math.nan if math.isnan(mirrored) or math.isnan(max_height) else max(max_height, -mirrored)
@@ -241,8 +241,8 @@ def _swath_excess_height(
 
     If the excess is larger than `max_excess`, return a lower bound that is larger than `max_excess`, too.
     """
-    run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
-    east, north = lateral * (b[1] - a[1]) / run, -lateral * (b[0] - a[0]) / run
+    horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
+    east, north = lateral * (b[1] - a[1]) / horizontal_length, -lateral * (b[0] - a[0]) / horizontal_length
     largest_excess = 0.0
     for side in (0.0, -1.0, 1.0):
         if side != 0.0 and lateral < _MIN_OFFSET:

@@ -256,8 +256,12 @@ def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record
         runs[b] = math.sqrt(dx * dx + dy * dy)
         lengths[b] += math.sqrt(dx * dx + dy * dy + dz * dz)
     for b in range(size):
-        rise, run = up[b], runs[b]
-        slopes[b] += 1.0 if (rise - climb * run > 0.0) | (-rise - dive * run > 0.0) else 0.0
+        altitude_change, horizontal_length = up[b], runs[b]
+        slopes[b] += (
+            1.0
+            if (altitude_change - climb * horizontal_length > 0.0) | (-altitude_change - dive * horizontal_length > 0.0)
+            else 0.0
+        )
     if not is_first:
         for b in range(size):
             # A leg without a course makes no turn: both sides are 0.

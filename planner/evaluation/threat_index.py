@@ -295,12 +295,12 @@ def _clip_fractions(begin: float, end: float) -> tuple[float, float]:
 
 
 @inlined
-def _shift_towards_missile(z: float, rise: float, below: float, above: float) -> float:
+def _shift_towards_missile(z: float, altitude_change: float, below: float, above: float) -> float:
     """Return the height of a segment's start above a missile (m), shifted towards it by the tracking error.
 
-    rise: rise of the segment up to its closest point, m.
+    altitude_change: altitude change of the segment up to its closest point, m.
     """
-    height = z + rise
+    height = z + altitude_change
     shift = min(height, below) if height > 0.0 else max(height, -above)
     return z - shift
 

@@ -431,17 +431,23 @@ def _add_slopes(
     """Add the slope margins of legs, as m of height, and their lengths above the minimum; see `_add_ground`."""
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
-        dx, dy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
-        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        dx, dy, altitude_change = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
+        horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
         for kind in range(3):
             tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
             second_slopes = slopes[1]
-            second_slopes[0], second_slopes[1], second_slopes[2] = tangent * dx / run, tangent * dy / run, sign
+            second_slopes[0], second_slopes[1], second_slopes[2] = (
+                tangent * dx / horizontal_length,
+                tangent * dy / horizontal_length,
+                sign,
+            )
             for axis in range(3):
                 slopes[0, axis] = -slopes[1, axis]
             number = first_number + 3 * i + kind
-            values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
+            values[number] = (
+                tangent * horizontal_length + sign * altitude_change - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
+            )
             merit += _add_constraint(values[number], i, 2, multipliers[number], penalty, model)
     return merit
 
@@ -487,11 +493,11 @@ def _add_turns(
     for i in range(count):
         number = first_number + count + 1 + i
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
-        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
         begin_tangent, end_tangent = math.tan(0.5 * min(MAX_TURN, turn[i])), math.tan(0.5 * min(MAX_TURN, turn[i + 1]))
         needed_length = active.after[i] * begin_tangent + active.before[i + 1] * end_tangent + active.roll[i]
         slopes[:] = 0.0
-        for axis, component in ((0, dx / run), (1, dy / run)):
+        for axis, component in ((0, dx / horizontal_length), (1, dy / horizontal_length)):
             slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * component, (1.0 - SETTLING_SHARE) * component
         _add_turn_derivatives(
             before_derivatives[i],
@@ -506,7 +512,10 @@ def _add_turns(
             slopes[1:],
         )
         values[number] = (
-            (1.0 - SETTLING_SHARE) * run - needed_length - min(SETTLING_LENGTH, needed_length) - active.turn_margin
+            (1.0 - SETTLING_SHARE) * horizontal_length
+            - needed_length
+            - min(SETTLING_LENGTH, needed_length)
+            - active.turn_margin
         )
         merit += _add_constraint(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
