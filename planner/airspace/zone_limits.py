@@ -259,8 +259,8 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
 @inlined
 def _view_circle(along: float, across: float, radius: float, horizontal_length: float) -> ShapeView:
     """Return a circle as seen from a line, given its centre in the line's axes."""
-    gap = along - min(horizontal_length, max(0.0, along))
-    min_distance = math.sqrt(gap * gap + across * across) - radius
+    distance_beyond_end = along - min(horizontal_length, max(0.0, along))
+    min_distance = math.sqrt(distance_beyond_end * distance_beyond_end + across * across) - radius
     max_inside_distance = math.sqrt(max(abs(along), abs(along - horizontal_length)) ** 2 + across * across) - radius
     is_inside = along * along + across * across <= radius * radius
     # The line is outside, or inside, or crosses the outline.
@@ -272,10 +272,10 @@ def _view_circle(along: float, across: float, radius: float, horizontal_length: 
 def _edge_distance2(along: float, across: float, to_along: float, to_across: float, horizontal_length: float) -> float:
     """Return the squared distance between the line and an edge that does not cross it."""
     # Two pieces that do not cross are nearest at an end of one of them.
-    gap = along - min(horizontal_length, max(0.0, along))
-    min_distance2 = gap * gap + across * across
-    gap = to_along - min(horizontal_length, max(0.0, to_along))
-    min_distance2 = min(min_distance2, gap * gap + to_across * to_across)
+    distance_beyond_end = along - min(horizontal_length, max(0.0, along))
+    min_distance2 = distance_beyond_end * distance_beyond_end + across * across
+    distance_beyond_end = to_along - min(horizontal_length, max(0.0, to_along))
+    min_distance2 = min(min_distance2, distance_beyond_end * distance_beyond_end + to_across * to_across)
     along_step, across_step = to_along - along, to_across - across
     length2 = along_step * along_step + across_step * across_step
     # From the line's beginning, then from its end.

@@ -216,14 +216,14 @@ def _leg_excess_height(
     """Return a leg's excess over the maximum height above ground, height lag included, m x km."""
     if not data.tracking.has_error:
         return _swath_excess_height(data, required, a, b, 0.0, 0.0, math.inf)
-    total, begin, end = 0.0, np.empty(3), np.empty(3)
+    total, start, end = 0.0, np.empty(3), np.empty(3)
     for k in range(len(_LAG_CUTS)):
         begin_fraction = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
         end_fraction = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
         if end_fraction > begin_fraction:
-            _cut_segment(a, b, begin_fraction, end_fraction, begin, end)
+            _cut_segment(a, b, begin_fraction, end_fraction, start, end)
             above = max(0.0, -lag_at(lag, begin_fraction), -lag_at(lag, end_fraction))
-            total += _swath_excess_height(data, required, begin, end, across, above, math.inf)
+            total += _swath_excess_height(data, required, start, end, across, above, math.inf)
     return total
 
 
@@ -259,11 +259,11 @@ def _swath_excess_height(
 
 @inlined
 def _cut_segment(
-    a: Floats, b: Floats, begin_fraction: float, end_fraction: float, begin: Floats, end: Floats
+    a: Floats, b: Floats, begin_fraction: float, end_fraction: float, start: Floats, end: Floats
 ) -> None:  # pragma: no cover
-    """Fill `begin` and `end` with the ends of the part of a-b between two fractions of its length."""
+    """Fill `start` and `end` with the ends of the part of a-b between two fractions of its length."""
     for axis in range(3):
-        begin[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
+        start[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
         end[axis] = a[axis] + end_fraction * (b[axis] - a[axis])
 
 

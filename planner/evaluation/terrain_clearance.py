@@ -143,13 +143,16 @@ def _take_sample(
     pitch: minimum spacing of samples, as a fraction of the line.
     """
     ground = pixel_height(heights, column, row)
-    gap = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH
+    excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH
     i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m per length of the line.
     max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * horizontal_length + abs(altitude_change) + 1e-9
-    next_step, tile_step = (gap - max_further_height - NEAR_GROUND) / max_fall, tile_side / (horizontal_length + 1e-9)
+    next_step, tile_step = (
+        (excess_height - max_further_height - NEAR_GROUND) / max_fall,
+        tile_side / (horizontal_length + 1e-9),
+    )
     next_step = next_step if next_step < tile_step else tile_step
-    return gap, next_step if next_step > pitch else pitch
+    return excess_height, next_step if next_step > pitch else pitch
 
 
 @inlined
@@ -187,10 +190,10 @@ def terrain_excess(
                 clearance_at(required, ax + fraction * (bx - ax), ay + fraction * (by - ay)) + extra_height
             )
         x, y, up = column + fraction * column_step, row + fraction * row_step, az + fraction * altitude_change
-        gap, next_step = _take_sample(
+        excess_height, next_step = _take_sample(
             heights, tiles, tile_side, growth, x, y, up, required_height, 0.0, horizontal_length, altitude_change, pitch
         )
-        depth -= gap if gap < 0.0 else 0.0
+        depth -= excess_height if excess_height < 0.0 else 0.0
         if fraction >= 1.0 or depth > max_depth:
             break
         fraction = min(1.0, fraction + next_step)
@@ -262,7 +265,7 @@ def sample_terrain(
             if lags[k].max_below > 0.0:
                 below = max(0.0, lag_at(lags[k], fraction))
                 further_height = lags[k].max_below - below
-            gap, next_step = _take_sample(
+            excess_height, next_step = _take_sample(
                 heights,
                 tiles,
                 tile_side,
@@ -276,10 +279,10 @@ def sample_terrain(
                 altitude_change,
                 pitch,
             )
-            leg.depth -= gap if gap < 0.0 else 0.0
+            leg.depth -= excess_height if excess_height < 0.0 else 0.0
             gap_at_beginning, gap_at_end = (
-                gap if fraction <= leg.beginning else math.inf,
-                gap if fraction >= leg.ending else math.inf,
+                excess_height if fraction <= leg.beginning else math.inf,
+                excess_height if fraction >= leg.ending else math.inf,
             )
             leg.height_at_beginning = (
                 gap_at_beginning if gap_at_beginning < leg.height_at_beginning else leg.height_at_beginning

@@ -288,10 +288,12 @@ def kill_density(
 
 
 @inlined
-def _clip_fractions(begin: float, end: float) -> tuple[float, float]:
+def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, float]:
     """Return two fractions of a line in increasing order, clipped to it."""
-    begin, end = (begin, end) if begin < end else (end, begin)
-    return begin if begin > 0.0 else 0.0, end if end < 1.0 else 1.0
+    start_fraction, end_fraction = (
+        (start_fraction, end_fraction) if start_fraction < end_fraction else (end_fraction, start_fraction)
+    )
+    return start_fraction if start_fraction > 0.0 else 0.0, end_fraction if end_fraction < 1.0 else 1.0
 
 
 @inlined

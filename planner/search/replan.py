@@ -142,15 +142,15 @@ def _check_first_waypoint(scenario: Scenario, old: Plan, leg: int) -> None:
         )
     forbidden = violated_zones(scenario, old.waypoints[[leg, leg]])
     if forbidden:
-        begin_text = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
-        message = f"{scenario.name}: leg {leg}: {begin_text}: every path from there violates it"
+        reason = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
+        message = f"{scenario.name}: leg {leg}: {reason}: every path from there violates it"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:
     """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
-    points = [np.asarray(point, dtype=np.float64) for point in path]
-    while len(points) < count:
-        longest = int(np.argmax(leg_runs(np.array(points))))
-        points.insert(longest + 1, 0.5 * (points[longest] + points[longest + 1]))
-    return np.array(points)
+    waypoints = [np.asarray(point, dtype=np.float64) for point in path]
+    while len(waypoints) < count:
+        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
+        waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
+    return np.array(waypoints)

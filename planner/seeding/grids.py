@@ -286,15 +286,25 @@ def relax_stage(
         if first > last:
             continue
         for side in range(-SIDEWAYS, SIDEWAYS + 1):
-            begin, end = max(first, -side), min(last, width - 1 - side) + 1
-            if begin >= end:
+            first_cell, end_cell = max(first, -side), min(last, width - 1 - side) + 1
+            if first_cell >= end_cell:
                 continue
             limit = step_layers[side + SIDEWAYS, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
-                source, target = z * width + begin, next_z * width + begin + side
-                relax(flat_cost, flat_price, flat_next_cost, flat_parents, source, target, target, end - begin, length)
+                source, target = z * width + first_cell, next_z * width + first_cell + side
+                relax(
+                    flat_cost,
+                    flat_price,
+                    flat_next_cost,
+                    flat_parents,
+                    source,
+                    target,
+                    target,
+                    end_cell - first_cell,
+                    length,
+                )
 
 
 @inner

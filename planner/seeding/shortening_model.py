@@ -193,23 +193,32 @@ def constraint_count(active: ActiveConstraints) -> int:
 
 
 @inner
-def carry_multipliers(old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints) -> Floats:
-    """Return the multipliers for new active constraints; a new pair of leg and missile starts with 0."""
-    new_multipliers, pair_count, old_pair_count = (
-        np.zeros(constraint_count(new)),
-        new.pairs.shape[0],
-        old.pairs.shape[0],
+def carry_multipliers(
+    previous_active: ActiveConstraints, multipliers: Floats, next_active: ActiveConstraints
+) -> Floats:
+    """Return the multipliers for the next active constraints; a new pair of leg and missile starts with 0."""
+    new_multipliers, pair_count, previous_pair_count = (
+        np.zeros(constraint_count(next_active)),
+        next_active.pairs.shape[0],
+        previous_active.pairs.shape[0],
     )
-    copy_into(new_multipliers[pair_count:], multipliers[old_pair_count:])
+    copy_into(new_multipliers[pair_count:], multipliers[previous_pair_count:])
     k = 0
     for p in range(pair_count):
         # Both are sorted by missile and leg.
-        while k < old_pair_count and (
-            old.pairs[k, 1] < new.pairs[p, 1]
-            or (old.pairs[k, 1] == new.pairs[p, 1] and old.pairs[k, 0] < new.pairs[p, 0])
+        while k < previous_pair_count and (
+            previous_active.pairs[k, 1] < next_active.pairs[p, 1]
+            or (
+                previous_active.pairs[k, 1] == next_active.pairs[p, 1]
+                and previous_active.pairs[k, 0] < next_active.pairs[p, 0]
+            )
         ):
             k += 1
-        if k < old_pair_count and old.pairs[k, 0] == new.pairs[p, 0] and old.pairs[k, 1] == new.pairs[p, 1]:
+        if (
+            k < previous_pair_count
+            and previous_active.pairs[k, 0] == next_active.pairs[p, 0]
+            and previous_active.pairs[k, 1] == next_active.pairs[p, 1]
+        ):
             new_multipliers[p] = multipliers[k]
     return new_multipliers
 
@@ -247,13 +256,13 @@ def _add_constraint(
     new_multiplier = multiplier - penalty * value
     if not new_multiplier > 0.0:
         return -multiplier * multiplier / (2.0 * penalty)
-    size, begin = model.gradient.size, 3 * (first_waypoint - 1)
+    size, first_row = model.gradient.size, 3 * (first_waypoint - 1)
     for a in range(3 * waypoint_count):
-        row = begin + a
+        row = first_row + a
         if 0 <= row < size:
             model.gradient[row] -= new_multiplier * model.slopes[a // 3, a % 3]
             for b in range(a + 1):
-                if begin + b >= 0:
+                if first_row + b >= 0:
                     model.band[row, a - b] += penalty * model.slopes[a // 3, a % 3] * model.slopes[b // 3, b % 3]
     return (new_multiplier * new_multiplier - multiplier * multiplier) / (2.0 * penalty)
 
@@ -294,13 +303,13 @@ def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) 
     total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
-        begin = 3 * (i - 1)
+        first_row = 3 * (i - 1)
         for a in range(6):
-            row = begin + a
+            row = first_row + a
             if 0 <= row < size:
                 model.gradient[row] += leg.slopes[a // 3, a % 3]
                 for b in range(a + 1):
-                    if begin + b >= 0:
+                    if first_row + b >= 0:
                         model.band[row, a - b] += leg.curvature[a // 3, a % 3, b // 3, b % 3]
     return total
 

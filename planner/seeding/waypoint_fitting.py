@@ -95,17 +95,17 @@ def _max_depth_below_leg(
     east: float,
     north: float,
     horizontal_length: float,
-    low: float,
-    high: float,
+    start_altitude: float,
+    end_altitude: float,
 ) -> float:
     """Return the largest distance of the aircraft below a long leg, m; negative if it is always above.
 
     east, north: unit course of the leg.
     """
-    altitude_change = high - low
+    altitude_change = end_altitude - start_altitude
     if abs(altitude_change) < data.tracking.step:
         return -altitude_change
-    length = lag_length(data.tracking, data.aircraft, east, north, low, limits.wind)
+    length = lag_length(data.tracking, data.aircraft, east, north, start_altitude, limits.wind)
     return length * altitude_change / max(horizontal_length, 1e-6)
 
 
