@@ -420,11 +420,11 @@ def _evaluate(coefficients: tuple[float, ...], x: float) -> float:
 
 
 def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
-    """Return a polynomial in an element, by Horner's method."""
-    *lower, highest = coefficients
-    text = f"<v> {number(highest)} </v>"
-    for value in reversed(lower):
-        text = total(f"<v> {number(value)} </v>", product(x, text))
+    """Return the JSBSim element of a polynomial in x, by Horner's method."""
+    *lower_coefficients, leading_coefficient = coefficients
+    text = f"<v> {number(leading_coefficient)} </v>"
+    for coefficient in reversed(lower_coefficients):
+        text = total(f"<v> {number(coefficient)} </v>", product(x, text))
     return text
 
 

@@ -38,7 +38,7 @@ LEG = np.dtype([("east", np.float64), ("north", np.float64), ("run", np.float64)
 CORNER = np.dtype([(name, np.float64) for name in ("tangent", "radius", "before", "after", "excursion")])
 
 # Straight part of a leg between its two turns: fraction of the leg.
-SETTLING_SHARE = 0.05
+SETTLING_FRACTION = 0.05
 # Upper limit on its additional length, which is the length of small turns, m.
 SETTLING_LENGTH = 20.0
 
@@ -121,7 +121,7 @@ def settling_length(turn_lengths: float, horizontal_length: float) -> float:
 
     turn_lengths: length of both turns, m.
     """
-    return SETTLING_SHARE * horizontal_length + min(SETTLING_LENGTH, turn_lengths)
+    return SETTLING_FRACTION * horizontal_length + min(SETTLING_LENGTH, turn_lengths)
 
 
 @inlined
@@ -142,7 +142,7 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
 
 @inner
 def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind) -> float:
-    """Return the length of leg i that rolling between its two turns takes up, m; 0 if both turn the same way."""
+    """Return the length of leg i used for rolling between its two turns, m; 0 if both turns have the same direction."""
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north

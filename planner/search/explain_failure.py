@@ -349,7 +349,7 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:
-    """Name the missiles, or the altitude, that block every path; no line if that is not proven."""
+    """Name the missiles or the altitude that block every path; return no line if this is not proven."""
     data, ceiling = problem.certified, "the ceiling"
     missiles, level_altitude = closing_missiles(data), highest_level_flight(data)
     if missiles is None:
@@ -374,7 +374,7 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
-    """Return the names of the exclusions that a path (w, 3) enters and of the inclusions that it leaves.
+    """Return the names of the exclusion zones a path (w, 3) enters and the inclusion zones it leaves.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

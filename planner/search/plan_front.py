@@ -256,7 +256,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
-    """Reduce the task's margins to those of the default path (w, 3), so that others may pass equally narrow gaps."""
+    """Reduce the task's margins to the margins of the default path (w, 3), so that other paths may be equally tight."""
     for fraction in MARGINS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():

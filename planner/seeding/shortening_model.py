@@ -17,8 +17,8 @@ import numpy as np
 from planner.evaluation.corners import (
     CORNER,
     LEG,
+    SETTLING_FRACTION,
     SETTLING_LENGTH,
-    SETTLING_SHARE,
     courses_at,
     measure_corner,
     measure_corners,
@@ -507,7 +507,10 @@ def _add_turns(
         needed_length = active.after[i] * begin_tangent + active.before[i + 1] * end_tangent + active.roll[i]
         slopes[:] = 0.0
         for axis, component in ((0, dx / horizontal_length), (1, dy / horizontal_length)):
-            slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * component, (1.0 - SETTLING_SHARE) * component
+            slopes[1, axis], slopes[2, axis] = (
+                -(1.0 - SETTLING_FRACTION) * component,
+                (1.0 - SETTLING_FRACTION) * component,
+            )
         _add_turn_derivatives(
             before_derivatives[i],
             after_derivatives[i],
@@ -521,7 +524,7 @@ def _add_turns(
             slopes[1:],
         )
         values[number] = (
-            (1.0 - SETTLING_SHARE) * horizontal_length
+            (1.0 - SETTLING_FRACTION) * horizontal_length
             - needed_length
             - min(SETTLING_LENGTH, needed_length)
             - active.turn_margin
