@@ -201,9 +201,9 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
         index[b] = cell_index if is_inside else outside
     for b in range(size):
         cell, z = cells[np.uintp(index[b])], up[b]
-        first_entry, entry_count, lowest, highest = cell.first, cell.count, cell.lowest, cell.highest
+        first_entry, entry_count, min_altitude, max_altitude = cell.first, cell.count, cell.lowest, cell.highest
         first[b] = first_entry
-        count[b] = entry_count if (z >= lowest) & (z <= highest) else 0
+        count[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
 
 
 @inlined

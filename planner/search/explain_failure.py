@@ -62,7 +62,7 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     if terrain is None or not scenario.zones:
         return None
     pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
-    east, north = (np.arange(min_heights + 0.5 * pitch, high, pitch) for min_heights, high in scenario.bounds)
+    east, north = (np.arange(lower + 0.5 * pitch, upper, pitch) for lower, upper in scenario.bounds)
     ground = terrain.height(east[None, :], north[:, None])
     min_heights = np.maximum(ground + scenario.limits.min_clearance_m, scenario.floor)
     max_heights = np.full(ground.shape, scenario.ceiling)
