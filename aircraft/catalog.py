@@ -344,7 +344,7 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
 
 
 def _renamed_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the files of the new folder by path: those of aircraft and model, renamed to the new name."""
+    """Return the files of the new folder by path: the files of aircraft and model, renamed to the new name."""
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}

@@ -86,9 +86,9 @@ RANGES = {
 # Rounding of a conversion of units, as a ratio.
 _EDGE_ROUNDING = 1e-12
 # Range of the ratio of stall speed to cruise speed.
-STALL_SHARE = (0.35, 0.87)
+STALL_RATIO_RANGE = (0.35, 0.87)
 # Range of the ratio of top speed to cruise speed.
-TOP_SHARE = (1.05, 2.5)
+TOP_RATIO_RANGE = (1.05, 2.5)
 # Range of the lift coefficient at the stall.
 LIFT_RANGE = (0.5, 2.4)
 # Range of the aspect ratio, span^2 / area.
@@ -251,13 +251,13 @@ _ENGINE_EFFICIENCY = 0.15
 _FRICTION_RATIO = 0.08
 
 
-def _is_within(value: float, low: float, high: float) -> bool:
-    """Return True for a value within a range, whose edges may be off by the rounding of a conversion of units.
+def _is_within(value: float, min_value: float, max_value: float) -> bool:
+    """Return True if a value is within a range, except for the rounding of a unit conversion.
 
     >>> _is_within(math.radians(15.0) / (math.pi / 180.0), 15.0, 60.0), _is_within(14.9, 15.0, 60.0)
     (True, False)
     """
-    return low * (1.0 - _EDGE_ROUNDING) <= value <= high * (1.0 + _EDGE_ROUNDING)
+    return min_value * (1.0 - _EDGE_ROUNDING) <= value <= max_value * (1.0 + _EDGE_ROUNDING)
 
 
 def check_sheet(sheet: DataSheet) -> DataSheet:
@@ -271,29 +271,32 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
     Traceback (most recent call last):
     world.errors.FlightError: stall 14 m/s: allowed 5.25..13.05 m/s at a cruise speed of 15 m/s
     """
-    for field, (option_name, unit, low, high, factor) in RANGES.items():
+    for field, (option_name, unit, min_value, max_value, factor) in RANGES.items():
         value = getattr(sheet, field) / factor
         if field not in ("mass", "span", "cruise", "stall") and value == 0.0:
             continue
-        if not _is_within(value, low, high):
-            raise _out_of_range(option_name, value, f"allowed {low:g}..{high:g} {unit}", unit)
-    low, high = (ratio * sheet.cruise for ratio in STALL_SHARE)
-    if not _is_within(sheet.stall, low, high):
-        raise _out_of_range("stall", sheet.stall, f"allowed {_speed_range_text(low, high, sheet)}", "m/s")
-    low, high = (ratio * sheet.cruise for ratio in TOP_SHARE)
-    if sheet.top and not _is_within(sheet.top, low, high):
-        raise _out_of_range("top", sheet.top, f"allowed {_speed_range_text(low, high, sheet)}", "m/s")
+        if not _is_within(value, min_value, max_value):
+            raise _out_of_range(option_name, value, f"allowed {min_value:g}..{max_value:g} {unit}", unit)
+    min_value, max_value = (ratio * sheet.cruise for ratio in STALL_RATIO_RANGE)
+    if not _is_within(sheet.stall, min_value, max_value):
+        raise _out_of_range("stall", sheet.stall, f"allowed {_speed_range_text(min_value, max_value, sheet)}", "m/s")
+    min_value, max_value = (ratio * sheet.cruise for ratio in TOP_RATIO_RANGE)
+    if sheet.top and not _is_within(sheet.top, min_value, max_value):
+        raise _out_of_range("top", sheet.top, f"allowed {_speed_range_text(min_value, max_value, sheet)}", "m/s")
     area = _wing_area(sheet)
     lift = _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
     if not _is_within(lift, *LIFT_RANGE):
-        low, high = (math.sqrt(lift / lift_limit) * sheet.stall for lift_limit in reversed(LIFT_RANGE))
+        min_stall, max_stall = (math.sqrt(lift / lift_limit) * sheet.stall for lift_limit in reversed(LIFT_RANGE))
         areas = f"{lift / LIFT_RANGE[1] * area:.3g}..{lift / LIFT_RANGE[0] * area:.3g} m2 at this stall speed"
-        allowed = f"allowed {low:.3g}..{high:.3g} m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or {areas}"
+        allowed = (
+            f"allowed {min_stall:.3g}..{max_stall:.3g}"
+            f" m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or {areas}"
+        )
         raise _out_of_range("stall", sheet.stall, allowed, "m/s")
     aspect = sheet.span**2 / area
     if not _is_within(aspect, *ASPECT_RANGE):
-        low, high = (math.sqrt(lift_limit * area) for lift_limit in ASPECT_RANGE)
-        allowed = f"allowed {low:.2f}..{high:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
+        min_span, max_span = (math.sqrt(lift_limit * area) for lift_limit in ASPECT_RANGE)
+        allowed = f"allowed {min_span:.2f}..{max_span:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
         raise _out_of_range("span", sheet.span, allowed, "m")
     if sheet.fuelled and (sheet.motor or sheet.volts):
         raise _out_of_range("fuel", sheet.fuel, "cannot be combined with --battery and --motor", "kg")
@@ -310,8 +313,8 @@ def _out_of_range(option: str, value: float, allowed: str, unit: str) -> FlightE
     return FlightError.of_argument(option, value, allowed, shown=f"{value:g} {unit}")
 
 
-def _speed_range_text(low: float, high: float, sheet: DataSheet) -> str:
-    return f"{low:.4g}..{high:.4g} m/s at a cruise speed of {sheet.cruise:g} m/s"
+def _speed_range_text(min_speed: float, max_speed: float, sheet: DataSheet) -> str:
+    return f"{min_speed:.4g}..{max_speed:.4g} m/s at a cruise speed of {sheet.cruise:g} m/s"
 
 
 def _weight(sheet: DataSheet) -> float:
@@ -440,7 +443,8 @@ def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerP
         lift_limit = lift_max - slope * (MIN_CRUISE_ALPHA - cruise_alpha)
         min_stall = sheet.stall * math.sqrt(lift_max / lift_limit)
         allowed = (
-            f"allowed {min_stall:.3g}..{STALL_SHARE[1] * sheet.cruise:.4g} m/s for a wing of aspect ratio {aspect:.1f}"
+            f"allowed {min_stall:.3g}..{STALL_RATIO_RANGE[1] * sheet.cruise:.4g}"
+            f" m/s for a wing of aspect ratio {aspect:.1f}"
         )
         raise _out_of_range("stall", sheet.stall, allowed, "m/s")
     # An elevator that is enough for the stall only may be too weak for the fastest level flight.
@@ -530,7 +534,7 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
     try:
         return _size_drive(stated_sheet, sheet, drag)
     except _NoPropellerError:
-        raise _no_propeller(stated_sheet, sheet, drag) from None
+        raise _no_propeller_error(stated_sheet, sheet, drag) from None
 
 
 def _size_drive(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Drive, DataSheet]:
@@ -655,14 +659,14 @@ def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: fl
 
 def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prior: PowerPrior) -> ElectricMotor:
     """Return a motor whose battery power in level flight at cruise has the prior's efficiency and avionics."""
-    thrust, low, high = drag(sheet.cruise), 0.0, 1.0
+    thrust, min_throttle, max_throttle = drag(sheet.cruise), 0.0, 1.0
     for _ in range(60):
-        throttle = 0.5 * (low + high)
+        throttle = 0.5 * (min_throttle + max_throttle)
         has_excess = motor.thrust(throttle, sheet.cruise, SHEET_DENSITY) > thrust
-        low, high = (low, throttle) if has_excess else (throttle, high)
+        min_throttle, max_throttle = (min_throttle, throttle) if has_excess else (throttle, max_throttle)
     drive_power = thrust * sheet.cruise / prior.drive_efficiency(sheet.mass)
     return replace(
-        motor, power_ratio=drive_power / motor.power(high, sheet.cruise, SHEET_DENSITY), avionics=prior.avionics
+        motor, power_ratio=drive_power / motor.power(max_throttle, sheet.cruise, SHEET_DENSITY), avionics=prior.avionics
     )
 
 
@@ -762,8 +766,8 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
     return x if np.abs(residual).max() < _THRUST_TOLERANCE_RATIO else None
 
 
-def _no_propeller(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
-    """Return the error for a sheet whose climb and top speed no propeller gives, with the range of a stated value.
+def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
+    """Return the error for a climb and top speed that no propeller reaches, with the feasible range of a stated value.
 
     sheet: the sheet with missing values filled in.
     """
@@ -772,15 +776,15 @@ def _no_propeller(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> Flig
         reason = "no propeller of this size and pitch" if stated_sheet.propeller[0] else "no propeller"
         allowed = f"{reason} carries {sheet.mass:g} kg at {sheet.cruise:g} m/s; state the climb, the top speed or both"
         return FlightError.of_argument("prop" if stated_sheet.propeller[0] else "cruise", None, allowed, shown="")
-    option, unit, low, high, factor = RANGES[field]
+    option, unit, min_value, max_value, factor = RANGES[field]
     if field == "top":
-        low, high = (ratio * sheet.cruise for ratio in TOP_SHARE)
-    found = []
-    for value in np.geomspace(low, high, _RANGE_STEPS).tolist():
+        min_value, max_value = (ratio * sheet.cruise for ratio in TOP_RATIO_RANGE)
+    feasible_values = []
+    for value in np.geomspace(min_value, max_value, _RANGE_STEPS).tolist():
         changed = {field: value * factor}
         with contextlib.suppress(_NoPropellerError):
             _size_drive(replace(stated_sheet, **changed), replace(sheet, **changed), drag)
-            found.append(value)
+            feasible_values.append(value)
     others = [
         f"{title} of {getattr(stated_sheet, name) / RANGES[name][4]:.3g} {RANGES[name][1]}"
         for name, title in (("top", "a top speed"), ("motor", "a motor"))
@@ -788,7 +792,9 @@ def _no_propeller(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> Flig
     ]
     condition = " and ".join([f"at {sheet.cruise:g} m/s", *others])
     allowed = (
-        f"allowed about {min(found):.3g}..{max(found):.3g} {unit} {condition}" if found else f"no propeller {condition}"
+        f"allowed about {min(feasible_values):.3g}..{max(feasible_values):.3g} {unit} {condition}"
+        if feasible_values
+        else f"no propeller {condition}"
     )
     value = getattr(stated_sheet, field) / factor
     return FlightError.of_argument(option, value, allowed, shown=f"{value:.3g} {unit}")
@@ -800,9 +806,9 @@ def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))
     if not climb >= math.radians(RANGES["climb"][2]) * (1.0 - _EDGE_ROUNDING):
         raise _NoPropellerError
-    low, high = sheet.cruise, 4.0 * sheet.cruise
+    min_speed, max_speed = sheet.cruise, 4.0 * sheet.cruise
     for _ in range(60):
-        airspeed = 0.5 * (low + high)
+        airspeed = 0.5 * (min_speed + max_speed)
         has_excess = motor.thrust(1.0, airspeed, SHEET_DENSITY) > drag(airspeed)
-        low, high = (airspeed, high) if has_excess else (low, airspeed)
-    return replace(sheet, climb=climb, top=low)
+        min_speed, max_speed = (airspeed, max_speed) if has_excess else (min_speed, airspeed)
+    return replace(sheet, climb=climb, top=min_speed)

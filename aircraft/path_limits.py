@@ -292,12 +292,20 @@ def aircraft_slopes(table: PerformanceTable, course: float, amsl: float) -> tupl
 
 @inlined
 def _turn_radius(
-    table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
+    table: PerformanceTable,
+    ux: float,
+    uy: float,
+    vx: float,
+    vy: float,
+    amsl: float,
+    turn_sign: float,
+    wx: float,
+    wy: float,
 ) -> float:
     """Return the radius of the arc between the unit courses u and v, m.
 
     w: unit vector of `downwind`.
-    side: sign of the turn, 0 for either direction.
+    turn_sign: sign of the turn, 0 for either direction.
     """
     wind, speed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
@@ -310,7 +318,7 @@ def _turn_radius(
             return math.inf
         max_speed = max(speed_in, speed_out)
         # The highest ground speed is downwind, if the turn passes through that course.
-        if side == 0.0 or (side * (ux * wy - uy * wx) > 0.0 and side * (wx * vy - wy * vx) > 0.0):
+        if turn_sign == 0.0 or (turn_sign * (ux * wy - uy * wx) > 0.0 and turn_sign * (wx * vy - wy * vx) > 0.0):
             max_speed = max(max_speed, speed + wind)
     max_speed += table.gust_sigma
     return max_speed * max_speed / (GRAVITY * table.tan_max_bank)
@@ -327,8 +335,8 @@ def turn_radius_between(table: PerformanceTable, course_in: float, course_out: f
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
     wx, wy = downwind(table)
     # A U-turn may be flown in either direction.
-    side = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
-    return _turn_radius(table, ux, uy, vx, vy, amsl, side, wx, wy)
+    turn_sign = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
+    return _turn_radius(table, ux, uy, vx, vy, amsl, turn_sign, wx, wy)
 
 
 @inlined

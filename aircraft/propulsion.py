@@ -13,8 +13,8 @@ from typing import Protocol
 
 from aircraft.xml_text import number, product, scaled, total
 
-# Direction or position in body axes: forward, right, down.
-Place = tuple[float, float, float]
+# Direction or position vector in body axes: forward, right, down.
+Vector3 = tuple[float, float, float]
 
 
 class Propulsion(Protocol):
@@ -25,12 +25,12 @@ class Propulsion(Protocol):
     """
 
     @property
-    def direction(self) -> Place:
-        """Direction of the thrust."""
+    def direction(self) -> Vector3:
+        """Unit vector of the thrust: forward, right, down."""
 
     @property
-    def place(self) -> Place:
-        """Point where the thrust acts."""
+    def place(self) -> Vector3:
+        """Point where the thrust acts, m forward, right and below the centre of gravity."""
 
     def functions(self, factors: tuple[str, ...]) -> str:
         """Return the JSBSim functions.
@@ -120,8 +120,8 @@ class ElectricMotor:
     resistance: float
     idle_current: float
     windmill: float = 1.0
-    direction: Place = (1.0, 0.0, 0.0)
-    place: Place = (0.0, 0.0, 0.0)
+    direction: Vector3 = (1.0, 0.0, 0.0)
+    place: Vector3 = (0.0, 0.0, 0.0)
     power_ratio: float = 1.0
     avionics: float = 0.0
 
@@ -208,8 +208,8 @@ class FuelEngine:
     friction: float
     efficiency: float = 0.2
     windmill: float = 1.0
-    direction: Place = (1.0, 0.0, 0.0)
-    place: Place = (0.0, 0.0, 0.0)
+    direction: Vector3 = (1.0, 0.0, 0.0)
+    place: Vector3 = (0.0, 0.0, 0.0)
 
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the propeller speed, rad/s."""
@@ -277,8 +277,8 @@ class ActuatorDisc:
     volts: float
     efficiency: float
     ducted: bool = False
-    direction: Place = (1.0, 0.0, 0.0)
-    place: Place = (0.0, 0.0, 0.0)
+    direction: Vector3 = (1.0, 0.0, 0.0)
+    place: Vector3 = (0.0, 0.0, 0.0)
 
     def functions(self, factors: tuple[str, ...]) -> str:
         """Return the JSBSim functions."""
@@ -331,8 +331,8 @@ class ShaftPower:
     shaft: tuple[float, ...]
     volts: float
     efficiency: float
-    direction: Place = (1.0, 0.0, 0.0)
-    place: Place = (0.0, 0.0, 0.0)
+    direction: Vector3 = (1.0, 0.0, 0.0)
+    place: Vector3 = (0.0, 0.0, 0.0)
 
     def functions(self, factors: tuple[str, ...]) -> str:
         """Return the JSBSim functions.
@@ -420,11 +420,11 @@ def _evaluate(coefficients: tuple[float, ...], x: float) -> float:
 
 
 def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
-    """Return a polynomial in an element, by Horner's method."""
-    *lower, highest = coefficients
-    text = f"<v> {number(highest)} </v>"
-    for value in reversed(lower):
-        text = total(f"<v> {number(value)} </v>", product(x, text))
+    """Return the JSBSim element of a polynomial in x, by Horner's method."""
+    *lower_coefficients, leading_coefficient = coefficients
+    text = f"<v> {number(leading_coefficient)} </v>"
+    for coefficient in reversed(lower_coefficients):
+        text = total(f"<v> {number(coefficient)} </v>", product(x, text))
     return text
 
 

@@ -15,9 +15,9 @@ from world.kernels import Record, compiled, inlined, record_dtype
 # Turn angles of the tables, from 0 in equal steps, rad.
 TURNS = np.radians(np.linspace(0.0, 150.0, 11))
 # Ground speeds of the tables, as ratios to the airspeed: from a headwind of 40 % to a tailwind of 80 % of it.
-SPEED_SHARES = np.linspace(0.6, 1.8, 4)
+SPEED_RATIOS = np.linspace(0.6, 1.8, 4)
 # Shape of the tables.
-_TABLE_SHAPE = (TURNS.size, SPEED_SHARES.size)
+_TABLE_SHAPE = (TURNS.size, SPEED_RATIOS.size)
 # `TrackingError` for compiled code; `has_error` is False for an autopilot without tracking error.
 TRACKING = record_dtype(
     ("has_error", np.bool_),
@@ -38,7 +38,7 @@ class TrackingError:
 
     airspeed: equivalent airspeed command, m/s; the true airspeed increases with altitude.
     acceptance: acceptance radius with the minimum deviation, (t, s) m, at turns `TURNS` and ground speeds
-        `SPEED_SHARES` x airspeed.
+        `SPEED_RATIOS` x airspeed.
     excursion: maximum distance from the legs near the corner with that radius, (t, s) m.
     before, after: lengths of the legs before and after the corner on which the deviation exceeds the deviation on a
         straight leg, (t, s) m.
@@ -146,10 +146,10 @@ def corner_deviation(tracking: Record, turn: float, ground_speed: float) -> tupl
 
 # Step of `TURNS`, rad.
 _TURN_STEP_RAD = float(TURNS[1])
-# First of `SPEED_SHARES`.
-_FIRST_SPEED_RATIO = float(SPEED_SHARES[0])
-# Step of `SPEED_SHARES`.
-_SPEED_RATIO_STEP = float(SPEED_SHARES[1] - SPEED_SHARES[0])
+# First of `SPEED_RATIOS`.
+_FIRST_SPEED_RATIO = float(SPEED_RATIOS[0])
+# Step of `SPEED_RATIOS`.
+_SPEED_RATIO_STEP = float(SPEED_RATIOS[1] - SPEED_RATIOS[0])
 
 
 # --- Corridor ---

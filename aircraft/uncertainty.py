@@ -53,11 +53,11 @@ _LOG_KEYS = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class UncertainQuantity:
-    """One property of the model that is not known for certain.
+    """Uncertain property of the model.
 
     name: name of the property.
     unit: "factor", or the unit of an offset.
-    estimate, sd: estimate and standard deviation; of a factor, the median and the deviation of the logarithm.
+    estimate, sd: estimate and standard deviation; for a factor, the median and the standard deviation of its logarithm.
     reason: source of the deviation, for a person.
     """
 
@@ -77,7 +77,8 @@ class Uncertainty:
     quantities: uncertain properties of the model.
     power: standard deviation of the logarithm of the power in flight.
     fastest: standard deviation of the fastest level flight, m/s.
-    battery_guessed, climb_guessed: True if the battery's energy, the steepest climb was not stated.
+    battery_guessed: True if the battery's energy was not stated.
+    climb_guessed: True if the steepest climb was not stated.
     """
 
     source: str
@@ -93,7 +94,7 @@ class Uncertainty:
 def read_uncertainty(folder: Path) -> Uncertainty | None:
     """Read the uncertainty next to the model in an aircraft's folder; return None if there is no file.
 
-    Raises FlightError, in one line, for a file that cannot be read or used.
+    Raises FlightError, with a message of one line, if the file cannot be read or used.
 
     >>> from aircraft.catalog import load_aircraft
     >>> read_uncertainty(load_aircraft("aerosonde").folder) is None
@@ -112,7 +113,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     if not isinstance(source, str) or not source.strip():
         raise FlightError.at(str(file), "source", source, "expected a text", shown=repr(source))
     _check_keys(table, file)
-    climb, descent = (
+    climb_sd, descent_sd = (
         math.radians(_read_number(table, key, file, 0.0, 45.0)) for key in ("climb_sd_deg", "descent_sd_deg")
     )
     guesses = {name: table.get(name, False) for name in ("battery_guessed", "climb_guessed")}
@@ -123,16 +124,16 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise FlightError.at(str(file), "quantity", entries, "expected [[quantity]] tables", shown=repr(entries)[:60])
     quantities = tuple(_read_quantity(entry, file) for entry in entries)
-    power = POWER_SD if file.name == FILES[1] else 0.0
+    power_sd = POWER_SD if file.name == FILES[1] else 0.0
     if "power_sd" in table:
-        power = _read_number(table, "power_sd", file, 0.0, 1.0)
-    # Older folders do not state it.
-    fastest = _read_number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
-    return Uncertainty(source, climb, descent, quantities, power, fastest=fastest, **guesses)
+        power_sd = _read_number(table, "power_sd", file, 0.0, 1.0)
+    # Older folders have no fastest_sd_mps.
+    max_speed_sd = _read_number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
+    return Uncertainty(source, climb_sd, descent_sd, quantities, power_sd, fastest=max_speed_sd, **guesses)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
-    """Raise FlightError for a file without a deviation, which would mean certainty, or with an unknown key."""
+    """Raise FlightError if a required deviation is missing, which would mean certainty, or a key is unknown."""
     known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == FILES[0] else frozenset())
     missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
     suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
@@ -144,18 +145,22 @@ def _check_keys(table: dict[str, Any], file: Path) -> None:
         raise FlightError(message, file=file, field=unknown[0], value=table[unknown[0]])
 
 
-def _read_number(table: dict[str, Any], key: str, file: Path, low: float, high: float) -> float:
-    """Return a number of a table. Raises FlightError for one that is missing or out of range."""
+def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, max_value: float) -> float:
+    """Return a number of a table. Raises FlightError if it is missing or out of range."""
     value = table.get(key)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-        raise FlightError.at(str(file), key, value, f"expected a number from {low:g} to {high:g}", shown=repr(value))
+    if isinstance(value, bool) or not isinstance(value, int | float) or not min_value <= value <= max_value:
+        raise FlightError.at(
+            str(file), key, value, f"expected a number from {min_value:g} to {max_value:g}", shown=repr(value)
+        )
     return float(value)
 
 
 def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
     name = entry.get("property")
     _check_name(name, str(file), "property")
-    estimate, sd = (_read_number(entry, key, file, low, 1e6) for key, low in (("estimate", -1e6), ("sd", 0.0)))
+    estimate, sd = (
+        _read_number(entry, key, file, min_value, 1e6) for key, min_value in (("estimate", -1e6), ("sd", 0.0))
+    )
     return UncertainQuantity(str(name), str(entry.get("unit", "factor")), estimate, sd, str(entry.get("reason", "")))
 
 
@@ -246,7 +251,7 @@ def draws_text(draws: Draws) -> str:
 
 
 def read_draws(path: Path, error: type[PlanflyError] = FlightError) -> Draws:
-    """Read a ``draws.csv``. Raises the error, with the line, for one that cannot be read or used."""
+    """Read a ``draws.csv``. Raises ``error``, with the line number, if the file cannot be read or used."""
     text = utf8_text(read_small_file(path, MAX_BYTES, "draws", error), path, error)
     reader = csv.reader(io.StringIO(text))
     try:

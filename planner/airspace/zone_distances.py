@@ -80,8 +80,10 @@ def zone_excess(
         depth, first_fraction, last_fraction = penetration_depth(records, z, line, required[z].horizontal + lateral)
         if depth <= 0.0:
             continue
-        rise = b[2] - a[2]
-        band = altitude_band(a[2] + first_fraction * rise, a[2] + last_fraction * rise, below, above)
+        altitude_change = b[2] - a[2]
+        band = altitude_band(
+            a[2] + first_fraction * altitude_change, a[2] + last_fraction * altitude_change, below, above
+        )
         if zone.floor_above_ground or zone.ceiling_above_ground:
             band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, first_fraction, last_fraction, below, above)
         vertical_excess = required[z].vertical - vertical_distance(zone, band)
@@ -220,7 +222,7 @@ def measure_zone_margin(
     records, max_lateral = zones.records, max(lateral[0], lateral[1])
     west, east = min(a[0], b[0]) - max_lateral, max(a[0], b[0]) + max_lateral
     south, north = min(a[1], b[1]) - max_lateral, max(a[1], b[1]) + max_lateral
-    run = math.hypot(b[0] - a[0], b[1] - a[1])
+    horizontal_length = math.hypot(b[0] - a[0], b[1] - a[1])
     piece_begin, piece_end, piece_lateral = a.copy(), b.copy(), lateral.copy()
     for z in range(zones.required.shape[0]):
         required, zone = zones.required[z], records.zones[z]
@@ -238,7 +240,7 @@ def measure_zone_margin(
         )
         if _distance_to_violation(zone, horizontal, vertical) >= search_distance:
             continue
-        pieces = max(1, math.ceil(run / MAX_PIECE_LENGTH))
+        pieces = max(1, math.ceil(horizontal_length / MAX_PIECE_LENGTH))
         for k in range(pieces):
             for axis in range(3):
                 piece_begin[axis] = a[axis] + (b[axis] - a[axis]) * k / pieces
@@ -311,8 +313,8 @@ def _exact_altitude_band(
 ) -> AltitudeBand:
     """Return the vertical range along a-b, also above the ground on a-b and within `lateral` (2,) m to both sides."""
     band = altitude_band(a[2], b[2], below, above)
-    run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
-    ux, uy = (b[0] - a[0]) / run, (b[1] - a[1]) / run
+    horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
+    ux, uy = (b[0] - a[0]) / horizontal_length, (b[1] - a[1]) / horizontal_length
     offset_begin, offset_end = a.copy(), b.copy()
     lowest, highest = math.inf, -math.inf
     for side in (0.0, -1.0, 1.0):

@@ -210,10 +210,10 @@ class ShapeView(NamedTuple):
 def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
     """Return the line from a to b; a line without length points north."""
     dx, dy = bx - ax, by - ay
-    run = math.sqrt(dx * dx + dy * dy)
-    if run < 1e-9:
+    horizontal_length = math.sqrt(dx * dx + dy * dy)
+    if horizontal_length < 1e-9:
         return MapSegment(ax, ay, 0.0, 1.0, 0.0)
-    return MapSegment(ax, ay, dx / run, dy / run, run)
+    return MapSegment(ax, ay, dx / horizontal_length, dy / horizontal_length, horizontal_length)
 
 
 @inner
@@ -257,11 +257,11 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
 
 
 @inlined
-def _view_circle(along: float, across: float, radius: float, run: float) -> ShapeView:
+def _view_circle(along: float, across: float, radius: float, horizontal_length: float) -> ShapeView:
     """Return a circle as seen from a line, given its centre in the line's axes."""
-    gap = along - min(run, max(0.0, along))
-    min_distance = math.sqrt(gap * gap + across * across) - radius
-    max_inside_distance = math.sqrt(max(abs(along), abs(along - run)) ** 2 + across * across) - radius
+    distance_beyond_end = along - min(horizontal_length, max(0.0, along))
+    min_distance = math.sqrt(distance_beyond_end * distance_beyond_end + across * across) - radius
+    max_inside_distance = math.sqrt(max(abs(along), abs(along - horizontal_length)) ** 2 + across * across) - radius
     is_inside = along * along + across * across <= radius * radius
     # The line is outside, or inside, or crosses the outline.
     distance = min_distance if min_distance > 0.0 else max(0.0, -max_inside_distance)
@@ -269,19 +269,19 @@ def _view_circle(along: float, across: float, radius: float, run: float) -> Shap
 
 
 @inlined
-def _edge_distance2(along: float, across: float, to_along: float, to_across: float, run: float) -> float:
+def _edge_distance2(along: float, across: float, to_along: float, to_across: float, horizontal_length: float) -> float:
     """Return the squared distance between the line and an edge that does not cross it."""
     # Two pieces that do not cross are nearest at an end of one of them.
-    gap = along - min(run, max(0.0, along))
-    min_distance2 = gap * gap + across * across
-    gap = to_along - min(run, max(0.0, to_along))
-    min_distance2 = min(min_distance2, gap * gap + to_across * to_across)
+    distance_beyond_end = along - min(horizontal_length, max(0.0, along))
+    min_distance2 = distance_beyond_end * distance_beyond_end + across * across
+    distance_beyond_end = to_along - min(horizontal_length, max(0.0, to_along))
+    min_distance2 = min(min_distance2, distance_beyond_end * distance_beyond_end + to_across * to_across)
     along_step, across_step = to_along - along, to_across - across
     length2 = along_step * along_step + across_step * across_step
     # From the line's beginning, then from its end.
     fraction = min(1.0, max(0.0, -(along * along_step + across * across_step) / length2))
     x, y = along + fraction * along_step, across + fraction * across_step
     min_distance2 = min(min_distance2, x * x + y * y)
-    fraction = min(1.0, max(0.0, ((run - along) * along_step - across * across_step) / length2))
-    x, y = along + fraction * along_step - run, across + fraction * across_step
+    fraction = min(1.0, max(0.0, ((horizontal_length - along) * along_step - across * across_step) / length2))
+    x, y = along + fraction * along_step - horizontal_length, across + fraction * across_step
     return min(min_distance2, x * x + y * y)

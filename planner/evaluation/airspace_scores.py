@@ -109,12 +109,12 @@ def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Re
 def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
     """Return the maximum height above ground along a piece and on both sides of it, m, or NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
-    run, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
+    horizontal_length, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
     for side in (0.0, -1.0, 1.0):
         for end, point, lateral in ((a, piece.begin, piece.lateral_begin), (b, piece.end, piece.lateral_end)):
-            end[0] = point[0] + side * lateral * dy / run
-            end[1] = point[1] - side * lateral * dx / run
+            end[0] = point[0] + side * lateral * dy / horizontal_length
+            end[1] = point[1] - side * lateral * dx / horizontal_length
             end[2] = -(point[2] + piece.above)
         mirrored, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
         max_height = math.nan if math.isnan(mirrored) or math.isnan(max_height) else max(max_height, -mirrored)
@@ -216,14 +216,14 @@ def _leg_excess_height(
     """Return a leg's excess over the maximum height above ground, height lag included, m x km."""
     if not data.tracking.has_error:
         return _swath_excess_height(data, required, a, b, 0.0, 0.0, math.inf)
-    total, begin, end = 0.0, np.empty(3), np.empty(3)
+    total, start, end = 0.0, np.empty(3), np.empty(3)
     for k in range(len(_LAG_CUTS)):
         begin_fraction = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
         end_fraction = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
         if end_fraction > begin_fraction:
-            _cut_segment(a, b, begin_fraction, end_fraction, begin, end)
+            _cut_segment(a, b, begin_fraction, end_fraction, start, end)
             above = max(0.0, -lag_at(lag, begin_fraction), -lag_at(lag, end_fraction))
-            total += _swath_excess_height(data, required, begin, end, across, above, math.inf)
+            total += _swath_excess_height(data, required, start, end, across, above, math.inf)
     return total
 
 
@@ -241,8 +241,8 @@ def _swath_excess_height(
 
     If the excess is larger than `max_excess`, return a lower bound that is larger than `max_excess`, too.
     """
-    run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
-    east, north = lateral * (b[1] - a[1]) / run, -lateral * (b[0] - a[0]) / run
+    horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
+    east, north = lateral * (b[1] - a[1]) / horizontal_length, -lateral * (b[0] - a[0]) / horizontal_length
     largest_excess = 0.0
     for side in (0.0, -1.0, 1.0):
         if side != 0.0 and lateral < _MIN_OFFSET:
@@ -259,11 +259,11 @@ def _swath_excess_height(
 
 @inlined
 def _cut_segment(
-    a: Floats, b: Floats, begin_fraction: float, end_fraction: float, begin: Floats, end: Floats
+    a: Floats, b: Floats, begin_fraction: float, end_fraction: float, start: Floats, end: Floats
 ) -> None:  # pragma: no cover
-    """Fill `begin` and `end` with the ends of the part of a-b between two fractions of its length."""
+    """Fill `start` and `end` with the ends of the part of a-b between two fractions of its length."""
     for axis in range(3):
-        begin[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
+        start[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
         end[axis] = a[axis] + end_fraction * (b[axis] - a[axis])
 
 

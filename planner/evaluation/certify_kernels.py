@@ -101,12 +101,12 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 
 @inner
-def _piece_ends(decay: float, run: float) -> Floats:
+def _piece_ends(decay: float, horizontal_length: float) -> Floats:
     """Return the end fractions of a leg's pieces, increasing; the last is 1."""
     fractions = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
         fractions[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
-    end_zone = min(1.0, ENDS / max(1e-9, run))
+    end_zone = min(1.0, ENDS / max(1e-9, horizontal_length))
     fractions[len(_CUTS)], fractions[len(_CUTS) + 1] = end_zone, 1.0 - end_zone
     sort_few(fractions)
     return fractions
@@ -268,13 +268,13 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
     for k in range(pieces.size):
         piece = pieces[k]
         dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
-        run = max(1e-9, math.hypot(dx, dy))
+        horizontal_length = max(1e-9, math.hypot(dx, dy))
         min_height = math.inf
         for side in (0.0, -1.0, 1.0):
             a, b = piece.begin.copy(), piece.end.copy()
             for end, lateral in ((a, piece.lateral_begin), (b, piece.lateral_end)):
-                end[0] += side * lateral * dy / run
-                end[1] -= side * lateral * dx / run
+                end[0] += side * lateral * dy / horizontal_length
+                end[1] -= side * lateral * dx / horizontal_length
                 end[2] -= piece.below
             height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
             min_height = math.nan if math.isnan(height) or math.isnan(min_height) else min(min_height, height)

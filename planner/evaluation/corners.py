@@ -38,7 +38,7 @@ LEG = np.dtype([("east", np.float64), ("north", np.float64), ("run", np.float64)
 CORNER = np.dtype([(name, np.float64) for name in ("tangent", "radius", "before", "after", "excursion")])
 
 # Straight part of a leg between its two turns: fraction of the leg.
-SETTLING_SHARE = 0.05
+SETTLING_FRACTION = 0.05
 # Upper limit on its additional length, which is the length of small turns, m.
 SETTLING_LENGTH = 20.0
 
@@ -49,10 +49,10 @@ def measure_legs(path: Floats, legs: Records) -> None:
     for i in range(legs.shape[0]):
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
         dz = path[i + 1, 2] - path[i, 2]
-        run = math.sqrt(dx * dx + dy * dy)
-        legs[i].east = dx / run if run > 0.0 else 0.0
-        legs[i].north = dy / run if run > 0.0 else 0.0
-        legs[i].run = run
+        horizontal_length = math.sqrt(dx * dx + dy * dy)
+        legs[i].east = dx / horizontal_length if horizontal_length > 0.0 else 0.0
+        legs[i].north = dy / horizontal_length if horizontal_length > 0.0 else 0.0
+        legs[i].run = horizontal_length
         legs[i].length = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
@@ -116,12 +116,12 @@ def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float
 
 
 @compiled_inline
-def settling_length(turn_lengths: float, run: float) -> float:
+def settling_length(turn_lengths: float, horizontal_length: float) -> float:
     """Return the straight length of a leg for settling between its two turns, m.
 
     turn_lengths: length of both turns, m.
     """
-    return SETTLING_SHARE * run + min(SETTLING_LENGTH, turn_lengths)
+    return SETTLING_FRACTION * horizontal_length + min(SETTLING_LENGTH, turn_lengths)
 
 
 @inlined
@@ -142,7 +142,7 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
 
 @inner
 def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind) -> float:
-    """Return the length of leg i that rolling between its two turns takes up, m; 0 if both turn the same way."""
+    """Return the length of leg i used for rolling between its two turns, m; 0 if both turns have the same direction."""
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north
@@ -239,8 +239,8 @@ def legs_about(
     """Return the parts of both legs next to `waypoint`, of the given lengths (m), as vertices (3, 3)."""
     vertices = np.empty((3, 3))
     for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):
-        run = math.hypot(waypoint[0] - neighbour[0], waypoint[1] - neighbour[1])
-        fraction = min(1.0, length / max(run, 1e-6))
+        horizontal_length = math.hypot(waypoint[0] - neighbour[0], waypoint[1] - neighbour[1])
+        fraction = min(1.0, length / max(horizontal_length, 1e-6))
         for axis in range(3):
             vertices[row, axis] = waypoint[axis] + fraction * (neighbour[axis] - waypoint[axis])
     copy_into(vertices[1], waypoint)

@@ -97,8 +97,8 @@ def _min_height(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float,
     min_height: minimum height of the legs before, m. Samples are skipped where the steepest slope nearby shows that the
         ground cannot be closer.
     """
-    run = math.sqrt(dx * dx + dy * dy)
-    count = 1 + int(run / data.sample_pitch)
+    horizontal_length = math.sqrt(dx * dx + dy * dy)
+    count = 1 + int(horizontal_length / data.sample_pitch)
     tiles, k = data.slope_bounds.tiles, 0
     while True:
         fraction = k / count
@@ -109,6 +109,6 @@ def _min_height(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float,
         if k == count or min_height == -math.inf:
             return min_height
         i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
-        skip_fraction = (height - min_height) / (tiles[i, j] * run + abs(dz) + 1e-9)
-        skip_fraction = min(skip_fraction, data.slope_bounds.tile_side / (run + 1e-9))
+        skip_fraction = (height - min_height) / (tiles[i, j] * horizontal_length + abs(dz) + 1e-9)
+        skip_fraction = min(skip_fraction, data.slope_bounds.tile_side / (horizontal_length + 1e-9))
         k = min(count, k + max(1, int(skip_fraction * count)))

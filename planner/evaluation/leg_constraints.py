@@ -41,7 +41,7 @@ BLOCK_SCRATCH = np.dtype(
         ("end", _POINT),
         ("step", _POINT),
         ("point", _POINT),
-        # A leg's run, and the east, north and run of the previous leg, m.
+        # Horizontal length of a leg, and the east, north and horizontal length of the previous leg, m.
         *_block_rows(np.float64, "run", "east_before", "north_before", "run_before"),
         ("sums", _SUMS),
         # Ground height at a point and the clearance required there, m.
@@ -235,8 +235,8 @@ def _course_slope_limits(
 def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:
     """Return the climb and dive limits of the leg a-b, the smallest at three of its altitudes minus the margin, rad."""
     dx, dy = b[0] - a[0], b[1] - a[1]
-    run = math.sqrt(dx * dx + dy * dy)
-    ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 1.0)
+    horizontal_length = math.sqrt(dx * dx + dy * dy)
+    ux, uy = (dx / horizontal_length, dy / horizontal_length) if horizontal_length > 0.0 else (0.0, 1.0)
     return _course_slope_limits(data, ux, uy, a[2], b[2], downwind(data.aircraft))
 
 
@@ -246,23 +246,31 @@ def slope_excess(
     limits: PrecomputedLimits,
     ux: float,
     uy: float,
-    run: float,
+    horizontal_length: float,
     begin_altitude: float,
     end_altitude: float,
 ) -> float:
-    """Return the excess of a leg's slope over its limit, m of height per m of run; 0 within the limit (eq. 3-4).
+    """Return the excess of a leg's slope over its limit, m per m of horizontal length; 0 within the limit (eq. 3-4).
 
     ux, uy: unit vector along the leg's course.
-    run: horizontal length, m.
+    horizontal_length: m.
     begin_altitude, end_altitude: altitudes of its start and end, m.
     """
-    rise = end_altitude - begin_altitude
-    excess = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run)
+    altitude_change = end_altitude - begin_altitude
+    excess = max(
+        0.0,
+        altitude_change - limits.climb_slope * horizontal_length,
+        -altitude_change - limits.dive_slope * horizontal_length,
+    )
     is_outside = min(begin_altitude, end_altitude) < data.floor or max(begin_altitude, end_altitude) > data.ceiling
     if limits.slopes_by_aircraft and (excess > 0.0 or is_outside):
         climb, dive = _course_slope_limits(data, ux, uy, begin_altitude, end_altitude, limits.wind)
-        excess = max(0.0, rise - math.tan(climb) * run, -rise - math.tan(dive) * run)
-    return excess / max(run, 1.0)
+        excess = max(
+            0.0,
+            altitude_change - math.tan(climb) * horizontal_length,
+            -altitude_change - math.tan(dive) * horizontal_length,
+        )
+    return excess / max(horizontal_length, 1.0)
 
 
 @inlined
@@ -298,10 +306,16 @@ def add_leg_violations(
     for i in range(legs.shape[0]):
         # Coincident waypoints have no course between them, and would hide two sharp turns.
         violations.turn += max(0.0, MIN_LEG - legs[i].run) / 100.0 if by_amount else 0.0
-        rise, run = path[i + 1, 2] - path[i, 2], legs[i].run
-        excess = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run) / max(run, 1.0)
+        altitude_change, horizontal_length = path[i + 1, 2] - path[i, 2], legs[i].run
+        excess = max(
+            0.0,
+            altitude_change - limits.climb_slope * horizontal_length,
+            -altitude_change - limits.dive_slope * horizontal_length,
+        ) / max(horizontal_length, 1.0)
         if limits.slopes_by_aircraft:
-            excess = slope_excess(data, limits, legs[i].east, legs[i].north, run, path[i, 2], path[i + 1, 2])
+            excess = slope_excess(
+                data, limits, legs[i].east, legs[i].north, horizontal_length, path[i, 2], path[i + 1, 2]
+            )
         violations.slope += _violation(excess, by_amount)
     if limits.slopes_by_aircraft and data.legs_hold_turns and not data.fly_over:
         for i in range(1, legs.shape[0]):
@@ -353,8 +367,12 @@ def _add_leg_length_violations(
 ) -> None:
     """Add legs that are too short for their turns, the roll between the turns, and settling, in units of 100 m."""
     for i in range(legs.shape[0]):
-        needed_length, run = turn_length(data.fly_over, corners, i), legs[i].run
-        missing_length = needed_length + settling_length(needed_length, run) - run if needed_length > 0.0 else 0.0
+        needed_length, horizontal_length = turn_length(data.fly_over, corners, i), legs[i].run
+        missing_length = (
+            needed_length + settling_length(needed_length, horizontal_length) - horizontal_length
+            if needed_length > 0.0
+            else 0.0
+        )
         if missing_length > -MAX_ROLL and not data.fly_over:
             altitude = min(path[i, 2], path[i + 1, 2])
             missing_length += roll_length(data.aircraft, legs, corners, i, altitude, limits.wind)

@@ -201,9 +201,9 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
         index[b] = cell_index if is_inside else outside
     for b in range(size):
         cell, z = cells[np.uintp(index[b])], up[b]
-        first_entry, entry_count, lowest, highest = cell.first, cell.count, cell.lowest, cell.highest
+        first_entry, entry_count, min_altitude, max_altitude = cell.first, cell.count, cell.lowest, cell.highest
         first[b] = first_entry
-        count[b] = entry_count if (z >= lowest) & (z <= highest) else 0
+        count[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
 
 
 @inlined
@@ -256,8 +256,12 @@ def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record
         runs[b] = math.sqrt(dx * dx + dy * dy)
         lengths[b] += math.sqrt(dx * dx + dy * dy + dz * dz)
     for b in range(size):
-        rise, run = up[b], runs[b]
-        slopes[b] += 1.0 if (rise - climb * run > 0.0) | (-rise - dive * run > 0.0) else 0.0
+        altitude_change, horizontal_length = up[b], runs[b]
+        slopes[b] += (
+            1.0
+            if (altitude_change - climb * horizontal_length > 0.0) | (-altitude_change - dive * horizontal_length > 0.0)
+            else 0.0
+        )
     if not is_first:
         for b in range(size):
             # A leg without a course makes no turn: both sides are 0.

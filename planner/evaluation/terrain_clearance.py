@@ -52,17 +52,20 @@ def lag_length(
 
 
 @inlined
-def set_lag(tracking: Record, length: float, run: float, rise: float, below: float, lag: Record) -> float:
+def set_lag(
+    tracking: Record, length: float, horizontal_length: float, altitude_change: float, below: float, lag: Record
+) -> float:
     """Fill the `HEIGHT_LAG` record of a leg, and return the distance of the aircraft below its end, m.
 
-    length: lag length (`lag_length`). run, rise: length and rise of the leg. below: distance of the aircraft below its
-    beginning, m.
+    length: lag length (`lag_length`), m.
+    horizontal_length, altitude_change: of the leg, m.
+    below: distance of the aircraft below the start of the leg, m.
     """
-    lag.steady, lag.slant = length * rise / max(run, 1e-6), 0.0
-    if abs(rise) < tracking.step:
-        lag.steady, lag.slant = 0.0, -rise
+    lag.steady, lag.slant = length * altitude_change / max(horizontal_length, 1e-6), 0.0
+    if abs(altitude_change) < tracking.step:
+        lag.steady, lag.slant = 0.0, -altitude_change
     lag.rest = below - lag.steady - lag.slant
-    lag.decay = run / length
+    lag.decay = horizontal_length / length
     end_below: float = lag.steady + lag.rest * _remaining_fraction(lag.decay)
     lag.max_below, lag.min_below = max(0.0, below, end_below, lag.slant), min(0.0, below, end_below, lag.slant)
     return end_below
@@ -75,9 +78,9 @@ def measure_lags(
     """Fill `HEIGHT_LAG` records (w - 1,) of a path (w, 3), flown without deviation at its start."""
     below = 0.0
     for i in range(legs.shape[0]):
-        leg, rise = legs[i], path[i + 1, 2] - path[i, 2]
+        leg, altitude_change = legs[i], path[i + 1, 2] - path[i, 2]
         length = lag_length(tracking, aircraft, leg.east, leg.north, path[i, 2], wind)
-        below = set_lag(tracking, length, leg.run, rise, below, lags[i])
+        below = set_lag(tracking, length, leg.run, altitude_change, below, lags[i])
 
 
 @inlined
@@ -128,24 +131,28 @@ def _take_sample(
     up: float,
     required_height: float,
     max_further_height: float,
-    run: float,
-    rise: float,
+    horizontal_length: float,
+    altitude_change: float,
     pitch: float,
 ) -> tuple[float, float]:
     """Return the height above the required clearance at a point of a line, and the step to the next sample.
 
     tiles, tile_side: see `SlopeBounds`. growth: see `RequiredClearance`. required_height: required clearance.
-    max_further_height: largest further requirement elsewhere on the line, m. run, rise: length and rise of the whole
-    line, m. pitch: spacing of samples near the ground, as a fraction.
+    max_further_height: largest further requirement elsewhere on the line, m.
+    horizontal_length, altitude_change: of the whole line, m.
+    pitch: minimum spacing of samples, as a fraction of the line.
     """
     ground = pixel_height(heights, column, row)
-    gap = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH
+    excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH
     i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m per length of the line.
-    max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * run + abs(rise) + 1e-9
-    next_step, tile_step = (gap - max_further_height - NEAR_GROUND) / max_fall, tile_side / (run + 1e-9)
+    max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * horizontal_length + abs(altitude_change) + 1e-9
+    next_step, tile_step = (
+        (excess_height - max_further_height - NEAR_GROUND) / max_fall,
+        tile_side / (horizontal_length + 1e-9),
+    )
     next_step = next_step if next_step < tile_step else tile_step
-    return gap, next_step if next_step > pitch else pitch
+    return excess_height, next_step if next_step > pitch else pitch
 
 
 @inlined
@@ -170,27 +177,27 @@ def terrain_excess(
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
-    rise = bz - az
-    run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
-    pitch = 1.0 / max(1.0, math.ceil(run / required.sample_pitch))
+    altitude_change = bz - az
+    horizontal_length = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
+    pitch = 1.0 / max(1.0, math.ceil(horizontal_length / required.sample_pitch))
     tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
     required_height = required.clearance + required.buffer + extra_height
-    scale = max(run, 1.0) * pitch / 1000.0
+    scale = max(horizontal_length, 1.0) * pitch / 1000.0
     depth, fraction, max_depth = 0.0, 0.0, max_excess / scale
     while True:
         if not required.same_everywhere:
             required_height = (
                 clearance_at(required, ax + fraction * (bx - ax), ay + fraction * (by - ay)) + extra_height
             )
-        x, y, up = column + fraction * column_step, row + fraction * row_step, az + fraction * rise
-        gap, next_step = _take_sample(
-            heights, tiles, tile_side, growth, x, y, up, required_height, 0.0, run, rise, pitch
+        x, y, up = column + fraction * column_step, row + fraction * row_step, az + fraction * altitude_change
+        excess_height, next_step = _take_sample(
+            heights, tiles, tile_side, growth, x, y, up, required_height, 0.0, horizontal_length, altitude_change, pitch
         )
-        depth -= gap if gap < 0.0 else 0.0
+        depth -= excess_height if excess_height < 0.0 else 0.0
         if fraction >= 1.0 or depth > max_depth:
             break
         fraction = min(1.0, fraction + next_step)
-    return float(depth * max(run, 1.0) * pitch / 1000.0)
+    return float(depth * max(horizontal_length, 1.0) * pitch / 1000.0)
 
 
 @inlined
@@ -202,14 +209,14 @@ def _start_sampling(
     column, row = polymap(to_pixel, start[0], start[1])
     for i in range(legs.shape[0]):
         end_column, end_row = polymap(to_pixel, path[i + 1, 0], path[i + 1, 1])
-        run = legs[i].run
-        pitch = 1.0 / max(1.0, math.ceil(run / sample_pitch))
+        horizontal_length = legs[i].run
+        pitch = 1.0 / max(1.0, math.ceil(horizontal_length / sample_pitch))
         leg = terrain_legs[i]
         leg.column, leg.row = column, row
         leg.column_step, leg.row_step = end_column - column, end_row - row
         leg.pitch, leg.share = pitch, 0.0
         # A sample represents the steps before and after it.
-        per_metre = 1.0 / max(run, 1e-9)
+        per_metre = 1.0 / max(horizontal_length, 1e-9)
         leg.beginning = extents[i] * per_metre + pitch
         leg.ending = 1.0 - extents[i + 1] * per_metre - pitch
         leg.depth, leg.height_at_beginning, leg.height_at_end = 0.0, math.inf, math.inf
@@ -249,7 +256,7 @@ def sample_terrain(
             k = np.uintp(unfinished[entry])
             leg = terrain_legs[k]
             fraction, pitch = leg.share, leg.pitch
-            up, rise = path[k, 2], path[k + np.uintp(1), 2] - path[k, 2]
+            up, altitude_change = path[k, 2], path[k + np.uintp(1), 2] - path[k, 2]
             if not required.same_everywhere:
                 dx, dy = path[k + np.uintp(1), 0] - path[k, 0], path[k + np.uintp(1), 1] - path[k, 1]
                 required_height = clearance_at(required, path[k, 0] + fraction * dx, path[k, 1] + fraction * dy)
@@ -258,24 +265,24 @@ def sample_terrain(
             if lags[k].max_below > 0.0:
                 below = max(0.0, lag_at(lags[k], fraction))
                 further_height = lags[k].max_below - below
-            gap, next_step = _take_sample(
+            excess_height, next_step = _take_sample(
                 heights,
                 tiles,
                 tile_side,
                 growth,
                 x,
                 y,
-                up + fraction * rise,
+                up + fraction * altitude_change,
                 required_height + below,
                 further_height,
                 legs[k].run,
-                rise,
+                altitude_change,
                 pitch,
             )
-            leg.depth -= gap if gap < 0.0 else 0.0
+            leg.depth -= excess_height if excess_height < 0.0 else 0.0
             gap_at_beginning, gap_at_end = (
-                gap if fraction <= leg.beginning else math.inf,
-                gap if fraction >= leg.ending else math.inf,
+                excess_height if fraction <= leg.beginning else math.inf,
+                excess_height if fraction >= leg.ending else math.inf,
             )
             leg.height_at_beginning = (
                 gap_at_beginning if gap_at_beginning < leg.height_at_beginning else leg.height_at_beginning

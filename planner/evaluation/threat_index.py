@@ -67,39 +67,39 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
         max_corner + GRID_EXTENSION * (max_corner - min_corner),
     )
     size = max_corner - min_corner
-    side = math.sqrt(float(size[0] * size[1]) / MAX_THREAT_CELLS)
+    cell_size = math.sqrt(float(size[0] * size[1]) / MAX_THREAT_CELLS)
     positive_radii = radius[radius > 0.0]
     if positive_radii.size:
-        side = min(max(side, CELL_SIDE * float(np.median(positive_radii))), float(size.max()))
-    columns, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
+        cell_size = min(max(cell_size, CELL_SIDE * float(np.median(positive_radii))), float(size.max()))
+    columns, rows = max(1, math.ceil(size[0] / cell_size)), max(1, math.ceil(size[1] / cell_size))
     first, units = _lists(
-        np.ascontiguousarray(position), radius, float(min_corner[0]), float(min_corner[1]), side, columns, rows
+        np.ascontiguousarray(position), radius, float(min_corner[0]), float(min_corner[1]), cell_size, columns, rows
     )
     # Whole metres, widened against rounding.
-    lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
-    highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
+    min_altitudes = np.clip(np.floor(position[:, 2] - radius) - 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
+    max_altitudes = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -MAX_CELL_HEIGHT, MAX_CELL_HEIGHT).astype(np.int32)
     cells = np.zeros(first.size - 1, dtype=THREAT_CELL)
-    _fill_cells(first, units, lowest, highest, cells)
+    _fill_cells(first, units, min_altitudes, max_altitudes, cells)
     for array in (cells, units):
         array.setflags(write=False)
-    return ThreatCells(cells, units, float(min_corner[0]), float(min_corner[1]), side, columns, rows)
+    return ThreatCells(cells, units, float(min_corner[0]), float(min_corner[1]), cell_size, columns, rows)
 
 
 @compiled
-def _fill_cells(first: Short, units: Short, lowest: Short, highest: Short, cells: Records) -> None:
+def _fill_cells(first: Short, units: Short, min_altitudes: Short, max_altitudes: Short, cells: Records) -> None:
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]
         for entry in range(first[k], first[k + 1]):
             unit = units[entry]
             is_first = entry == first[k]
-            cell.lowest = lowest[unit] if is_first else min(cell.lowest, lowest[unit])
-            cell.highest = highest[unit] if is_first else max(cell.highest, highest[unit])
+            cell.lowest = min_altitudes[unit] if is_first else min(cell.lowest, min_altitudes[unit])
+            cell.highest = max_altitudes[unit] if is_first else max(cell.highest, max_altitudes[unit])
 
 
 @compiled
 def _lists(
-    position: Floats, radius: Floats, west: float, south: float, side: float, columns: int, rows: int
+    position: Floats, radius: Floats, west: float, south: float, cell_size: float, columns: int, rows: int
 ) -> tuple[Short, Short]:
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
@@ -110,7 +110,7 @@ def _lists(
         for k in range(position.shape[0]):
             if radius[k] <= 0.0:
                 continue
-            x, y, r = (position[k, 0] - west) / side, (position[k, 1] - south) / side, radius[k] / side
+            x, y, r = (position[k, 0] - west) / cell_size, (position[k, 1] - south) / cell_size, radius[k] / cell_size
             # Widened against rounding.
             r += 1e-6
             for row in range(max(0, math.floor(y - r)), min(rows - 1, math.floor(y + r)) + 1):
@@ -288,19 +288,21 @@ def kill_density(
 
 
 @inlined
-def _clip_fractions(begin: float, end: float) -> tuple[float, float]:
+def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, float]:
     """Return two fractions of a line in increasing order, clipped to it."""
-    begin, end = (begin, end) if begin < end else (end, begin)
-    return begin if begin > 0.0 else 0.0, end if end < 1.0 else 1.0
+    start_fraction, end_fraction = (
+        (start_fraction, end_fraction) if start_fraction < end_fraction else (end_fraction, start_fraction)
+    )
+    return start_fraction if start_fraction > 0.0 else 0.0, end_fraction if end_fraction < 1.0 else 1.0
 
 
 @inlined
-def _shift_towards_missile(z: float, rise: float, below: float, above: float) -> float:
+def _shift_towards_missile(z: float, altitude_change: float, below: float, above: float) -> float:
     """Return the height of a segment's start above a missile (m), shifted towards it by the tracking error.
 
-    rise: rise of the segment up to its closest point, m.
+    altitude_change: altitude change of the segment up to its closest point, m.
     """
-    height = z + rise
+    height = z + altitude_change
     shift = min(height, below) if height > 0.0 else max(height, -above)
     return z - shift
 

@@ -100,7 +100,7 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost 
 
 
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Return the coefficients of power as a function of the sine of the climb angle, and the bounds of this sine.
+    """Return the coefficients of a parabola of power over the sine of the climb angle, and the bounds of this sine.
 
     All are NaN if power is unknown.
     """

@@ -163,5 +163,5 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
-    """Return the limits for an algorithm; they ignore the tracking error if it counts violations as the paper does."""
+    """Return the limits for an algorithm; without tracking error if it counts violations as the paper does."""
     return limits if algorithm.graded else replace(limits, tracking=None)

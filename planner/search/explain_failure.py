@@ -62,7 +62,7 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     if terrain is None or not scenario.zones:
         return None
     pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
-    east, north = (np.arange(min_heights + 0.5 * pitch, high, pitch) for min_heights, high in scenario.bounds)
+    east, north = (np.arange(lower + 0.5 * pitch, upper, pitch) for lower, upper in scenario.bounds)
     ground = terrain.height(east[None, :], north[:, None])
     min_heights = np.maximum(ground + scenario.limits.min_clearance_m, scenario.floor)
     max_heights = np.full(ground.shape, scenario.ceiling)
@@ -349,7 +349,7 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:
-    """Name the missiles, or the altitude, that block every path; no line if that is not proven."""
+    """Name the missiles or the altitude that block every path; return no line if this is not proven."""
     data, ceiling = problem.certified, "the ceiling"
     missiles, level_altitude = closing_missiles(data), highest_level_flight(data)
     if missiles is None:
@@ -374,7 +374,7 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
-    """Return the names of the exclusions that a path (w, 3) enters and of the inclusions that it leaves.
+    """Return the names of the exclusion zones a path (w, 3) enters and the inclusion zones it leaves.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

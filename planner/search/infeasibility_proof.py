@@ -97,13 +97,13 @@ def closing_missiles(data: ProblemArrays) -> list[int] | None:
         return None
     remaining, group_size = np.flatnonzero(data.threats["kill_radius"] > 0.0), len(data.threats)
     while group_size > 0:
-        begin = 0
-        while begin < len(remaining):
-            reduced = np.delete(remaining, slice(begin, begin + group_size))
+        group_start = 0
+        while group_start < len(remaining):
+            reduced = np.delete(remaining, slice(group_start, group_start + group_size))
             if is_closed(data, _index_mask(reduced, len(data.threats))):
                 remaining = reduced
             else:
-                begin += group_size
+                group_start += group_size
         group_size //= 2
     return [int(k) for k in remaining]
 
@@ -115,18 +115,21 @@ def _index_mask(indices: Ints, count: int) -> Flags:
 
 
 @compiled
-def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float) -> bool:
-    """Implement `is_closed` for columns of the given side, m."""
+def _is_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
+    """Implement `is_closed`.
+
+    column_size: side of the square columns, m.
+    """
     columns, rows = (
-        max(1, math.ceil((data.east - data.west) / side)),
-        max(1, math.ceil((data.north - data.south) / side)),
+        max(1, math.ceil((data.east - data.west) / column_size)),
+        max(1, math.ceil((data.north - data.south) / column_size)),
     )
     # Closed altitude ranges of each column, ascending and disjoint: lower ends, upper ends, and their number.
     range_bottoms, range_tops = np.empty((columns, rows, MAX_RANGES)), np.empty((columns, rows, MAX_RANGES))
     range_counts = np.zeros((columns, rows), dtype=np.int64)
     for i in range(columns):
         for j in range(rows):
-            closed_below = _lowest_ground(data, i, j, side) + data.clearance
+            closed_below = _lowest_ground(data, i, j, column_size) + data.clearance
             range_bottoms[i, j, 0], range_tops[i, j, 0], range_counts[i, j] = (
                 -math.inf,
                 max(closed_below, data.floor),
@@ -141,20 +144,20 @@ def _is_closed(data: ProblemArrays, missiles: Flags, side: float, margin: float)
                 position[1],
                 missile.up,
                 missile.kill_radius + margin,
-                side,
+                column_size,
                 range_bottoms,
                 range_tops,
                 range_counts,
             )
-    return not _reaches_destination(data, side, range_bottoms, range_tops, range_counts)
+    return not _reaches_destination(data, column_size, range_bottoms, range_tops, range_counts)
 
 
 @inner
-def _lowest_ground(data: ProblemArrays, i: int, j: int, side: float) -> float:
+def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
     """Return the lowest pixel under a column and next to it, m; -inf if any is missing."""
     first_column, first_row, last_column, last_row = math.inf, math.inf, -math.inf, -math.inf
     for corner in range(4):
-        east, north = data.west + (i + corner % 2) * side, data.south + (j + corner // 2) * side
+        east, north = data.west + (i + corner % 2) * column_size, data.south + (j + corner // 2) * column_size
         column, row = polymap(data.to_pixel, east, north)
         first_column, last_column = min(first_column, column), max(last_column, column)
         first_row, last_row = min(first_row, row), max(last_row, row)
@@ -177,7 +180,7 @@ def _close_sphere(
     north: float,
     altitude: float,
     radius: float,
-    side: float,
+    column_size: float,
     range_bottoms: Floats,
     range_tops: Floats,
     range_counts: Ints,
@@ -188,17 +191,17 @@ def _close_sphere(
     """
     columns, rows = range_counts.shape
     first_column, last_column = (
-        max(0, math.floor((east - radius) / side)),
-        min(columns - 1, math.floor((east + radius) / side)),
+        max(0, math.floor((east - radius) / column_size)),
+        min(columns - 1, math.floor((east + radius) / column_size)),
     )
     first_row, last_row = (
-        max(0, math.floor((north - radius) / side)),
-        min(rows - 1, math.floor((north + radius) / side)),
+        max(0, math.floor((north - radius) / column_size)),
+        min(rows - 1, math.floor((north + radius) / column_size)),
     )
     for i in range(first_column, last_column + 1):
-        dx = abs((i + 0.5) * side - east) + 0.5 * side
+        dx = abs((i + 0.5) * column_size - east) + 0.5 * column_size
         for j in range(first_row, last_row + 1):
-            dy = abs((j + 0.5) * side - north) + 0.5 * side
+            dy = abs((j + 0.5) * column_size - north) + 0.5 * column_size
             half_height2 = radius * radius - dx * dx - dy * dy
             if half_height2 > 0.0:
                 half_height = math.sqrt(half_height2)
@@ -240,23 +243,23 @@ def _close_range(
 
 @inner
 def _reaches_destination(
-    data: ProblemArrays, side: float, range_bottoms: Floats, range_tops: Floats, range_counts: Ints
+    data: ProblemArrays, column_size: float, range_bottoms: Floats, range_tops: Floats, range_counts: Ints
 ) -> bool:
     """Return True if the destination can be reached from the start through open altitudes of adjacent columns.
 
     Open range s of a column is above its closed range s.
     """
-    columns, rows, stretches = range_bottoms.shape
+    columns, rows, range_limit = range_bottoms.shape
     ends = np.zeros(2, dtype=np.int64)
     for k in range(2):
         point = data.start if k == 0 else data.destination
-        i = min(columns - 1, max(0, math.floor((point[0] - data.west) / side)))
-        j = min(rows - 1, max(0, math.floor((point[1] - data.south) / side)))
+        i = min(columns - 1, max(0, math.floor((point[0] - data.west) / column_size)))
+        j = min(rows - 1, max(0, math.floor((point[1] - data.south) / column_size)))
         # A fixed end may be below the clearance; then it is in the lowest open range.
         s = 0
         while s + 1 < range_counts[i, j] and range_bottoms[i, j, s + 1] < point[2]:
             s += 1
-        ends[k] = (i * rows + j) * stretches + s
+        ends[k] = (i * rows + j) * range_limit + s
     is_visited = np.zeros(range_bottoms.size, dtype=np.bool_)
     stack = np.empty(range_bottoms.size, dtype=np.int64)
     stack[0], size = ends[0], 1
@@ -266,7 +269,7 @@ def _reaches_destination(
         current = stack[size]
         if current == ends[1]:
             return True
-        s, j, i = current % stretches, current // stretches % rows, current // (stretches * rows)
+        s, j, i = current % range_limit, current // range_limit % rows, current // (range_limit * rows)
         bottom = range_tops[i, j, s]
         top = range_bottoms[i, j, s + 1] if s + 1 < range_counts[i, j] else data.ceiling
         for step in range(4):
@@ -276,7 +279,7 @@ def _reaches_destination(
             for t in range(range_counts[x, y]):
                 neighbour_bottom = range_tops[x, y, t]
                 neighbour_top = range_bottoms[x, y, t + 1] if t + 1 < range_counts[x, y] else data.ceiling
-                neighbour = (x * rows + y) * stretches + t
+                neighbour = (x * rows + y) * range_limit + t
                 if max(bottom, neighbour_bottom) <= min(top, neighbour_top) and not is_visited[neighbour]:
                     is_visited[neighbour] = True
                     stack[size] = neighbour

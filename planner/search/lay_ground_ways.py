@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aircraft.path_limits import Limits, aircraft_slopes
-from aircraft.tracking import SPEED_SHARES
+from aircraft.tracking import SPEED_RATIOS
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
 from planner.ground_ways import ClimbOut, Descent, GroundWays
@@ -258,7 +258,7 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
 
 def _interpolate_turn_lengths(length_table: Floats, speed_ratio: float) -> list[float]:
     """Interpolate the turn lengths of a tracking error, m, at a ratio of ground speed to airspeed."""
-    return [float(np.interp(speed_ratio, SPEED_SHARES, row)) for row in length_table]
+    return [float(np.interp(speed_ratio, SPEED_RATIOS, row)) for row in length_table]
 
 
 def _read_only(position: Floats) -> Floats:

@@ -256,7 +256,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
-    """Reduce the task's margins to those of the default path (w, 3), so that others may pass equally narrow gaps."""
+    """Reduce the task's margins to the margins of the default path (w, 3), so that other paths may be equally tight."""
     for fraction in MARGINS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():
@@ -365,14 +365,18 @@ def make_sampling(
     data, frame, inner_count = task.problem.search, task.frame, waypoints - 2
     corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
     rotated = frame.rotate(corners)
-    low = np.array([rotated[:, 0].min(), rotated[:, 1].min(), data.floor])
-    high = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
+    min_corner = np.array([rotated[:, 0].min(), rotated[:, 1].min(), data.floor])
+    max_corner = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
     scales = np.array(
-        [NOISE_ALONG * frame.length / (inner_count + 1), NOISE_ACROSS * frame.length, NOISE_UP * (high[2] - low[2])]
+        [
+            NOISE_ALONG * frame.length / (inner_count + 1),
+            NOISE_ACROSS * frame.length,
+            NOISE_UP * (max_corner[2] - min_corner[2]),
+        ]
     )
     return FrontSampling(
-        np.tile(low, inner_count),
-        np.tile(high, inner_count),
+        np.tile(min_corner, inner_count),
+        np.tile(max_corner, inner_count),
         directions(inner_count, scales),
         reference,
         3,

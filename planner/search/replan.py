@@ -30,7 +30,7 @@ MIN_WAYPOINTS = 8
 def replan(
     scenario: Scenario,
     limits: Limits,
-    old: Plan,
+    old_plan: Plan,
     leg: int,
     *,
     seed: int,
@@ -62,13 +62,13 @@ def replan(
     Raises MissionError for a leg that the old plan does not have or that begins in a missile's kill sphere or violates
     a zone, and for a plan of another mission; ScenarioError as `plan_path`.
     """
-    waypoint_count = len(old.waypoints)
+    waypoint_count = len(old_plan.waypoints)
     if not 0 <= leg < waypoint_count - 1:
         raise MissionError.of_argument("at_leg", leg, f"the plan has legs 0..{waypoint_count - 2}", file=scenario.name)
-    check_same_mission(scenario, old)
-    _check_first_waypoint(scenario, old, leg)
-    remaining_path = with_waypoints(old.waypoints[leg:], max(MIN_WAYPOINTS, waypoint_count - leg))
-    course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
+    check_same_mission(scenario, old_plan)
+    _check_first_waypoint(scenario, old_plan, leg)
+    remaining_path = with_waypoints(old_plan.waypoints[leg:], max(MIN_WAYPOINTS, waypoint_count - leg))
+    course = scenario.start_course if leg == 0 else float(leg_courses(old_plan.waypoints)[leg - 1])
     settings = scenario.planner.model_copy(update={"waypoints": len(remaining_path)})
     remaining_scenario = replace(scenario, start=remaining_path[0], start_course=course, planner=settings)
 
@@ -89,7 +89,7 @@ def replan(
     new_plan = budget(remaining_scenario, limits)
     if settle is not None:
         new_plan = budget.total(settle(new_plan, budget))
-    waypoints = np.concatenate([old.waypoints[:leg], new_plan.waypoints])
+    waypoints = np.concatenate([old_plan.waypoints[:leg], new_plan.waypoints])
     algorithm_limits = limits_for(find_algorithm(new_plan.algorithm, scenario.name), limits)
     violations, objectives = paper_scores(make_problem(scenario, algorithm_limits).certified, waypoints[None])
     return replace(
@@ -102,7 +102,7 @@ def replan(
     )
 
 
-def check_same_mission(scenario: Scenario, old: Plan) -> None:
+def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
     """Raise MissionError if the ends of a plan differ from the scenario's ends.
 
     >>> from planfly.workflow.airframe import load_airframe
@@ -115,8 +115,8 @@ def check_same_mission(scenario: Scenario, old: Plan) -> None:
     world.errors.MissionError: tight: start: 742 m from that of the plan; the plan belongs to another mission
     """
     for name, planned, required in (
-        ("start", old.waypoints[0], scenario.start),
-        ("destination", old.waypoints[-1], scenario.destination),
+        ("start", old_plan.waypoints[0], scenario.start),
+        ("destination", old_plan.waypoints[-1], scenario.destination),
     ):
         distance = math.dist(planned, required)
         if distance > 1.0:
@@ -127,10 +127,10 @@ def check_same_mission(scenario: Scenario, old: Plan) -> None:
             )
 
 
-def _check_first_waypoint(scenario: Scenario, old: Plan, leg: int) -> None:
+def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
     """Raise MissionError if the new plan would begin within a missile's kill radius, or where it violates a zone."""
     threats = scenario.threats
-    depths = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
+    depths = threats.kill_radius - np.sqrt(((threats.position - old_plan.waypoints[leg]) ** 2).sum(axis=1))
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1
     if missile >= 0 and threats.kill_radius[missile] > 0.0 and depths[missile] >= 0.0:
         raise MissionError(
@@ -140,17 +140,17 @@ def _check_first_waypoint(scenario: Scenario, old: Plan, leg: int) -> None:
             field="leg",
             value=leg,
         )
-    forbidden = violated_zones(scenario, old.waypoints[[leg, leg]])
+    forbidden = violated_zones(scenario, old_plan.waypoints[[leg, leg]])
     if forbidden:
-        begin_text = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
-        message = f"{scenario.name}: leg {leg}: {begin_text}: every path from there violates it"
+        reason = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
+        message = f"{scenario.name}: leg {leg}: {reason}: every path from there violates it"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:
     """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
-    points = [np.asarray(point, dtype=np.float64) for point in path]
-    while len(points) < count:
-        longest = int(np.argmax(leg_runs(np.array(points))))
-        points.insert(longest + 1, 0.5 * (points[longest] + points[longest + 1]))
-    return np.array(points)
+    waypoints = [np.asarray(point, dtype=np.float64) for point in path]
+    while len(waypoints) < count:
+        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
+        waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
+    return np.array(waypoints)

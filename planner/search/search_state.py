@@ -205,8 +205,8 @@ class Search:
         Raises SearchEnded if asked to stop.
         """
         batch_size, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
-        for begin in range(0, len(vectors), batch_size):
-            scores = np.concatenate([scores, self.score(vectors[begin : begin + batch_size])])
+        for batch_start in range(0, len(vectors), batch_size):
+            scores = np.concatenate([scores, self.score(vectors[batch_start : batch_start + batch_size])])
             if len(scores) < len(vectors) and self.should_stop():
                 break
         self._archive_and_count(vectors[: len(scores)], scores)
@@ -270,9 +270,9 @@ class Search:
         """Move all waypoints of a vector (d,) at once, then `improve` it, and return the best scores (8,)."""
         if self._evaluation_budget() - self.evaluations < TIGHTENING_EVALUATIONS:
             return self.improve(vector, max_evaluations)
-        moved, evaluations = tighten(self.problem.search, self.encoding, vector, rounds, scale)
+        moved_vector, evaluations = tighten(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += evaluations
-        return self.improve(moved, max_evaluations)
+        return self.improve(moved_vector, max_evaluations)
 
     @property
     def can_shorten(self) -> bool:

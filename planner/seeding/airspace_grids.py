@@ -205,13 +205,13 @@ def _relax_stage(
             if not 0 <= target < width or columns[target].lowest > columns[target].highest:
                 continue
             target_first_height = columns[target].lowest if grid.follows else grid.floor
-            run = step * math.sqrt(1.0 + side * side)
+            horizontal_length = step * math.sqrt(1.0 + side * side)
             to_east, to_north = position_of(frame, stage * step, grid.across[target])
             closed_heights = _ClosedHeights(math.inf, -math.inf)
             if zones.required.shape[0] > 0:
                 leg = segment_between(east, north, to_east, to_north)
                 closed_heights = _closed_heights(zones, leg, lateral, previous_columns[y].ground)
-            climb, dive = slopes[side + SIDEWAYS, 0] * run, slopes[side + SIDEWAYS, 1] * run
+            climb, dive = slopes[side + SIDEWAYS, 0] * horizontal_length, slopes[side + SIDEWAYS, 1] * horizontal_length
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
                     continue
@@ -222,15 +222,19 @@ def _relax_stage(
                 highest_layer = min(grid.layers - 1, math.floor((height + climb - target_first_height) / grid.pitch))
                 for next_z in range(lowest_layer, highest_layer + 1):
                     # A step is at least as long as a level step; most cost too much even then, and need no square root.
-                    if base_cost + run * price[target, next_z] >= next_cost[target, next_z]:
+                    if base_cost + horizontal_length * price[target, next_z] >= next_cost[target, next_z]:
                         continue
-                    rise = target_first_height + next_z * grid.pitch - height
+                    altitude_change = target_first_height + next_z * grid.pitch - height
                     if (
-                        max(height, height + rise) > closed_heights.low
-                        and min(height, height + rise) < closed_heights.high
+                        max(height, height + altitude_change) > closed_heights.low
+                        and min(height, height + altitude_change) < closed_heights.high
                     ):
                         continue
-                    total = base_cost + math.sqrt(run * run + rise * rise) * price[target, next_z]
+                    total = (
+                        base_cost
+                        + math.sqrt(horizontal_length * horizontal_length + altitude_change * altitude_change)
+                        * price[target, next_z]
+                    )
                     if total < next_cost[target, next_z]:
                         next_cost[target, next_z] = total
                         parents[target, next_z] = y * grid.layers + z

@@ -151,12 +151,12 @@ def arc_room(
         next_waypoint[1] - waypoint[1],
     )
     turn = min(MAX_TURN, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
-    rise = (
+    altitude_change = (
         radius
         * math.tan(0.5 * turn)
         * ((waypoint[2] - previous[2]) / length_in + (next_waypoint[2] - waypoint[2]) / length_out)
     )
-    return radius * turn - sign * rise / max_slope
+    return radius * turn - sign * altitude_change / max_slope
 
 
 @inner
@@ -262,13 +262,13 @@ def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
     """Fill the derivatives (3,) of the height above ground at a point; unknown horizontal derivatives are 0."""
     heights, to_pixel = data.heights, data.to_pixel
     column, row = polymap(to_pixel, x + GROUND_STEP, y)
-    rise = pixel_height(heights, column, row)
+    ground_height = pixel_height(heights, column, row)
     column, row = polymap(to_pixel, x - GROUND_STEP, y)
-    by_east = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
+    by_east = (ground_height - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
     column, row = polymap(to_pixel, x, y + GROUND_STEP)
-    rise = pixel_height(heights, column, row)
+    ground_height = pixel_height(heights, column, row)
     column, row = polymap(to_pixel, x, y - GROUND_STEP)
-    by_north = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
+    by_north = (ground_height - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
     out[0], out[1], out[2] = -by_east, -by_north, 1.0
     if math.isnan(by_east + by_north):
         out[0], out[1] = 0.0, 0.0

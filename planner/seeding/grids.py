@@ -220,15 +220,15 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
     step_layers = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
     for side in range(-SIDEWAYS, SIDEWAYS + 1):
-        run = step * math.sqrt(1.0 + (side * ratio) ** 2)
+        horizontal_length = step * math.sqrt(1.0 + (side * ratio) ** 2)
         b[0], b[1] = position_of(frame, step, side * ratio * step)
         a[0], a[1] = frame.east, frame.north
         for z in range(layers.size):
             a[2] = layers[z]
             b[2] = layers[z]
             climb, dive = slope_limits(data, a, b)
-            step_layers[side + SIDEWAYS, z].climb = max(0, math.floor(math.tan(climb) * run / pitch))
-            step_layers[side + SIDEWAYS, z].sink = max(0, math.floor(math.tan(dive) * run / pitch))
+            step_layers[side + SIDEWAYS, z].climb = max(0, math.floor(math.tan(climb) * horizontal_length / pitch))
+            step_layers[side + SIDEWAYS, z].sink = max(0, math.floor(math.tan(dive) * horizontal_length / pitch))
     return step_layers
 
 
@@ -286,15 +286,25 @@ def relax_stage(
         if first > last:
             continue
         for side in range(-SIDEWAYS, SIDEWAYS + 1):
-            begin, end = max(first, -side), min(last, width - 1 - side) + 1
-            if begin >= end:
+            first_cell, end_cell = max(first, -side), min(last, width - 1 - side) + 1
+            if first_cell >= end_cell:
                 continue
             limit = step_layers[side + SIDEWAYS, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
-                source, target = z * width + begin, next_z * width + begin + side
-                relax(flat_cost, flat_price, flat_next_cost, flat_parents, source, target, target, end - begin, length)
+                source, target = z * width + first_cell, next_z * width + first_cell + side
+                relax(
+                    flat_cost,
+                    flat_price,
+                    flat_next_cost,
+                    flat_parents,
+                    source,
+                    target,
+                    target,
+                    end_cell - first_cell,
+                    length,
+                )
 
 
 @inner

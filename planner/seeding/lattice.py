@@ -90,10 +90,10 @@ def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) ->
     for course in range(8):
         step_across, step_along = _STEPS[course, 1], _STEPS[course, 0]
         _set_position(frame, lattice, lattice.behind + step_along, lattice.right + step_across, lattice.start_layer, b)
-        run = math.hypot(b[0] - a[0], b[1] - a[1])
+        horizontal_length = math.hypot(b[0] - a[0], b[1] - a[1])
         climb, dive = slope_limits(data, a, b)
-        layers[course, 0] = max(0, math.floor(math.tan(climb) * run / lattice.pitch))
-        layers[course, 1] = max(0, math.floor(math.tan(dive) * run / lattice.pitch))
+        layers[course, 0] = max(0, math.floor(math.tan(climb) * horizontal_length / lattice.pitch))
+        layers[course, 1] = max(0, math.floor(math.tan(dive) * horizontal_length / lattice.pitch))
     return layers
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from planner.evaluation.corners import (
     CORNER,
     LEG,
+    SETTLING_FRACTION,
     SETTLING_LENGTH,
-    SETTLING_SHARE,
     courses_at,
     measure_corner,
     measure_corners,
@@ -193,23 +193,32 @@ def constraint_count(active: ActiveConstraints) -> int:
 
 
 @inner
-def carry_multipliers(old: ActiveConstraints, multipliers: Floats, new: ActiveConstraints) -> Floats:
-    """Return the multipliers for new active constraints; a new pair of leg and missile starts with 0."""
-    new_multipliers, pair_count, old_pair_count = (
-        np.zeros(constraint_count(new)),
-        new.pairs.shape[0],
-        old.pairs.shape[0],
+def carry_multipliers(
+    previous_active: ActiveConstraints, multipliers: Floats, next_active: ActiveConstraints
+) -> Floats:
+    """Return the multipliers for the next active constraints; a new pair of leg and missile starts with 0."""
+    new_multipliers, pair_count, previous_pair_count = (
+        np.zeros(constraint_count(next_active)),
+        next_active.pairs.shape[0],
+        previous_active.pairs.shape[0],
     )
-    copy_into(new_multipliers[pair_count:], multipliers[old_pair_count:])
+    copy_into(new_multipliers[pair_count:], multipliers[previous_pair_count:])
     k = 0
     for p in range(pair_count):
         # Both are sorted by missile and leg.
-        while k < old_pair_count and (
-            old.pairs[k, 1] < new.pairs[p, 1]
-            or (old.pairs[k, 1] == new.pairs[p, 1] and old.pairs[k, 0] < new.pairs[p, 0])
+        while k < previous_pair_count and (
+            previous_active.pairs[k, 1] < next_active.pairs[p, 1]
+            or (
+                previous_active.pairs[k, 1] == next_active.pairs[p, 1]
+                and previous_active.pairs[k, 0] < next_active.pairs[p, 0]
+            )
         ):
             k += 1
-        if k < old_pair_count and old.pairs[k, 0] == new.pairs[p, 0] and old.pairs[k, 1] == new.pairs[p, 1]:
+        if (
+            k < previous_pair_count
+            and previous_active.pairs[k, 0] == next_active.pairs[p, 0]
+            and previous_active.pairs[k, 1] == next_active.pairs[p, 1]
+        ):
             new_multipliers[p] = multipliers[k]
     return new_multipliers
 
@@ -247,13 +256,13 @@ def _add_constraint(
     new_multiplier = multiplier - penalty * value
     if not new_multiplier > 0.0:
         return -multiplier * multiplier / (2.0 * penalty)
-    size, begin = model.gradient.size, 3 * (first_waypoint - 1)
+    size, first_row = model.gradient.size, 3 * (first_waypoint - 1)
     for a in range(3 * waypoint_count):
-        row = begin + a
+        row = first_row + a
         if 0 <= row < size:
             model.gradient[row] -= new_multiplier * model.slopes[a // 3, a % 3]
             for b in range(a + 1):
-                if begin + b >= 0:
+                if first_row + b >= 0:
                     model.band[row, a - b] += penalty * model.slopes[a // 3, a % 3] * model.slopes[b // 3, b % 3]
     return (new_multiplier * new_multiplier - multiplier * multiplier) / (2.0 * penalty)
 
@@ -294,13 +303,13 @@ def _add_travel_cost(data: ProblemArrays, path: Floats, model: LagrangianModel) 
     total, size, leg = 0.0, model.gradient.size, LegModel(np.zeros((2, 3)), np.zeros((2, 3, 2, 3)))
     for i in range(path.shape[0] - 1):
         total += model_leg(data.travel, data.aircraft, path[i], path[i + 1], leg)
-        begin = 3 * (i - 1)
+        first_row = 3 * (i - 1)
         for a in range(6):
-            row = begin + a
+            row = first_row + a
             if 0 <= row < size:
                 model.gradient[row] += leg.slopes[a // 3, a % 3]
                 for b in range(a + 1):
-                    if begin + b >= 0:
+                    if first_row + b >= 0:
                         model.band[row, a - b] += leg.curvature[a // 3, a % 3, b // 3, b % 3]
     return total
 
@@ -431,17 +440,23 @@ def _add_slopes(
     """Add the slope margins of legs, as m of height, and their lengths above the minimum; see `_add_ground`."""
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
-        dx, dy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
-        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        dx, dy, altitude_change = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
+        horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
         for kind in range(3):
             tangent = active.climb[i] if kind == 0 else active.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
             second_slopes = slopes[1]
-            second_slopes[0], second_slopes[1], second_slopes[2] = tangent * dx / run, tangent * dy / run, sign
+            second_slopes[0], second_slopes[1], second_slopes[2] = (
+                tangent * dx / horizontal_length,
+                tangent * dy / horizontal_length,
+                sign,
+            )
             for axis in range(3):
                 slopes[0, axis] = -slopes[1, axis]
             number = first_number + 3 * i + kind
-            values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
+            values[number] = (
+                tangent * horizontal_length + sign * altitude_change - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
+            )
             merit += _add_constraint(values[number], i, 2, multipliers[number], penalty, model)
     return merit
 
@@ -487,12 +502,15 @@ def _add_turns(
     for i in range(count):
         number = first_number + count + 1 + i
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
-        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
         begin_tangent, end_tangent = math.tan(0.5 * min(MAX_TURN, turn[i])), math.tan(0.5 * min(MAX_TURN, turn[i + 1]))
         needed_length = active.after[i] * begin_tangent + active.before[i + 1] * end_tangent + active.roll[i]
         slopes[:] = 0.0
-        for axis, component in ((0, dx / run), (1, dy / run)):
-            slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * component, (1.0 - SETTLING_SHARE) * component
+        for axis, component in ((0, dx / horizontal_length), (1, dy / horizontal_length)):
+            slopes[1, axis], slopes[2, axis] = (
+                -(1.0 - SETTLING_FRACTION) * component,
+                (1.0 - SETTLING_FRACTION) * component,
+            )
         _add_turn_derivatives(
             before_derivatives[i],
             after_derivatives[i],
@@ -506,7 +524,10 @@ def _add_turns(
             slopes[1:],
         )
         values[number] = (
-            (1.0 - SETTLING_SHARE) * run - needed_length - min(SETTLING_LENGTH, needed_length) - active.turn_margin
+            (1.0 - SETTLING_FRACTION) * horizontal_length
+            - needed_length
+            - min(SETTLING_LENGTH, needed_length)
+            - active.turn_margin
         )
         merit += _add_constraint(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit

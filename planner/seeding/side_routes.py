@@ -88,14 +88,14 @@ def _relax_stage_back(
         if first > last:
             continue
         for side in range(-SIDEWAYS, SIDEWAYS + 1):
-            begin, end = max(first, -side), min(last, width - 1 - side) + 1
-            if begin >= end:
+            first_cell, end_cell = max(first, -side), min(last, width - 1 - side) + 1
+            if first_cell >= end_cell:
                 continue
             limit = step_layers[side + SIDEWAYS, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
-                source, target = z * width + begin, next_z * width + begin + side
+                source, target = z * width + first_cell, next_z * width + first_cell + side
                 relax(
                     flat_remaining,
                     flat_price,
@@ -104,7 +104,7 @@ def _relax_stage_back(
                     target,
                     source,
                     target,
-                    end - begin,
+                    end_cell - first_cell,
                     length,
                 )
 

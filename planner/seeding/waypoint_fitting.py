@@ -36,15 +36,17 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
     If the cost exceeds `max_cost`, the evaluation ends and returns a lower bound that exceeds `max_cost`.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
-    run = math.sqrt(dx * dx + dy * dy)
+    horizontal_length = math.sqrt(dx * dx + dy * dy)
     length = math.sqrt(dx * dx + dy * dy + (b[2] - a[2]) ** 2)
-    ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
-    excess_slope = slope_excess(data, limits, ux, uy, run, a[2], b[2])
+    ux, uy = (dx / horizontal_length, dy / horizontal_length) if horizontal_length > 0.0 else (0.0, 0.0)
+    excess_slope = slope_excess(data, limits, ux, uy, horizontal_length, a[2], b[2])
     total = length + SLOPE_COST * excess_slope
     if total > max_cost:
         return total
     ends = segment_pixels(data.to_pixel, a[0], a[1], b[0], b[1])
-    depth_below = _max_depth_below_leg(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.has_error else 0.0
+    depth_below = (
+        _max_depth_below_leg(data, limits, ux, uy, horizontal_length, a[2], b[2]) if data.tracking.has_error else 0.0
+    )
     total += DEPTH_COST * terrain_excess(
         data.heights,
         data.slope_bounds,
@@ -88,17 +90,23 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
 
 @inner
 def _max_depth_below_leg(
-    data: ProblemArrays, limits: PrecomputedLimits, east: float, north: float, run: float, low: float, high: float
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    east: float,
+    north: float,
+    horizontal_length: float,
+    start_altitude: float,
+    end_altitude: float,
 ) -> float:
     """Return the largest distance of the aircraft below a long leg, m; negative if it is always above.
 
     east, north: unit course of the leg.
     """
-    rise = high - low
-    if abs(rise) < data.tracking.step:
-        return -rise
-    length = lag_length(data.tracking, data.aircraft, east, north, low, limits.wind)
-    return length * rise / max(run, 1e-6)
+    altitude_change = end_altitude - start_altitude
+    if abs(altitude_change) < data.tracking.step:
+        return -altitude_change
+    length = lag_length(data.tracking, data.aircraft, east, north, start_altitude, limits.wind)
+    return length * altitude_change / max(horizontal_length, 1e-6)
 
 
 @compiled

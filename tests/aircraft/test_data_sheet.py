@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aircraft.data_sheet import RANGES, STALL_SHARE, DataSheet, check_sheet, elliptic_slope, size_aircraft
+from aircraft.data_sheet import RANGES, STALL_RATIO_RANGE, DataSheet, check_sheet, elliptic_slope, size_aircraft
 from aircraft.propulsion import ElectricMotor, FuelEngine
 from world.errors import FlightError
 
@@ -220,7 +220,7 @@ def test_both_edges_of_a_range_are_allowed(field: str, edge: int) -> None:
 
 def test_edges_that_depend_on_the_cruise_speed_are_allowed_as_printed() -> None:
     for cruise in range(9, 40):
-        for share in STALL_SHARE:
+        for share in STALL_RATIO_RANGE:
             stall = float(f"{share * cruise:.6g}")
             # The wing may not carry the mass at that speed, and `stall` alone has a range of its own.
             assert f"at a cruise speed of {cruise} m/s" not in refusal(DataSheet(2.1, 1.6, float(cruise), stall))

@@ -17,7 +17,7 @@ from aircraft.path_limits import (
     turn_tangents,
     wind_speed_at,
 )
-from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError, air_density_factor
+from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError, air_density_factor
 from tests.setups import falling_envelope
 from world.wind import Wind
 
@@ -168,7 +168,7 @@ def test_plans_leave_nothing_open_at_the_airspeeds_that_are_flown() -> None:
     # At 1,000 m: 12.5 degrees at 25 m/s and 3.6 at 30, known to 2 degrees; ArduPlane flies 25 m/s as 26.24 there.
     known = falling_envelope()
     unsure = replace(known, source="a data sheet", climb_sd=math.radians(2.0), descent_sd=math.radians(1.0))
-    flat = np.zeros((TURNS.size, SPEED_SHARES.size))
+    flat = np.zeros((TURNS.size, SPEED_RATIOS.size))
     tracking = TrackingError(25.0, flat, flat, flat, flat, across=1.0, up=1.0, lag=0.0, step=0.0)
     limits = Limits(None, None, None, 30.0, unsure, 25.0, 0.5, Wind(), tracking)
     climb, descent = (math.degrees(angle) for angle in limits.surely().slopes(0.0, 1000.0))
@@ -190,7 +190,7 @@ def test_plans_leave_nothing_open_at_the_airspeeds_that_are_flown() -> None:
 def test_no_leg_may_lead_where_the_air_is_too_thin_to_fly_level() -> None:
     # 25.5 m/s are 28.1 true at 2,000 m, where it climbs 10.1 degrees at 25 m/s and 1.2 at 30; at 3,000 m they are 29.6,
     # where it climbs 7.7 and -1.2.
-    flat = np.zeros((TURNS.size, SPEED_SHARES.size))
+    flat = np.zeros((TURNS.size, SPEED_RATIOS.size))
     tracking = TrackingError(25.5, flat, flat, flat, flat, across=1.0, up=1.0, lag=0.0, step=0.0)
     limits = Limits(None, None, None, 30.0, falling_envelope(), 25.5, 0.5, Wind(), tracking)
     low, high = limits.slopes(0.0, 2000.0), limits.slopes(0.0, 3000.0)

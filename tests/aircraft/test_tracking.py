@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.tracking import (
-    SPEED_SHARES,
+    SPEED_RATIOS,
     TURNS,
     TrackingError,
     air_density_factor,
@@ -18,7 +18,7 @@ from aircraft.tracking import (
 
 def error_of(**numbers: float) -> TrackingError:
     """Excursion 10 m a radian plus 1 m for each m/s beyond 15; before and after 3 and 7 times the turn."""
-    turns, speeds = np.meshgrid(TURNS, SPEED_SHARES * 25.0, indexing="ij")
+    turns, speeds = np.meshgrid(TURNS, SPEED_RATIOS * 25.0, indexing="ij")
     tables = {"excursion": 10.0 * turns + (speeds - 15.0), "before": 3.0 * turns, "after": 7.0 * turns}
     given = {"across": 2.0, "up": 3.0, "lag": 3.0, "step": 15.0} | numbers
     return TrackingError(airspeed=25.0, acceptance=40.0 * turns, **tables, **given)

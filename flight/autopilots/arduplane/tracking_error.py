@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
+from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
@@ -109,8 +109,8 @@ def _corner_tables(
     parameters: ArduPilotParameters, airspeed: float, fly_over: bool
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
-    corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
-    record, speeds = parameters.record(), SPEED_SHARES * airspeed
+    corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
+    record, speeds = parameters.record(), SPEED_RATIOS * airspeed
     _measure_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
     factor, right_angle_margin = WIND_SPREAD
     corners["excursion"] *= (factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]

@@ -10,7 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
+from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError
 from flight.autopilots.px4.lateral import roll_setpoint
 from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG
 from flight.autopilots.px4.navigator import acceptance_radius_at, navigate
@@ -134,8 +134,8 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 @lru_cache(maxsize=8)
 def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
     """Return tables (turns, speeds) of acceptance radius, excursion, and lengths before and after the corner, m."""
-    corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
-    _measure_corners(parameters.record(), airspeed, TURNS, SPEED_SHARES * airspeed, corners, waypoint_column(3))
+    corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
+    _measure_corners(parameters.record(), airspeed, TURNS, SPEED_RATIOS * airspeed, corners, waypoint_column(3))
     excursion_factor, right_angle_margin = WIND_SPREAD
     corners["excursion"] *= (excursion_factor + right_angle_margin * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Rounded because plans must be the same on every machine, and sines differ between libraries.

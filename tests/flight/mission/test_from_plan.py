@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.catalog import load_aircraft
-from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
+from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.fences import with_fences
 from flight.mission.from_plan import plan_mission
@@ -80,7 +80,7 @@ def test_no_arc_of_the_flight_misses_the_radius_that_is_exported(turn_deg: float
 
 def test_a_corner_has_the_acceptance_that_its_autopilot_strays_least_with() -> None:
     """Of a table that is 100 m a radian and 2 m for each m/s over 25: at 60 degrees, 25.8 m/s at 700 m, 106.4 m."""
-    turns, speeds = np.meshgrid(TURNS, SPEED_SHARES * 25.0, indexing="ij")
+    turns, speeds = np.meshgrid(TURNS, SPEED_RATIOS * 25.0, indexing="ij")
     acceptance = 15.0 + 100.0 * turns + 2.0 * (speeds - 25.0)
     nothing = np.zeros(turns.shape)
     error = TrackingError(25.0, acceptance, nothing, nothing, nothing, across=0.0, up=0.0, lag=3.0, step=15.0)

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from aircraft.catalog import load_aircraft
-from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
+from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.tracking_error import MIN_ACCEPTANCE, WIND_SPREAD, tracking_error
 from tests.soak import some
@@ -58,7 +58,7 @@ def still_air(error: TrackingError, turn_deg: float, share: int) -> tuple[float,
 @pytest.mark.parametrize("share", [0, 1, 2])
 def test_a_corner_is_turned_at_where_it_strays_least(error: TrackingError, turn_deg: float, share: int) -> None:
     acceptance, excursion = still_air(error, turn_deg, share)
-    speed, turn = float(SPEED_SHARES[share]) * 25.0, math.radians(turn_deg)
+    speed, turn = float(SPEED_RATIOS[share]) * 25.0, math.radians(turn_deg)
     assert furthest(turn, acceptance, speed) == pytest.approx(excursion, rel=0.15, abs=0.5)
     tried = [furthest(turn, other, speed) for other in range(15, 256, 8)]
     assert excursion <= 1.15 * min(tried) + 0.5
