@@ -97,9 +97,8 @@ class LabelPlacer:
             return
         self.boxes.append(best_box)
         self.points.append((point_x, point_y))
-        center = self.axes.transData.inverted().transform(
-            (0.5 * (best_box[0] + best_box[2]), 0.5 * (best_box[1] + best_box[3]))
-        )
+        box_center = 0.5 * (best_box[0] + best_box[2]), 0.5 * (best_box[1] + best_box[3])
+        center = self.axes.transData.inverted().transform(box_center)
         artist = self.axes.text(
             center[0],
             center[1],
@@ -114,9 +113,8 @@ class LabelPlacer:
         else:
             if best_ring:
                 self._draw_lead_line(best_box, point_x, point_y, style.get("color", theme.colour("ink")), 0.5)
-            artist.set_path_effects(
-                [patheffects.withStroke(linewidth=1.8, foreground=theme.colour("paper"), alpha=0.85)]
-            )
+            outline = patheffects.withStroke(linewidth=1.8, foreground=theme.colour("paper"), alpha=0.85)
+            artist.set_path_effects([outline])
 
     def _draw_lead_line(self, box: Box, x: float, y: float, color: str, width: float) -> None:
         """Draw a thin line from under a label to its point."""

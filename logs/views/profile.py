@@ -86,16 +86,8 @@ def profile_chart(
     labels: list[Label] = []
     if not is_straight_line:
         role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
-        layers.append(
-            Layer(
-                "dots",
-                "waypoint, numbered",
-                role,
-                waypoint_distances[stop_starts] / 1000.0,
-                route[stop_starts, 2],
-                quiet=True,
-            )
-        )
+        positions = waypoint_distances[stop_starts] / 1000.0, route[stop_starts, 2]
+        layers.append(Layer("dots", "waypoint, numbered", role, *positions, quiet=True))
         labels = _waypoint_labels(waypoint_distances, route, stops, failed)
     layers += _failing_waypoints(waypoint_distances, route, failed)
     corners = np.column_stack([waypoint_distances / 1000.0, route[:, 2]])

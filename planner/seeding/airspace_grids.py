@@ -225,16 +225,11 @@ def _relax_stage(
                     if base_cost + horizontal_length * price[target, next_z] >= next_cost[target, next_z]:
                         continue
                     altitude_change = target_first_height + next_z * grid.pitch - height
-                    if (
-                        max(height, height + altitude_change) > closed_heights.low
-                        and min(height, height + altitude_change) < closed_heights.high
-                    ):
+                    end_height = height + altitude_change
+                    if max(height, end_height) > closed_heights.low and min(height, end_height) < closed_heights.high:
                         continue
-                    total = (
-                        base_cost
-                        + math.sqrt(horizontal_length * horizontal_length + altitude_change * altitude_change)
-                        * price[target, next_z]
-                    )
+                    length = math.sqrt(horizontal_length * horizontal_length + altitude_change * altitude_change)
+                    total = base_cost + length * price[target, next_z]
                     if total < next_cost[target, next_z]:
                         next_cost[target, next_z] = total
                         parents[target, next_z] = y * grid.layers + z

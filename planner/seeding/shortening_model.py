@@ -474,11 +474,8 @@ def _add_turns(
 ) -> float:
     """Add turn margins, and the lengths of legs that remain between their turns; see `_add_ground`."""
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
-    turn, before_derivatives, after_derivatives = (
-        np.zeros(count + 1),
-        np.zeros((count + 1, 2)),
-        np.zeros((count + 1, 2)),
-    )
+    turn = np.zeros(count + 1)
+    before_derivatives, after_derivatives = np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
     for i in range(count + 1):
         ux, uy = math.sin(data.start_course), math.cos(data.start_course)
         vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
@@ -507,10 +504,8 @@ def _add_turns(
         needed_length = active.after[i] * begin_tangent + active.before[i + 1] * end_tangent + active.roll[i]
         slopes[:] = 0.0
         for axis, component in ((0, dx / horizontal_length), (1, dy / horizontal_length)):
-            slopes[1, axis], slopes[2, axis] = (
-                -(1.0 - SETTLING_FRACTION) * component,
-                (1.0 - SETTLING_FRACTION) * component,
-            )
+            slopes[1, axis] = -(1.0 - SETTLING_FRACTION) * component
+            slopes[2, axis] = (1.0 - SETTLING_FRACTION) * component
         _add_turn_derivatives(
             before_derivatives[i],
             after_derivatives[i],
@@ -523,12 +518,8 @@ def _add_turns(
             -0.5 * active.before[i + 1] * (1.0 + end_tangent * end_tangent),
             slopes[1:],
         )
-        values[number] = (
-            (1.0 - SETTLING_FRACTION) * horizontal_length
-            - needed_length
-            - min(SETTLING_LENGTH, needed_length)
-            - active.turn_margin
-        )
+        remaining_length = (1.0 - SETTLING_FRACTION) * horizontal_length - needed_length
+        values[number] = remaining_length - min(SETTLING_LENGTH, needed_length) - active.turn_margin
         merit += _add_constraint(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
 

@@ -372,17 +372,11 @@ def _bisect_move(
             continue
         earlier = parts[top + 1]
         copy_move_part(part, earlier)
-        middle = 0.5 * (part.first + part.last)
-        earlier.last = part.first = middle
+        earlier.last = part.first = middle = 0.5 * (part.first + part.last)
         east, north, up = move_point(move, middle)
         outline_distance, band_distance, edge = distances_outside_zone(records, z, heights, to_pixel, east, north, up)
-        part.east, part.north, part.outline_distance, part.band_distance, part.edge = (
-            east,
-            north,
-            outline_distance,
-            band_distance,
-            edge,
-        )
+        part.east, part.north, part.outline_distance = east, north, outline_distance
+        part.band_distance, part.edge = band_distance, edge
         earlier.end_east, earlier.end_north, earlier.end_outline_distance = east, north, outline_distance
         earlier.end_band_distance, earlier.end_edge = band_distance, edge
         if not in_order and beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance) > beyond_limit(

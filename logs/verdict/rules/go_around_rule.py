@@ -400,10 +400,8 @@ def _judge_go_around(
     go_around = go_around._replace(entered_hazard=first_hazard_on_path(requirements, path))
     if end_status == RETURN_GROUND_IMPACT or min_height <= 0.0:
         return go_around._replace(lowest_height=min(min_height, 0.0), impact_time=float(result["clearance_time"]))
-    is_beyond_point = (positions[:-1, :2] - landing.point[:2]) @ (
-        math.sin(landing.course),
-        math.cos(landing.course),
-    ) > 0.0
+    landing_direction = math.sin(landing.course), math.cos(landing.course)
+    is_beyond_point = (positions[:-1, :2] - landing.point[:2]) @ landing_direction > 0.0
     climb = float(np.nanmin(heights[:rows][is_beyond_point[:rows]], initial=math.inf))
     if climb < GO_AROUND_MODEL_ERROR_M and not go_around.unknown_part_text:
         passing_text = (

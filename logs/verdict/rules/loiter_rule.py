@@ -182,21 +182,15 @@ def _loiter_finding(
         faults.append(_unheld_corners_message(circle, failed_corners))
     elif failed_corners and not faults:
         first_corner = failed_corners[0]
-        reason_text, placed = (
-            f"{place_text(first_corner.place)}: {first_corner.reason}",
-            first_corner.place == requirements.waypoint(circle.first),
-        )
-        faults.append(Message(reason_text, _corner_text(first_corner.place), placed))
+        reason_text = f"{place_text(first_corner.place)}: {first_corner.reason}"
+        is_at_waypoint = first_corner.place == requirements.waypoint(circle.first)
+        faults.append(Message(reason_text, _corner_text(first_corner.place), is_at_waypoint))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
     if radii.size:
         facts.append(f"flown with {radii.min():.1f} to {radii.max():.1f} m")
-        if (
-            joins_at_center
-            and not uses_parameter
-            and circle.laps >= 1.0
-            and mean_radius > circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
-        ):
+        max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
+        if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
             faults.append(message(f"flown with {mean_radius:.0f} m where {circle.radius:.0f} m is required"))
     ok: bool | None = not (faults or failed_corners)
     if ok and any(finding.ok is None for finding in corner_findings):

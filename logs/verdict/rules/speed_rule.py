@@ -92,10 +92,8 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
             if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, flown_command)):
                 # From here on the flown speed is judged by the command, instead of the command by the envelope.
                 mean_speed, allowed_error, source = held_speed.speed, held_speed.allowed_error, "mission"
-                limit, at_least = (
-                    flown_command + math.copysign(allowed_error, mean_speed - flown_command),
-                    mean_speed < flown_command,
-                )
+                limit = flown_command + math.copysign(allowed_error, mean_speed - flown_command)
+                at_least = mean_speed < flown_command
                 margin, tolerance = allowed_error - abs(mean_speed - flown_command), held_speed.tolerance
                 faults.append(message(f"{mean_speed:.1f} m/s held of the commanded {flown_command:.1f} m/s"))
         facts.append(Fact("speed error", mean_speed - commanded, "m/s"))

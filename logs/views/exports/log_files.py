@@ -197,6 +197,10 @@ def _topic_records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
     return stamps[recorded_rows].tolist(), [data[start : start + size] for start in range(0, len(data), size)]
 
 
+# Flags of vehicle_local_position.
+_VALIDITY_FIELDS = ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid", "xy_global", "z_global", "dist_bottom_valid")
+
+
 def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     track, origin = log.track, log.setup.scenario.origin
     stamp = np.rint(track.time[rows] * 1e6).astype(np.uint64)
@@ -224,18 +228,7 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
                 ("ref_lat", "<f8"),
                 ("ref_lon", "<f8"),
                 ("ref_timestamp", "<u8"),
-                *(
-                    (name, "?")
-                    for name in (
-                        "xy_valid",
-                        "z_valid",
-                        "v_xy_valid",
-                        "v_z_valid",
-                        "xy_global",
-                        "z_global",
-                        "dist_bottom_valid",
-                    )
-                ),
+                *((name, "?") for name in _VALIDITY_FIELDS),
             ],
             x=north,
             y=east,
