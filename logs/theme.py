@@ -84,6 +84,7 @@ LOOKS = {
     "commanded": Look(_ORANGE, "#ffb938", width=2.0),
     "second": _SECOND,
     "other": Look(_VERMILLION, "#ff8033", width=1.4, dash=(5.0, 2.0)),
+    "band": Look(_VERMILLION, "#ff8033", width=0.0, fill=0.25),
     "difference": Look(_GREY, _PALE_GREY, width=1.0, fill=0.25),
     "waypoint": Look(_BLUE, "#7cc0f5", width=1.0, size=4.6, face="paper"),
     "waypoint-small": Look(_BLUE, "#7cc0f5", width=0.5, size=1.6, face="paper"),

@@ -31,6 +31,7 @@ new_scenario                         a commented scenario of one's own, from her
 make_scenario                        a scenario with other threats (arrays, a data frame) and other values, in Python
 describe_aircraft, new_aircraft      trims, modes and envelope; a folder for an aircraft of one's own
 identify_aircraft                    that folder from flight logs, with what is not known of it
+predict                              a logged flight that a model has not seen, as bands of 95 %
 paper_tables, optimise               the paper's section V; the planner's optimisers alone, by ask and tell
 progress                             have the progress of the calls reported
 PlanflyError                         what bad input raises, with file, field, value and allowed; and its kinds
@@ -91,6 +92,8 @@ if TYPE_CHECKING:
     from planfly.api.planning import replan as replan
     from planfly.api.planning import scenarios as scenarios
     from planfly.api.planning import what_blocks as what_blocks
+    from planfly.api.predicting import Predicted as Predicted
+    from planfly.api.predicting import predict as predict
     from planfly.api.replaying import instruments as instruments
     from planfly.api.replaying import movie as movie
     from planfly.api.replaying import play_to_foxglove as play_to_foxglove
@@ -199,6 +202,10 @@ _HOMES = {
             "replan",
             "scenarios",
             "what_blocks",
+        ),
+        "planfly.api.predicting": (
+            "Predicted",
+            "predict",
         ),
         "planfly.api.replaying": (
             "instruments",

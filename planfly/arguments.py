@@ -58,6 +58,7 @@ RANGES: Mapping[str, Range] = {
     "front": Range(2, 100, "expected a whole number of plans, 2 to 100", integer=True),
     "at_leg": Range(0, 10_000, "expected a leg's number, from 0", integer=True),
     "airspeed": _POSITIVE_RANGE,
+    "until": _TIME_RANGE_S,
     "max_hours": _POSITIVE_RANGE,
     "max_log": _POSITIVE_RANGE,
     "speed": _POSITIVE_RANGE,

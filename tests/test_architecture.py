@@ -52,7 +52,6 @@ LONGER = {
     "planfly/api/optimising.py:optimise": 66,
     "planfly/campaigns/pictures.py:draw_go_no_go": 72,
     "planfly/campaigns/pictures.py:narrow_figure": 62,
-    "planfly/identification/records.py:flight_records": 65,
     "planner/evaluation/graded_scores.py:score_missiles": 61,
     "planner/evaluation/terrain_clearance.py:sample_terrain": 70,
     "planner/evaluation/threat_index.py:kill_density": 73,

@@ -53,11 +53,16 @@ class FlightRecord:
         """Return the central part, at most ``seconds`` long."""
         rows = round(seconds * GRID_HZ)
         begin = max(0, (len(self.time) - rows) // 2)
-        columns = {
-            field.name: getattr(self, field.name)[begin : begin + rows]
-            for field in fields(self)
-            if field.name != "source"
-        }
+        return self.rows(slice(begin, begin + rows))
+
+    def between(self, start: float, end: float) -> "FlightRecord":
+        """Return the rows from time ``start`` on and before time ``end``, s."""
+        begin_row, end_row = np.searchsorted(self.time, [start, end]).tolist()
+        return self.rows(slice(begin_row, end_row))
+
+    def rows(self, rows: slice) -> "FlightRecord":
+        """Return some rows."""
+        columns = {field.name: getattr(self, field.name)[rows] for field in fields(self) if field.name != "source"}
         return replace(self, **columns)
 
     @property

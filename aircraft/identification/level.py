@@ -69,11 +69,18 @@ def lateral_biases(signals: Signals) -> Floats:
     return np.array(biases)
 
 
-def level_signals(signals: Signals) -> Signals:
-    """Return signals without biases, and with the forward excess divided between level and accelerometer."""
+def level_signals(signals: Signals, reference: Signals | None = None) -> Signals:
+    """Return signals without biases, and with the forward excess divided between level and accelerometer.
+
+    reference: signals of the same sensors whose mean biases are used; None for the biases of each stretch itself.
+    """
     level_fraction = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
     attitude, acceleration, rates = signals.attitude.copy(), signals.acceleration.copy(), signals.rates.copy()
-    biases = zip(forward_excess(signals), lateral_biases(signals), strict=True)
+    if reference is None:
+        biases = list(zip(forward_excess(signals), lateral_biases(signals), strict=True))
+    else:
+        means = float(np.mean(forward_excess(reference))), lateral_biases(reference).mean(axis=0)
+        biases = [means] * (len(signals.edges) - 1)
     for (excess, lateral), first, last in zip(biases, signals.edges[:-1], signals.edges[1:], strict=True):
         limit = _MAX_LEVEL_SIGMAS * LEVEL_SD
         level = float(np.clip(level_fraction * excess / GRAVITY, -limit, limit))

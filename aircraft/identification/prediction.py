@@ -11,7 +11,7 @@ Identification, section 6.2).
 Trim offsets (constant moments, one for each stretch) are estimated for each model before it predicts.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -100,6 +100,7 @@ class Predictor:
     """A model with the trim offsets and the filtered unmodelled moments of one log.
 
     filters: of roll, pitch and yaw; None for the filters with the smallest innovations.
+    trims: (3,) trim offsets as angular accelerations, rad/s^2; None for the means over each stretch of the log.
     with_flow: True to take measured flow angles and airspeed throughout, for an estimate; False to predict them too.
     """
 
@@ -110,6 +111,7 @@ class Predictor:
         values: Floats,
         filters: Sequence[GustFilter] | None = None,
         *,
+        trims: Floats | None = None,
         with_flow: bool = False,
     ) -> None:
         self._signals, self._base, self._values = signals, base, values
@@ -121,7 +123,8 @@ class Predictor:
         modelled = self._accelerations(self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed)))
         self.trims = np.empty_like(modelled)
         for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
-            self.trims[first:last] = (required[first:last] - modelled[first:last]).mean(axis=0)
+            offsets = (required[first:last] - modelled[first:last]).mean(axis=0) if trims is None else trims
+            self.trims[first:last] = offsets
         residual = required - modelled - self.trims
         self.filters = (
             [_best_filter(residual[:, axis], signals) for axis in range(3)] if filters is None else list(filters)
@@ -139,12 +142,24 @@ class Predictor:
 
     def predict(self, starts: Ints, horizons: Sequence[float] = HORIZONS_S) -> dict[float, Floats]:
         """Return predicted `QUANTITIES` (rad and m/s, (n, 6)) by the time ahead (s) from some rows (n,)."""
+        due = {round(horizon * self._signals.hertz): horizon for horizon in horizons}
+        predictions = {}
+        for k, state in enumerate(self.fly(starts, max(due))):
+            if k in due:
+                speed = np.linalg.norm(state[:, :3], axis=1)
+                predictions[due[k]] = np.column_stack([state[:, 3:8], speed])
+        return predictions
+
+    def fly(self, starts: Ints, count: int) -> Iterator[Floats]:
+        """Yield the states (n, 8) at some rows (n,) and after each of a number of samples of the logged controls.
+
+        A state holds velocity through the air, m/s, angular rates, rad/s, bank and pitch, rad.
+        """
         signals, step = self._signals, 1.0 / self._signals.hertz
-        # Velocity through the air, angular rates, bank and pitch.
         state = np.column_stack([self._air_velocity(starts), signals.rates[starts], signals.attitude[starts, :2]])
         disturbances, decays = self._unmodelled[starts], np.array([one.decay for one in self.filters])
-        predictions, due = {}, {round(horizon * signals.hertz): horizon for horizon in horizons}
-        for k in range(max(due)):
+        yield state
+        for k in range(count):
             rows = starts + k
             # Heun's method, with disturbances held over a step.
             first = self._state_rates(state, disturbances, rows)
@@ -153,10 +168,7 @@ class Predictor:
             if self._with_flow:
                 state[:, :3] = self._air_velocity(rows + 1)
             disturbances = disturbances * decays
-            if k + 1 in due:
-                speed = np.linalg.norm(state[:, :3], axis=1)
-                predictions[due[k + 1]] = np.column_stack([state[:, 3:8], speed])
-        return predictions
+            yield state
 
     def _air_velocity(self, rows: Ints) -> Floats:
         """Return the measured velocity through the air (n, 3), body axes, m/s."""

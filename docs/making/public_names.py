@@ -26,6 +26,7 @@ _ORDER = (
         "guess_columns",
         "import_log",
         "refly",
+        "predict",
         "recover",
         "campaign",
         "campaign_flight",

@@ -13,6 +13,7 @@ from aircraft.identification.flight_record import FlightRecord
 from aircraft.identification.prediction import PredictedLog
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
+from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.checks import check_estimate
 from planfly.identification.folder import Identified, folder_files, make_identified
@@ -99,6 +100,7 @@ def identify_aircraft(
     battery: str | None = None,
     base: str | Path = "aerosonde",
     check: str | Path | None = None,
+    until: float | None = None,
     overwrite: bool = False,
 ) -> IdentifiedAircraft:
     """Make the folder of an aircraft from flight logs of ArduPlane or PX4, with a list of uncertain properties.
@@ -109,9 +111,11 @@ def identify_aircraft(
     from the base.
     battery: volts and capacity, "44.4V,888Wh"; None takes the battery of the base.
     base: the most similar aircraft, by name or folder; it supplies every property that the logs do not show.
+    until: end of the part of each log that is used, s of the log; `planfly.predict` judges the rest.
     check: a log that is not among `logs`, to predict with the base and the identified model; a minute is enough.
     Raises a `planfly.PlanflyError` for logs that cannot be used; then nothing is written.
     """
+    check_arguments(until=until)
     target = check_new_folder(Path(folder), overwrite=overwrite)
     paths = [Path(path) for path in ([logs] if isinstance(logs, str | Path) else logs)]
     if not paths:
@@ -120,20 +124,15 @@ def identify_aircraft(
     area = prior.wing_area * (span / prior.wing_span) ** 2 if area is None else area
     stated_numbers = {"mass": mass, "span": span, "area": area}
     _check_stated(stated_numbers, prior)
-    volts, energy = prior.battery_voltage, prior.battery_energy
-    if battery is not None:
-        sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
-        volts, energy = sheet.volts, sheet.energy
-    base_numbers = scale_model(
-        base_model(prior), stated_numbers["mass"], stated_numbers["span"], stated_numbers["area"], volts
-    )
+    volts, energy = _find_battery(prior, battery)
+    base_numbers = scale_model(base_model(prior), **stated_numbers, volts=volts)
     check_base(prior)
     with stage(f"reading {len(paths)} log{'s' if len(paths) > 1 else ''}", "reading logs"):
         motion_logs = [read_motion(path) for path in paths]
         check_motion = None if check is None else read_motion(Path(check))
         _check_distinct([*motion_logs, *([] if check_motion is None else [check_motion])])
-        log_parts = [(log, *_records_and_outputs(log, prior)) for log in motion_logs]
-        checked = [] if check_motion is None else _records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
+        log_parts = [(log, *records_and_outputs(log, prior, until=until)) for log in motion_logs]
+        checked = [] if check_motion is None else records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
     records = [record for _, stretches, _ in log_parts for record in stretches]
     log, _, outputs = log_parts[-1]
     with stage("estimating"):
@@ -141,7 +140,7 @@ def identify_aircraft(
         estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
         check_estimate(estimate, base_numbers, _unmixed_outputs(log, prior), log.source)
         identified = make_identified(
-            prior, base_numbers, estimate, [motion_log for motion_log, _, _ in log_parts], outputs
+            prior, base_numbers, estimate, [motion_log for motion_log, _, _ in log_parts], outputs, until
         )
         files = folder_files(identified, target.name, (volts, energy))
     with stage("predicting"):
@@ -154,6 +153,14 @@ def identify_aircraft(
     return IdentifiedAircraft(
         aircraft, estimate, *_intervals(identified), predicted, without_current(records), slow, wide
     )
+
+
+def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
+    """Return voltage, V, and energy, J, of a stated battery, or of the base's."""
+    if battery is None:
+        return prior.battery_voltage, prior.battery_energy
+    sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
+    return sheet.volts, sheet.energy
 
 
 def _load_base(base: str | Path) -> Aircraft:
@@ -197,8 +204,8 @@ def _check_distinct(logs: Sequence[MotionLog]) -> None:
         sources[log.sha256] = log.source
 
 
-def _records_and_outputs(
-    log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS
+def records_and_outputs(
+    log: MotionLog, prior: Aircraft, min_seconds: float = MIN_SECONDS, until: float | None = None
 ) -> tuple[list[FlightRecord], dict[str, ServoOutput]]:
     """Return the flight records of a log, and the servo outputs of the aircraft.
 
@@ -206,19 +213,21 @@ def _records_and_outputs(
     with elevons, whose mixer is part of the model, they are always those of the base.
 
     min_seconds: shortest usable flight, s.
+    until: end of the part that is used, s of the log; None for the whole log.
     """
+    end = math.inf if until is None else until
     file = prior.folder / "ardupilot.toml"
     base_outputs = read_servos(file) if file.is_file() else {}
     if log.program_kind in ("px4", "columns"):
-        return flight_records(log, prior, min_seconds=min_seconds), dict(base_outputs)
+        return flight_records(log, prior, min_seconds=min_seconds, until=end), dict(base_outputs)
     outputs = log_outputs(log, prior)
     if LEFT in outputs:
-        return flight_records(log, prior, outputs, min_seconds), dict(base_outputs)
+        return flight_records(log, prior, outputs, min_seconds, end), dict(base_outputs)
     is_same = base_outputs.keys() == outputs.keys() and all(
         _is_same_output(base_outputs[name], output) for name, output in outputs.items()
     )
     used_outputs = dict(base_outputs) if is_same else outputs
-    return flight_records(log, prior, used_outputs if is_same else None, min_seconds), used_outputs
+    return flight_records(log, prior, used_outputs if is_same else None, min_seconds, end), used_outputs
 
 
 def _unmixed_outputs(log: MotionLog, prior: Aircraft) -> dict[str, int]:

@@ -148,7 +148,7 @@ def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersio
     airframe = load_airframe(scenario)
     mission = fences.add_to_mission(mission_of_plan(plan, airframe))
     placed = place_stops(mission, scenario.origin, scenario.terrain)
-    dispersions = _with_aircraft_draws(dispersions, airframe.aircraft)
+    dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)
 
 
@@ -156,7 +156,7 @@ def _make_base_from_setup(setup: FlightSetup, dispersions: Dispersions, source: 
     mission = replace(setup.mission, source=source)
     scenario, airframe = setup.scenario, airframe_of(setup)
     placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
-    dispersions = _with_aircraft_draws(dispersions, airframe.aircraft)
+    dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed, setup.plan, dispersions, setup.seed, setup.name)
 
 
@@ -198,7 +198,7 @@ def _check_draws(base: CampaignBase) -> None:
         raise SpreadError(f"{draws.source}: {allowed}", file=draws.source, field=error.field) from error
 
 
-def _with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
+def with_aircraft_draws(dispersions: Dispersions, aircraft: Aircraft) -> Dispersions:
     """Return the dispersions with the draws stored next to the aircraft's model, if there are any.
 
     A dispersions file that names other draws, or has its own dispersions of drag or control power, is used unchanged.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.terminal.arguments import complete_aircraft, file_completer, with_completer
+from planfly.terminal.arguments import complete_aircraft, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import call_api, result_options
@@ -83,6 +83,12 @@ def aircraft_options(command_line: LineParser) -> None:
     with_completer(
         log_group.add_argument("--check", metavar="LOG", help="with --identify: another log to predict"),
         file_completer("bin", "BIN", "tlog", "ulg", "toml", "csv", "mat", "parquet", "h5"),
+    )
+    log_group.add_argument(
+        "--until",
+        metavar="S",
+        type=number_parser("until"),
+        help="with --identify: use only rows before this time of the log; `planfly predict` judges the rest",
     )
     result_options(
         parser,

@@ -65,6 +65,7 @@ COMMANDS = (
     Command("recover", _JUDGE_AND_SHOW, "RecoverAnswer"),
     Command("import", _AUTOPILOT_LOGS, "ImportAnswer", "imported_logs", "import_log"),
     Command("refly", _AUTOPILOT_LOGS, "ReflyAnswer", "imported_logs"),
+    Command("predict", _AUTOPILOT_LOGS, "PredictAnswer"),
     Command("campaign", _MANY_FLIGHTS, "CampaignDocument", "campaigns"),
     Command("winds", _MANY_FLIGHTS, "WindsDocument", "campaigns"),
     Command("paper", _MANY_FLIGHTS, "PaperAnswer"),

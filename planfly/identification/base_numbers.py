@@ -12,8 +12,9 @@ from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel, Coefficients
 from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.motor import Motor
+from aircraft.identification.motor_table import MotorTable
 from aircraft.identification.propeller_disc import PropellerDisc
-from flight.dynamics.fdm import Fdm
+from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import straight
 from world.arrays import Floats
 from world.errors import FlightError
@@ -28,6 +29,16 @@ _RATE_STEP_RAD_S = 1e-3
 _SURFACE_STEP_RAD = 1e-3
 # Moment of inertia of 1 slug ft^2, kg m^2.
 _SLUG_FT2 = 1.3558179483314004
+# One pound of force, N.
+_POUND_N = 4.4482216152605
+# One pound-foot of torque, N m.
+_POUND_FOOT_NM = 1.3558179483314004
+# One slug per cubic foot, kg/m^3.
+_SLUG_PER_FT3 = 515.3788183931961
+# Smallest and largest airspeed of a motor's table, as ratios to the cruise airspeed.
+_TABLE_SPEEDS = (0.3, 2.2)
+# Number of airspeeds, and of throttles, of a motor's table.
+_TABLE_ROWS = 15
 
 
 def base_model(aircraft: Aircraft) -> BaseModel:
@@ -42,26 +53,24 @@ def base_model(aircraft: Aircraft) -> BaseModel:
     (5.61, -0.99, 0.043)
     """
     motor = read_motor(aircraft)
-    probe = _Probe(aircraft)
-    return BaseModel(
-        mass=probe.mass,
-        area=aircraft.wing_area,
-        span=aircraft.wing_span,
-        chord=probe.chord,
-        inertia=probe.inertia,
-        servo_lag=aircraft.surface_lag,
-        motor_lag=aircraft.motor_lag,
-        coefficients=probe.coefficients(),
-        motor=motor,
-        reacts=_has_torque_reaction(aircraft),
-    )
+    return _Probe(aircraft).base_model(motor, reacts=_has_torque_reaction(aircraft))
+
+
+def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
+    """Return the model values of an aircraft with a variation, its motor as tables.
+
+    Raises FlightError for an aircraft without steady flight at cruise.
+    """
+    probe = _Probe(aircraft, variation)
+    return probe.base_model(probe.motor_table(), reacts=True)
 
 
 class _Probe:
     """Coefficients of a model's forces and moments at given flow angles, rates and surface deflections."""
 
-    def __init__(self, aircraft: Aircraft) -> None:
-        self._fdm = fdm = Fdm(aircraft)
+    def __init__(self, aircraft: Aircraft, variation: Variation | None = None) -> None:
+        self._aircraft = aircraft
+        self._fdm = fdm = Fdm(aircraft, variation=variation)
         read = fdm.properties.getter
         self.chord = read("metrics/cbarw-ft")() * 0.3048
         self._span, self._area = aircraft.wing_span, aircraft.wing_area
@@ -69,12 +78,53 @@ class _Probe:
         if trim is None:
             raise FlightError(f"{aircraft.name}: no level flight at cruise to begin with", file=aircraft.name)
         self._airspeed = aircraft.airspeed
-        fdm.balance(trim.vector())
+        self._trim = trim.vector()
+        fdm.balance(self._trim)
         self.mass = read("inertia/mass-slugs")() * 14.593902937206364
         ixx, iyy, izz, ixz = (read(f"inertia/i{axes}-slugs_ft2")() * _SLUG_FT2 for axes in ("xx", "yy", "zz", "xz"))
         # JSBSim's product of inertia has the opposite sign.
         self.inertia = (ixx, iyy, izz, -ixz)
         self._pressure = read("aero/qbar-psf")() * 47.88025898033584 * self._area
+
+    def base_model(self, motor: Motor, *, reacts: bool) -> BaseModel:
+        """Return the model values with a motor; reacts: True if the propeller's torque rolls the aircraft."""
+        return BaseModel(
+            mass=self.mass,
+            area=self._area,
+            span=self._span,
+            chord=self.chord,
+            inertia=self.inertia,
+            servo_lag=self._aircraft.surface_lag,
+            motor_lag=self._aircraft.motor_lag,
+            coefficients=self.coefficients(),
+            motor=motor,
+            reacts=reacts,
+        )
+
+    def motor_table(self) -> MotorTable:
+        """Return thrust, power and torque of the motor over airspeed and throttle, at the altitude of the trim."""
+        fdm, aircraft = self._fdm, self._aircraft
+        source = "prop" if aircraft.model.settles else "external"
+        thrust, torque, density = (
+            fdm.properties.getter(name)
+            for name in (f"forces/fbx-{source}-lbs", f"moments/l-{source}-lbsft", "atmosphere/rho-slugs_ft3")
+        )
+        airspeeds, throttles = (
+            np.linspace(*_TABLE_SPEEDS, _TABLE_ROWS) * self._airspeed,
+            np.linspace(0.0, 1.0, _TABLE_ROWS),
+        )
+        rows = []
+        for airspeed in airspeeds.tolist():
+            for throttle in throttles.tolist():
+                values = self._trim.copy()
+                values[0], values[-1] = airspeed, throttle
+                fdm.balance(values)
+                rows.append((thrust() * _POUND_N, float(fdm.read().power), -torque() * _POUND_FOOT_NM))
+        thrusts, powers, torques = np.array(rows).reshape(_TABLE_ROWS, _TABLE_ROWS, 3).transpose(2, 0, 1)
+        volts = aircraft.battery_voltage
+        return MotorTable(
+            airspeeds, throttles, thrusts, powers, torques, density() * _SLUG_PER_FT3, volts, nominal=volts
+        )
 
     def coefficients(self) -> Coefficients:
         """Return coefficients by central differences about the trim at closed throttle; the propeller may windmill."""
@@ -146,8 +196,8 @@ class _Probe:
         states = np.array([*flow, *angular_rates, 0.0, 0.0])
         self._fdm.derivatives(states, np.array([*deflections, 0.0]))
         read = self._fdm.properties.getter
-        x, y, z = (read(f"forces/fb{axis}-aero-lbs")() * 4.4482216152605 for axis in "xyz")
-        moments = [read(f"moments/{axis}-aero-lbsft")() * 1.3558179483314004 for axis in "lmn"]
+        x, y, z = (read(f"forces/fb{axis}-aero-lbs")() * _POUND_N for axis in "xyz")
+        moments = [read(f"moments/{axis}-aero-lbsft")() * _POUND_FOOT_NM for axis in "lmn"]
         sine, cosine = math.sin(alpha), math.cos(alpha)
         forces = np.array([-x * cosine - z * sine, x * sine - z * cosine, y])
         lengths = np.array([self._span, self.chord, self._span])

@@ -71,6 +71,8 @@ class Identified:
     draws: draws of the estimate, (512, n).
     logs: the logs used.
     outputs: the servo outputs.
+    cruise: cruise airspeed, m/s, true.
+    until: end of the part of each log that was used, s of the log; None for the whole log.
     """
 
     base: Aircraft
@@ -80,6 +82,7 @@ class Identified:
     logs: Sequence[MotionLog]
     outputs: Mapping[str, ServoOutput]
     cruise: float
+    until: float | None = None
 
     def performance(self) -> tuple[Performance, Performance]:
         """Return the performance of the estimate, (1,), and of all draws, (512,)."""
@@ -95,10 +98,11 @@ def make_identified(
     estimate: Estimate,
     logs: Sequence[MotionLog],
     outputs: Mapping[str, ServoOutput],
+    until: float | None = None,
 ) -> Identified:
     """Return an identification with 512 draws, at the last log's cruise speed, a true airspeed at `AMSL`."""
     cruise = _airspeeds(logs[-1], base)[0]
-    return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise)
+    return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise, until)
 
 
 def folder_files(identified: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
@@ -286,6 +290,7 @@ def posterior_text(identified: Identified) -> str:
     ]
     for log in identified.logs:
         lines += ["", "[[log]]", f'file = "{_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
+        lines += [] if identified.until is None else [f"until_s = {identified.until:.9g}  # later rows were not used"]
     for k, parameter in enumerate(PARAMETERS):
         lines += [
             "",

@@ -1,5 +1,6 @@
 """Resample the logged motion on one time grid, and select the stretches that an identification can use."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -77,11 +78,13 @@ def flight_records(
     aircraft: Aircraft,
     servos: Mapping[str, ServoOutput] | None = None,
     min_seconds: float = MIN_SECONDS,
+    until: float = math.inf,
 ) -> list[FlightRecord]:
     """Return the stretches of a log that an identification can use, in which only the wing carries the aircraft.
 
     servos: output of each control, if known better than from the SERVOn_* parameters of the log.
     min_seconds: shortest usable flight, s.
+    until: end of the part that is used, s of the log.
     Raises LogError, with a one-line message, for a log that cannot be used.
     """
     _check_usable(log)
@@ -100,13 +103,8 @@ def flight_records(
     # A surface that is commanded beyond its stop stays at the stop.
     stops = np.array([aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder, 1.0])
     controls = np.clip(controls, -stops, stops)
-    ratio = (
-        _interpolate(log.ratio, grid)[:, 0]
-        if len(log.ratio.time)
-        else _airspeed_ratio(_interpolate(log.height, grid)[:, 0])
-    )
     height = _interpolate(log.height, grid)[:, 0]
-    velocity, wind = _interpolate(log.velocity, grid), _interpolate(log.wind, grid)
+    ratio = _interpolate(log.ratio, grid)[:, 0] if len(log.ratio.time) else _airspeed_ratio(height)
     airspeed = _interpolate(log.airspeed, grid)[:, 0] * ratio
     inertial = _interpolate(log.inertial, grid)
     attitude = np.column_stack(
@@ -114,27 +112,23 @@ def flight_records(
     )
     unknown = np.full(len(grid), np.nan)
     battery = _interpolate(log.battery, grid) if _has_current(log) else np.column_stack([unknown, unknown])
-    usable = _usable_rows(log, grid, airspeed / ratio, pulses)
-    records = []
-    for begin, end in _find_stretches(usable):
-        rows = slice(begin, end)
-        records.append(
-            FlightRecord(
-                time=grid[rows],
-                acceleration=inertial[rows, :3],
-                rates=inertial[rows, 3:],
-                attitude=attitude[rows],
-                velocity=velocity[rows],
-                wind=wind[rows],
-                airspeed=airspeed[rows],
-                density=1.225 / np.square(ratio[rows]),
-                height=height[rows],
-                controls=controls[rows],
-                current=battery[rows, 1],
-                voltage=battery[rows, 0],
-                source=log.source,
-            )
-        )
+    usable = _usable_rows(log, grid, airspeed / ratio, pulses) & (grid < until)
+    flight = FlightRecord(
+        time=grid,
+        acceleration=inertial[:, :3],
+        rates=inertial[:, 3:],
+        attitude=attitude,
+        velocity=_interpolate(log.velocity, grid),
+        wind=_interpolate(log.wind, grid),
+        airspeed=airspeed,
+        density=1.225 / np.square(ratio),
+        height=height,
+        controls=controls,
+        current=battery[:, 1],
+        voltage=battery[:, 0],
+        source=log.source,
+    )
+    records = [flight.rows(slice(begin, end)) for begin, end in _find_stretches(usable)]
     _check_length(log, records, min_seconds, cut=bool(_vtol_rows(log, grid, pulses).any()))
     return records
 

@@ -407,6 +407,33 @@ class ReflyAnswer:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class PredictedQuantity:
+    """A quantity of a prediction; numbers are null for a quantity that the log does not hold."""
+
+    name: str
+    unit: str
+    inside: float | None
+    half_width: float | None
+    unchanged_half_width: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class PredictAnswer:
+    """planfly predict: how much of the flight is inside each band of 95 %, and the files."""
+
+    schema: Literal["planfly.predict/1"] = "planfly.predict/1"
+    exit_code: int
+    by: Literal["controls", "mission"]
+    aircraft: str
+    start_s: float
+    end_s: float
+    draws: int
+    windows: int
+    quantities: list[PredictedQuantity]
+    files: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PaperRow:
     """The plans of one algorithm for one problem of the paper."""
 

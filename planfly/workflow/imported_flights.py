@@ -1,7 +1,9 @@
 """Import flight logs of other programs, judge each in its scenario, mission and wind, and fly its mission again."""
 
+import contextlib
 import hashlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,8 +15,10 @@ from flight.autopilots.catalog import autopilot_of_log
 from flight.autopilots.parameter_origin import TITLES
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.dynamics.envelope_tables import load_envelope
+from flight.dynamics.fdm import Variation
+from flight.mission.commands import Command
 from flight.mission.implied_scenario import implied_scenario
-from flight.mission.items import Mission
+from flight.mission.items import TAKEOFFS, Frame, Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import lay_route
 from flight.mission_files.formats import read_mission
@@ -37,7 +41,8 @@ from planfly.workflow.file_autopilots import with_file_autopilot
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
 from planner.plan import read_plan
-from world.errors import LogError, MissionError
+from world.errors import LogError, MissionError, StartError
+from world.frames import to_geo
 from world.scenario import Scenario, load_scenario, with_flight, with_wind
 from world.scenario_tables import FlightTable
 
@@ -342,10 +347,96 @@ def fly_again(
     )
 
 
+@dataclass(frozen=True, slots=True)
+class DrawnFlight:
+    """Differences of one flight from what is stated.
+
+    variation: differences of the aircraft from its model.
+    wind: north and east, in which the air moves faster than the log's mean wind, m/s.
+    turbulence: level of the turbulence.
+    seed: seed of the turbulence.
+    offset: error of the logged positions, east, north and up, m.
+    """
+
+    variation: Variation
+    wind: tuple[float, float]
+    turbulence: str
+    seed: int
+    offset: tuple[float, float, float]
+
+
+def fly_draws(
+    setup: FlightSetup, track: Track, aircraft: str, draws: Sequence[DrawnFlight], advance: Advance
+) -> tuple[Reflight, ...]:
+    """Fly the longest sequence of followed legs once for each draw, and return the comparisons.
+
+    A draw with which the aircraft cannot start, or flies none of the legs, is left out.
+
+    Raises LogError for a flight that followed no part of its mission, or if no draw flies.
+    """
+    setup = start_after_takeoff(setup, track)
+    legs = _followed_legs(setup, track)[0]
+    flights = []
+    for number, draw in enumerate(draws, 1):
+        # A draw may have no steady flight at the start, or leave it within a row.
+        with contextlib.suppress(StartError, LogError):
+            flights.append(_refly_followed_legs(setup, legs, aircraft, draw.turbulence, None, draw))
+        advance(number, len(draws), f"flight {number} of {len(draws)}")
+    if not flights:
+        name = setup.scenario.name
+        raise LogError(f"{name}: {aircraft} flew the mission with none of {len(draws)} draws", file=name)
+    return tuple(flights)
+
+
+def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
+    """Return a setup whose mission begins where the first stretch reached the altitude of its take-off.
+
+    The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  A mission without
+    a take-off, and a stretch that never reached its altitude, are returned unchanged.
+    """
+    source, route, mission, scenario = setup.source, setup.route, setup.mission, setup.scenario
+    first = next((item for item in mission.items if item.seq == route.items[0]), None)
+    if source is None or not source.stretches or first is None or first.command not in TAKEOFFS:
+        return setup
+    stretch, *others = source.stretches
+    is_inside = (track.time >= stretch.start) & (track.time <= stretch.end)
+    rows = np.flatnonzero(is_inside & (track.position[:, 2] >= route.waypoints[0, 2]))
+    if not rows.size:
+        return setup
+    east, north, up = track.position[rows[0]].tolist()
+    lat_deg, lon_deg = to_geo(scenario.origin, east, north)
+    start = replace(
+        first, command=Command.NAV_WAYPOINT, frame=Frame.GLOBAL, lat_deg=float(lat_deg), lon_deg=float(lon_deg), alt=up
+    )
+    items = tuple(start if item.seq == first.seq else item for item in mission.items)
+    mission = replace(mission, items=items)
+    placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
+    return replace(
+        setup,
+        mission=mission,
+        route=lay_route(
+            placed, setup.limits.airspeed, scenario.flight.fly_over, setup.limits, setup.autopilot.route_rules
+        ),
+        source=replace(source, stretches=(replace(stretch, start=float(track.time[rows[0]])), *others)),
+    )
+
+
 def _refly_followed_legs(
-    setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
+    setup: FlightSetup,
+    legs: FlownLegs,
+    aircraft: str | None,
+    turbulence: str | None,
+    advance: Advance | None,
+    draw: DrawnFlight | None = None,
 ) -> Reflight:
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
+    if draw is not None:
+        wind = scenario.wind
+        north, east = (
+            -wind.speed * math.cos(wind.from_course) + draw.wind[0],
+            -wind.speed * math.sin(wind.from_course) + draw.wind[1],
+        )
+        scenario = with_wind(scenario, math.hypot(north, east), math.atan2(-east, -north) % (2.0 * math.pi), turbulence)
     model, battery = find_airframe(scenario)
     limits = setup.limits
     if model.name != setup.aircraft:
@@ -361,14 +452,19 @@ def _refly_followed_legs(
         nav="perfect",
     )
 
-    flight, blocks = Flight(model_setup, model), []
+    if draw is not None:
+        model_setup = replace(model_setup, seed=draw.seed)
+    flight, blocks = Flight(model_setup, model, None if draw is None else draw.variation), []
     length = flight.path.length
     for block in simulate(flight):
         blocks.append(block)
-        advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
+        if advance is not None:
+            advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
     track, end_reason = track_of(blocks), blocks[-1].ended
     if len(track) < 2:
         raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {end_reason}", file=scenario.name)
+    if draw is not None:
+        track = replace(track, position=track.position + np.array(draw.offset))
     stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
     return compare_with_model(model_setup, legs, track, end_reason, stands_in=stands_in)
 

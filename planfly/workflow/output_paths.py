@@ -67,6 +67,10 @@ REFLY_FILES = tuple(
 )
 
 
+# Files that `planfly predict` writes.
+PREDICT_FILES = ("predict.html", "predict.png")
+
+
 def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -> None:
     """Raise PlanflyError if the target file is the input, is a folder, has no folder, or exists without `overwrite`.
 

@@ -27,6 +27,7 @@ FUNCTIONS = {
     "recover": ("recover",),
     "import": ("import_log", "guess_columns"),
     "refly": ("refly",),
+    "predict": ("predict",),
     "campaign": ("campaign", "campaign_flight"),
     "winds": ("winds",),
     "paper": ("paper_tables",),

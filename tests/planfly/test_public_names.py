@@ -38,6 +38,7 @@ VERBS = {
         "guess_columns",
         "import_log",
         "refly",
+        "predict",
         "recover",
         "campaign",
         "campaign_flight",
@@ -64,6 +65,7 @@ RESULTS = {
     *("ColumnGuesses", "Front", "FrontPlan", "IdentifiedAircraft"),
     *("FlownMission", "ImportedFlight", "Instruments", "Judged", "Optimiser", "PaperTables", "Plan", "PlanThenFly"),
     *(
+        "Predicted",
         "Reflown",
         "ReturnsFound",
         "Round",

@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from flight.simulation.setup import FlightSetup, MissionStretch
-from flight.simulation.track import ROLL, Track
+from flight.simulation.track import ROLL, THROTTLE, Track
 from logs.verdict.imported.flown_legs import FlownLegs
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track, along_across
@@ -17,6 +17,8 @@ from world.errors import LogError
 
 # Spacing along a leg of the points at which the flights are compared, m.
 COMPARISON_STEP_M = 10.0
+# Seconds per hour.
+SECONDS_PER_HOUR = 3600.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +30,9 @@ class Profile:
     ground_speed: m/s.
     bank: rad.
     energy: energy used since the first point, Wh.
+    airspeed: m/s, true.
+    throttle: 0..1.
+    power: W from the battery; NaN for a log without current.
     """
 
     cross_track: Floats
@@ -35,6 +40,9 @@ class Profile:
     ground_speed: Floats
     bank: Floats
     energy: Floats
+    airspeed: Floats
+    throttle: Floats
+    power: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,10 +172,14 @@ def _flight_profile(
     parts: list[Floats] = []
     track = aligned.track
     speed = np.hypot(track.velocity[:, 0], track.velocity[:, 1]).astype(np.float64)
-    bank, energy = track.attitude[:, ROLL].astype(np.float64), track.energy.astype(np.float64)
+    bank, energy, airspeed, throttle = (
+        values.astype(np.float64)
+        for values in (track.attitude[:, ROLL], track.energy, track.airspeed, track.controls[:, THROTTLE])
+    )
+    power = SECONDS_PER_HOUR * np.gradient(energy, track.time) if len(energy) > 1 else np.full(len(energy), math.nan)
     for leg, along_leg in enumerate(distances_on_legs):
         if not aligned.has_flown(leg):
-            parts.append(np.full((5, len(along_leg)), math.nan))
+            parts.append(np.full((len(fields(Profile)), len(along_leg)), math.nan))
             continue
         rows = aligned.leg_rows(leg)
         along, across = along_across(requirements, leg, track.position[rows])
@@ -175,7 +187,11 @@ def _flight_profile(
         is_forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
         line_altitude = requirements.points[leg, 2] + along * math.tan(requirements.slopes[leg])
         height_error = track.position[rows, 2] - line_altitude
-        columns = (across, height_error, speed[rows], bank[rows], energy[rows])
+        columns = (
+            across,
+            height_error,
+            *(column[rows] for column in (speed, bank, energy, airspeed, throttle, power)),
+        )
         parts.append(
             np.array(
                 [

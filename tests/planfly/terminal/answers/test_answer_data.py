@@ -6,8 +6,10 @@ from pathlib import Path
 import pytest
 
 import planfly.planning.paper
+from aircraft.catalog import load_aircraft
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
+from planfly.api import predicting
 from planfly.cli import main
 from planfly.planning.paper import SeededPlan
 from tests.logs.importers.written_logs import dataflash
@@ -65,13 +67,22 @@ def test_what_is_asked_of_a_log(capsys: Output) -> None:
     assert recovered["rows"] == len(read_log(Path("cut-recovered.mcap")).track)
 
 
-def test_logs_of_the_field(tmp_path: Path, capsys: Output) -> None:
+def test_logs_of_the_field(tmp_path: Path, capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:
     dataflash(Path("a.BIN"))
     plan = str(example_plan(tmp_path))
     imported = answered(capsys, 0, "import", "a.BIN", "a.mcap", "--plan", plan, "--aircraft", "aerosonde")
     assert (imported["log"], imported["rows"]) == ("a.mcap", len(read_log(Path("a.mcap")).track))
     refly = answered(capsys, 0, "refly", "a.mcap")
     assert sorted(refly["files"]) == sorted(str(path) for path in Path("a-refly").iterdir())
+    draws = predicting.drawn_flights(load_aircraft("aerosonde"), 3)
+    monkeypatch.setattr(predicting, "drawn_flights", lambda _: draws)
+    predict = answered(capsys, 0, "predict", "a.mcap", "--aircraft", "aerosonde", "--out", "predicted")
+    assert sorted(predict["files"]) == sorted(str(path) for path in Path("predicted").iterdir())
+    assert (predict["by"], predict["draws"], predict["windows"]) == ("mission", 3, 0)
+    shares = {one["name"]: one["inside"] for one in predict["quantities"]}
+    # The written log states 3,600 W, which no draw of the Aerosonde takes.
+    assert shares["power"] == 0.0
+    assert shares["cross-track"] is not None
 
 
 def test_the_papers_table(capsys: Output, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,270 @@
+"""Predict parts of a log that no estimate has seen, as bands of 95 %, and count how often the flight is inside.
+
+The judged part of the log is cut into windows. Each window starts from the measured state and follows the logged
+controls. Forty flights of a window differ in what is not known: each flies with another draw of the aircraft, and adds
+the errors of the central aircraft over one window of an earlier part of the log, drawn at random. These blocks of
+errors hold gusts, noise of the sensors and what the model lacks, with their growth over time and their correlation (a
+block bootstrap: Kunsch 1989; Politis and Romano 1994). Biases of the sensors, trim offsets and the filter of the gusts
+come from the earlier part too. Nothing is fitted to the judged part.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aircraft.identification.airspeed import airspeed_scale
+from aircraft.identification.alignment import Clocks, Signals, align
+from aircraft.identification.base_model import BaseModel
+from aircraft.identification.flight_record import GRID_HZ, FlightRecord
+from aircraft.identification.flow import motor_of, vane, voltage_of
+from aircraft.identification.level import level_signals
+from aircraft.identification.parameters import prior_means
+from aircraft.identification.prediction import GustFilter, Predictor
+from world.arrays import Flags, Floats, Ints
+
+# Number of flights of each window. The lowest and the highest of 40 values enclose the next value of the same kind with
+# a probability of 39 / 41, 95.1 %.
+DRAWS = 40
+# Probability with which the flight is inside a band.
+COVERAGE = 0.95
+# Smallest fraction of the draws with which a band is known.
+_MIN_DRAWS = 0.9
+# Duration of a window, s.
+WINDOW_S = 2.0
+# Time between the starts of windows in the earlier part, s; they may overlap.
+_CALIBRATION_STEP_S = 0.5
+# Time in a stretch before its first window, s; the filter has settled then.
+_SETTLING_TIME_S = 2.0
+# One of this many samples is kept, at 50 samples a second.
+_THINNING = 5
+# Seed of the blocks of errors.
+_SEED = 68
+
+
+@dataclass(frozen=True, slots=True)
+class BlindQuantity:
+    """One predicted quantity.
+
+    name, unit: for people.
+    factor: factor from SI to the unit.
+    """
+
+    name: str
+    unit: str
+    factor: float = 1.0
+
+
+# Predicted quantities; height and track begin with zero in each window.
+QUANTITIES = (
+    BlindQuantity("bank", "deg", float(np.degrees(1.0))),
+    BlindQuantity("pitch", "deg", float(np.degrees(1.0))),
+    BlindQuantity("airspeed", "m/s"),
+    BlindQuantity("height rate", "m/s"),
+    BlindQuantity("height", "m"),
+    BlindQuantity("track", "m"),
+    BlindQuantity("power", "W"),
+)
+# Columns of the height rate and the height.
+_HEIGHT_RATE = 3
+_HEIGHT = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """Band of one quantity, and the flight.
+
+    along: (n,) time or distance.
+    low, high: (n,) ends of the band.
+    flown: (n,) the flight; NaN where it is not known.
+    unchanged: half the width of the band of a quantity that keeps the value with which each window starts; NaN if that
+        is not a prediction.
+    """
+
+    name: str
+    unit: str
+    along: Floats
+    low: Floats
+    high: Floats
+    flown: Floats
+    unchanged: float = float("nan")
+
+    @property
+    def inside(self) -> float:
+        """Share of the known values that are inside the band; NaN without known values."""
+        known = self._known
+        is_inside = (self.flown >= self.low) & (self.flown <= self.high)
+        return float(is_inside[known].mean()) if known.any() else float("nan")
+
+    @property
+    def half_width(self) -> float:
+        """Median of half the width of the band."""
+        known = self._known
+        return float(np.median(0.5 * (self.high - self.low)[known])) if known.any() else float("nan")
+
+    @property
+    def _known(self) -> Flags:
+        return np.isfinite(self.flown) & np.isfinite(self.low) & np.isfinite(self.high)
+
+
+def band_limits(values: Floats) -> tuple[Floats, Floats]:
+    """Return the ends of the band (n,) of draws (d, n), at the plotting positions k / (d + 1) (Weibull 1939).
+
+    The next draw is inside with the probability `COVERAGE`; percentiles of the draws themselves would hold fewer.  The
+    band is unknown (NaN) where fewer than `_MIN_DRAWS` of the draws have a value.
+
+    >>> low, high = band_limits(np.arange(39.0)[:, np.newaxis])
+    >>> low.tolist(), high.tolist()
+    ([0.0], [38.0])
+    """
+    tail = 0.5 * (1.0 - COVERAGE)
+    is_known = np.isfinite(values).mean(axis=0) >= _MIN_DRAWS
+    limits = np.full((2, *values.shape[1:]), np.nan)
+    limits[:, is_known] = np.nanquantile(values[:, is_known], [tail, 1.0 - tail], axis=0, method="weibull")
+    return limits[0], limits[1]
+
+
+class BlindPrediction:
+    """Windows of the judged part of a log, predicted by draws of an aircraft.
+
+    earlier: stretches before the judged part, for biases, trims, filters and errors.
+    judged: stretches of the judged part.
+    clocks: clocks of the log, from the earlier part.
+    base: the central aircraft.
+    """
+
+    def __init__(
+        self,
+        earlier: Sequence[FlightRecord],
+        judged: Sequence[FlightRecord],
+        clocks: Clocks,
+        base: BaseModel,
+        window: float = WINDOW_S,
+    ) -> None:
+        raw = align(earlier, [clocks] * len(earlier), base.motor_lag)
+        self._earlier = level_signals(raw)
+        scale, _ = airspeed_scale(self._earlier, vane(self._earlier, base, prior_means()))
+        self._earlier = _scaled(self._earlier, scale)
+        self._judged = _scaled(
+            level_signals(align(judged, [clocks] * len(judged), base.motor_lag), reference=raw), scale
+        )
+        self._times = np.concatenate([record.time for record in judged])
+        self._count = round(window * self._earlier.hertz)
+        central = Predictor(self._earlier, base, prior_means())
+        self._filters: Sequence[GustFilter] = central.filters
+        starts = _window_starts(self._earlier, self._count, round(_CALIBRATION_STEP_S * self._earlier.hertz))
+        measured = _measured(self._earlier, starts, self._count)
+        self._errors = measured - self._fly(self._earlier, base, starts)
+        self._changes = measured - measured[:, :1]
+        # Of the height, the change beyond that of a constant height rate.
+        seconds = np.arange(measured.shape[1]) * _THINNING / GRID_HZ
+        self._changes[:, :, _HEIGHT] -= measured[:, :1, _HEIGHT_RATE] * seconds
+        self._starts = _window_starts(self._judged, self._count, self._count)
+        self._flown = _measured(self._judged, self._starts, self._count)
+
+    @property
+    def windows(self) -> tuple[int, int]:
+        """Number of windows of the earlier and of the judged part."""
+        return len(self._errors), len(self._starts)
+
+    def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
+        """Return the band of each of `QUANTITIES` over the judged windows, by draws of the aircraft."""
+        generator = np.random.default_rng(_SEED)
+        blocks = generator.integers(len(self._errors), size=(len(draws), len(self._starts)))
+        flights = np.stack(
+            [
+                self._fly(self._judged, base, self._starts) + self._errors[chosen]
+                for base, chosen in zip(draws, blocks, strict=True)
+            ]
+        )
+        low, high = band_limits(flights)
+        times = self._times[self._starts[:, np.newaxis] + _rows(self._count)].ravel()
+        made = []
+        for k, quantity in enumerate(QUANTITIES):
+            unchanged = np.quantile(np.abs(self._changes[:, :, k]), COVERAGE, axis=0)
+            lower, upper, flown = (quantity.factor * values[:, :, k].ravel() for values in (low, high, self._flown))
+            width = quantity.factor * float(np.median(unchanged))
+            made.append(Band(quantity.name, quantity.unit, times, lower, upper, flown, width))
+        return tuple(made)
+
+    def _fly(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
+        """Return `QUANTITIES` (w, k, q) over windows from some rows (w,), with trims of the earlier part."""
+        values = prior_means()
+        trims = Predictor(self._earlier, base, values, self._filters).trims.mean(axis=0)
+        predictor = Predictor(signals, base, values, self._filters, trims=trims)
+        states = np.stack(list(predictor.fly(starts, self._count)), axis=1)
+        rows = starts[:, np.newaxis] + np.arange(self._count + 1)
+        measured_velocity = signals.velocity[rows[:, 0]]
+        motor = motor_of(base, values)
+        airspeed = np.linalg.norm(states[:, :, :3], axis=2)
+        volts = voltage_of(signals, base)
+        battery = volts[rows] if isinstance(volts, np.ndarray) else np.full(rows.shape, volts)
+        flat = [array.ravel() for array in (airspeed, signals.throttle[rows], signals.density[rows], battery)]
+        _, current = motor.thrust_and_current(*flat)
+        heading = _headings(states, signals.attitude[rows[:, 0], 2], 1.0 / signals.hertz)
+        air = _to_ground(states, heading)
+        # The air moves as it did at the start of the window.
+        velocity = air + (measured_velocity - air[:, 0])[:, np.newaxis]
+        return _quantities(states[:, :, 6:8], airspeed, velocity, current.reshape(rows.shape) * battery, signals.hertz)
+
+
+def _scaled(signals: Signals, factor: float) -> Signals:
+    return replace(signals, airspeed=signals.airspeed * factor)
+
+
+def _rows(count: int) -> Ints:
+    """Return the samples of a window that are kept, without its start, which is measured."""
+    return np.arange(_THINNING, count + 1, _THINNING)
+
+
+def _window_starts(signals: Signals, count: int, step: int) -> Ints:
+    """Return the rows at which windows of a number of samples start, a step apart, in all stretches."""
+    settling = round(_SETTLING_TIME_S * signals.hertz)
+    return np.concatenate(
+        [
+            np.arange(first + settling, last - count - 1, step)
+            for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True)
+        ]
+    )
+
+
+def _measured(signals: Signals, starts: Ints, count: int) -> Floats:
+    """Return the measured `QUANTITIES` (w, k, q) over windows; the power is NaN for a log without current."""
+    rows = starts[:, np.newaxis] + np.arange(count + 1)
+    return _quantities(
+        signals.attitude[rows, :2],
+        signals.airspeed[rows],
+        signals.velocity[rows],
+        signals.current[rows] * signals.voltage[rows],
+        signals.hertz,
+    )
+
+
+def _quantities(angles: Floats, airspeed: Floats, velocity: Floats, power: Floats, hertz: float) -> Floats:
+    """Return `QUANTITIES` (w, k, q) over windows, of bank and pitch (w, n, 2), and velocity (w, n, 3)."""
+    north, east, down = np.moveaxis(velocity, 2, 0)
+    course = np.arctan2(east[:, :1], north[:, :1])
+    right = east * np.cos(course) - north * np.sin(course)
+    height, track = (np.cumsum(speed, axis=1) / hertz for speed in (-down, right))
+    kept = _rows(angles.shape[1] - 1)
+    columns = (angles[:, :, 0], angles[:, :, 1], airspeed, -down, height - height[:, :1], track - track[:, :1], power)
+    return np.stack([column[:, kept] for column in columns], axis=2)
+
+
+def _headings(states: Floats, start: Floats, step: float) -> Floats:
+    """Return the headings (w, n), rad, from the heading at each window's start (w,), rad."""
+    roll, pitch = states[:, :, 6], states[:, :, 7]
+    rate = (states[:, :, 4] * np.sin(roll) + states[:, :, 5] * np.cos(roll)) / np.cos(pitch)
+    turned = np.cumsum(0.5 * step * (rate[:, 1:] + rate[:, :-1]), axis=1)
+    return start[:, np.newaxis] + np.concatenate([np.zeros((len(states), 1)), turned], axis=1)
+
+
+def _to_ground(states: Floats, heading: Floats) -> Floats:
+    """Return the velocity through the air, north, east and down (w, n, 3), m/s."""
+    u, v, w, _, _, _, roll, pitch = np.moveaxis(states, 2, 0)
+    below = v * np.sin(roll) + w * np.cos(roll)
+    across = v * np.cos(roll) - w * np.sin(roll)
+    along, down = u * np.cos(pitch) + below * np.sin(pitch), below * np.cos(pitch) - u * np.sin(pitch)
+    north = along * np.cos(heading) - across * np.sin(heading)
+    east = along * np.sin(heading) + across * np.cos(heading)
+    return np.stack([north, east, down], axis=2)

@@ -1,0 +1,47 @@
+"""Chart a blind prediction: the band of each quantity, and the flight."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aircraft.identification.blind import Band
+from logs.views.charts import Chart, Label, Layer, Panel
+from world.arrays import Floats
+
+# Largest step along the axis within one window, as a multiple of the median step.
+_MAX_STEP_RATIO = 5.0
+
+
+def band_chart(bands: Sequence[Band], title: str) -> Chart:
+    """Return a panel for each quantity, with its band and the flight, over time or distance.
+
+    >>> time = np.arange(4.0)
+    >>> chart = band_chart([Band("bank", "deg", time, time - 1.0, time + 1.0, time)], "a flight")
+    >>> [panel.title for panel in chart.panels], chart.unit
+    (['bank'], 's')
+    """
+    is_by_time = any(band.name == "height rate" for band in bands) or len(bands) == 1
+    factor = 1.0 if is_by_time else 1e-3
+    panels = []
+    for band in bands:
+        if not np.isfinite(band.flown).any():
+            continue
+        along, low, high, flown = _with_gaps(factor * band.along, band.low, band.high, band.flown)
+        layers = (
+            Layer("band", "band of 95 %", "band", along, high, low),
+            Layer("line", "flown", "flown", along, flown),
+        )
+        top = float(np.nanmax([high, flown]))
+        share = Label(f"{100.0 * band.inside:.0f} % inside", float(along[0]), top, "end", prefer=(1, -1))
+        panels.append(Panel(band.name, band.unit.replace("deg", "°"), layers, min_span=1.0, labels=(share,)))
+    along_name, unit = ("time of the log", "s") if is_by_time else ("along the legs", "km")
+    return Chart(title, along_name, unit, tuple(panels), page_height=170, print_height=1.3)
+
+
+def _with_gaps(along: Floats, *columns: Floats) -> tuple[Floats, ...]:
+    """Return the axis and columns with a NaN wherever the axis jumps, as between stretches."""
+    steps = np.diff(along)
+    jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1
+    return along if not len(jumps) else np.insert(along, jumps, np.nan), *(
+        np.insert(column, jumps, np.nan) for column in columns
+    )

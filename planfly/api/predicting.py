@@ -1,0 +1,299 @@
+"""Predict a logged flight blindly, as bands of 95 %, and count how often the flight is inside."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal, Unpack
+
+import numpy as np
+
+from aircraft.catalog import Aircraft, find_aircraft
+from aircraft.identification.blind import DRAWS, Band, BlindPrediction, band_limits
+from aircraft.identification.estimate import align_clocks
+from aircraft.identification.flight_record import FlightRecord
+from flight.dynamics.fdm import Variation
+from logs.importers.motion import MotionLog
+from logs.importers.motion_log import read_motion
+from logs.recording.reader import read_log
+from logs.verdict.imported.model_comparison import Reflight
+from planfly.api.identifying import records_and_outputs
+from planfly.api.imported import read_imported
+from planfly.arguments import check_arguments
+from planfly.campaigns.campaign_base import TURBULENCE_LEVELS, with_aircraft_draws
+from planfly.campaigns.dispersions import default_dispersions, draw_flight
+from planfly.flight_logs import is_log
+from planfly.flight_options import LogOptions, takes_options
+from planfly.identification.base_numbers import varied_model
+from planfly.identification.records import MIN_CHECK_SECONDS
+from planfly.kernel_units.unit_kernels import FLYING
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.imported_flights import DrawnFlight, fly_draws
+from planfly.workflow.output_paths import PREDICT_FILES, check_output_folder, clean_folder
+from world.errors import LogError, PlanflyError
+from world.extras import needs_extra
+from world.files import read_toml, write_whole
+from world.scenario_tables import names_folder
+
+# Inputs with which the model flies: the logged controls, or the autopilot's model with the logged mission.
+PredictBy = Literal["controls", "mission"]
+# Seed of the draws.
+_SEED = 68
+# Standard deviation of each component of the mean wind of a log, m/s. Without a sideslip vane an error of the heading
+# of 3 degrees at 17 m/s is 0.9 m/s of wind on straight flight, and an error of the airspeed of 2 % is 0.3 m/s; the wind
+# changes by about 0.4 m/s over minutes.  The root of the sum of their squares is 1.0.
+LOGGED_WIND_SD_MPS = 1.0
+# Name, unit and factor of each quantity of a flight by its mission, by the field of its profile.
+_PROFILE_QUANTITIES = {
+    "cross_track": ("cross-track", "m", 1.0),
+    "height_error": ("height", "m", 1.0),
+    "ground_speed": ("ground speed", "m/s", 1.0),
+    "airspeed": ("airspeed", "m/s", 1.0),
+    "bank": ("bank", "deg", math.degrees(1.0)),
+    "throttle": ("throttle", "%", 100.0),
+    "power": ("power", "W", 1.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Predicted:
+    """Result of `planfly.predict`.
+
+    by: "controls" if the logged controls were followed, "mission" if the autopilot's model flew the logged mission.
+    bands: band of each quantity, with the flight; over time, s, or over the distance along the legs, m.
+    draws: number of flights that make the bands.
+    windows: number of judged windows; 0 by the mission.
+    start, end: judged part of the log, s.
+    source: file of the log.  aircraft: name of the aircraft.
+    lines: description for people.
+    files: written files.
+    """
+
+    by: PredictBy
+    bands: tuple[Band, ...]
+    draws: int
+    windows: int
+    start: float
+    end: float
+    source: str
+    aircraft: str
+    lines: tuple[str, ...]
+    files: tuple[Path, ...] = ()
+
+
+@needs_extra("identification")
+@with_warm_up(*FLYING)
+@takes_options
+def predict(
+    log: str | Path,
+    out: str | Path | None = None,
+    *,
+    by: PredictBy | None = None,
+    start: float | None = None,
+    overwrite: bool = False,
+    **options: Unpack[LogOptions],
+) -> Predicted:
+    """Predict a logged flight with a model that has not seen it, as bands of 95 %, and count how often it is inside.
+
+    log: a log as `import_log` and `identify_aircraft` read it, or a flight log that `import_log` wrote.
+    out: a folder for a page and a picture; None writes no files.  overwrite: True replaces results in the folder.
+    by: "controls" follows the logged controls over windows of 2 s; "mission" flies the logged mission with the
+    autopilot's model in the logged wind; None for the controls if the log has them.
+    start: start of the judged part, s of the log, with ``by="controls"``; the rows before it calibrate the bands.  None
+    for the end of the part from which the aircraft was identified, or the middle of a log that was not used.
+    aircraft: name or folder of the aircraft, which is required.  The other options are those of `import_log`.
+    Raises a `planfly.PlanflyError` for bad input; then nothing is written.
+    """
+    if options["aircraft"] is None:
+        raise PlanflyError.of_argument("aircraft", None, "name the aircraft that predicts the flight", shown="")
+    check_arguments(flight=options["flight"], datum=options["datum"], start=start)
+    if out is not None:
+        check_output_folder(Path(out), overwrite)
+    name = str(options["aircraft"])
+    aircraft = find_aircraft(str(Path(name).resolve()) if names_folder(name) else name)
+    path = Path(log)
+    motion = None if by == "mission" or is_log(path) else _read_motion(path, required=by == "controls")
+    if by == "controls" and motion is None:
+        raise LogError(f"{path}: by the mission only: a flight log of planfly holds no inertial sensors", file=path)
+    if motion is not None:
+        predicted = _predict_by_controls(motion, aircraft, start)
+    elif start is not None:
+        allowed = "expected only for a prediction by the controls; by the mission every followed leg is judged"
+        raise PlanflyError.of_argument("start", start, allowed)
+    else:
+        predicted = _predict_by_mission(path, aircraft, options)
+    files: tuple[Path, ...] = ()
+    if out is not None:
+        folder = clean_folder(out, PREDICT_FILES, overwrite=True)
+        with stage("drawing", "drawing a prediction"):
+            files = _write_page(folder, predicted)
+    return replace(predicted, files=files)
+
+
+def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
+    """Return the motion of a log with inertial sensors and controls; None for a log without them.
+
+    required: True to raise LogError for a log without them.
+    """
+    try:
+        motion = read_motion(path)
+    except LogError:
+        if required:
+            raise
+        return None
+    has_controls = len(motion.inertial.time) > 1 and len(motion.moved.time) > 1
+    if not has_controls and required:
+        raise LogError(f"{path}: no inertial sensors or no controls: predict it by the mission", file=path)
+    return motion if has_controls else None
+
+
+# ----------------------------------------------------------------------
+# By the logged controls.
+
+
+def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | None) -> Predicted:
+    with stage("reading a log"):
+        records, _ = records_and_outputs(motion, aircraft, MIN_CHECK_SECONDS)
+    start = _judged_start(motion, aircraft, records, start)
+    earlier = [part for record in records if len((part := record.between(-math.inf, start)).time) > 1]
+    judged = [part for record in records if len((part := record.between(start, math.inf)).time) > 1]
+    for parts, side in ((earlier, "before"), (judged, "from")):
+        seconds = sum(part.seconds for part in parts)
+        if seconds < MIN_CHECK_SECONDS:
+            allowed = f"at least {MIN_CHECK_SECONDS:g} s of usable flight are needed on either side"
+            message = f"{motion.source}: {seconds:.1f} s of usable flight {side} {start:.1f} s: {allowed}"
+            raise LogError(message, file=motion.source, field="start", value=start, allowed=allowed)
+    with stage("predicting") as advance:
+        central = varied_model(aircraft, Variation())
+        clocks = align_clocks(earlier, central)[-1]
+        prediction = BlindPrediction(earlier, judged, clocks, central)
+        models = []
+        for number, draw in enumerate(drawn_flights(aircraft), 1):
+            models.append(varied_model(aircraft, draw.variation))
+            advance(number, DRAWS, f"aircraft {number} of {DRAWS}")
+        bands = prediction.bands(models)
+    before, count = prediction.windows
+    end = float(judged[-1].time[-1])
+    heading = (
+        f"{motion.source} by the logged controls: {count} windows of 2 s from {start:.1f} s to {end:.1f} s, {DRAWS}"
+        f" flights each; their errors are drawn from {before} windows before {start:.1f} s"
+    )
+    lines = (heading, *_band_lines(bands))
+    return Predicted("controls", bands, DRAWS, count, start, end, motion.source, aircraft.name, lines)
+
+
+def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[FlightRecord], start: float | None) -> float:
+    """Return the start of the part that is judged, s of the log.
+
+    Raises LogError if the aircraft was identified from rows after it.
+    """
+    used = _used_until(aircraft, motion.sha256)
+    if used is None:
+        return float(np.median(np.concatenate([record.time for record in records]))) if start is None else start
+    if not math.isfinite(used):
+        allowed = "identify it with --until S, and predict the rest"
+        message = f"{motion.source}: {aircraft.name} was identified from all of it: {allowed}"
+        raise LogError(message, file=motion.source, field="aircraft", value=aircraft.name, allowed=allowed)
+    if start is not None and start < used:
+        allowed = f"expected at least {used:g} s: {aircraft.name} was identified from the rows before"
+        raise PlanflyError.of_argument("start", start, allowed)
+    return used if start is None else start
+
+
+def _used_until(aircraft: Aircraft, sha256: str) -> float | None:
+    """Return the end of the part of a log from which an aircraft was identified, s; infinity for the whole log.
+
+    Return None for a log that was not used.
+    """
+    file = aircraft.folder / "posterior.toml"
+    if not file.is_file():
+        return None
+    for entry in read_toml(file, "uncertainty").get("log", []):
+        if entry.get("sha256") == sha256:
+            return float(entry.get("until_s", math.inf))
+    return None
+
+
+def drawn_flights(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
+    """Return flights that differ from what is stated, drawn as for a campaign without a file of dispersions.
+
+    The wind is the wind of a log instead of a forecast's, and each level of turbulence is as likely.  The error of the
+    positions of satellite navigation, with which a campaign's flights start, is the error of the logged positions.
+    """
+    dispersions = with_aircraft_draws(default_dispersions(), aircraft)
+    generator = np.random.default_rng(_SEED)
+    winds = LOGGED_WIND_SD_MPS * generator.standard_normal((count, 2))
+    levels = generator.integers(len(TURBULENCE_LEVELS), size=count).tolist()
+    flights = []
+    for index, level in enumerate(levels):
+        draw = draw_flight(dispersions, _SEED, index)
+        properties = () if dispersions.draws is None else dispersions.draws.properties(draw.seed)
+        values = draw.values
+        variation = Variation(
+            mass=values["mass"], drag=values["drag"], control=values["control_power"], properties=properties
+        )
+        north, east = winds[index].tolist()
+        offset = (values["start_east"], values["start_north"], values["start_up"])
+        flights.append(DrawnFlight(variation, (north, east), TURBULENCE_LEVELS[level], draw.seed, offset))
+    return flights
+
+
+# ----------------------------------------------------------------------
+# By the logged mission.
+
+
+def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> Predicted:
+    if is_log(path):
+        log = read_log(path)
+        setup, track = log.setup, log.track
+        if setup.source is None:
+            message = f"{path}: flown by planfly itself: expected a log that `planfly import` wrote"
+            raise LogError(message, file=path)
+    else:
+        flight = read_imported(path, **options)
+        setup, track = flight.setup, flight.track
+    name = str(aircraft.folder) if not aircraft.embedded else aircraft.name
+    with stage("flying by draws") as advance:
+        flights = fly_draws(setup, track, name, drawn_flights(aircraft), advance)
+    bands = _profile_bands(flights)
+    stretch = flights[0].stretch
+    heading = (
+        f"{path} by its mission: {stretch.mode} from {stretch.start:.1f} s to {stretch.end:.1f} s, {len(flights)} of"
+        f" {DRAWS} flights with other aircraft, wind and turbulence; no band is fitted to the log"
+    )
+    lines = (heading, *_band_lines(bands))
+    return Predicted("mission", bands, len(flights), 0, stretch.start, stretch.end, str(path), aircraft.name, lines)
+
+
+def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
+    """Return the band of each quantity over the distance along the legs."""
+    flown, bands = flights[0].flown, []
+    for field, (name, unit, factor) in _PROFILE_QUANTITIES.items():
+        low, high = band_limits(np.stack([factor * getattr(flight.model, field) for flight in flights]))
+        bands.append(Band(name, unit, flights[0].distance, low, high, factor * getattr(flown, field)))
+    return tuple(bands)
+
+
+def _band_lines(bands: Sequence[Band]) -> list[str]:
+    lines = []
+    for band in bands:
+        if math.isnan(band.inside):
+            lines.append(f"  {band.name:<12} not in the log")
+            continue
+        unchanged = "" if math.isnan(band.unchanged) else f" (if it stayed as at the start: ±{band.unchanged:.3g})"
+        width = f"band of ±{band.half_width:.3g} {band.unit} at the median"
+        lines.append(f"  {band.name:<12} {100.0 * band.inside:.1f} % of the flight inside, {width}{unchanged}")
+    return lines
+
+
+def _write_page(folder: Path, predicted: Predicted) -> tuple[Path, ...]:
+    from logs.views.drawing import draw_chart, png_bytes
+    from logs.views.prediction import band_chart
+    from logs.views.report.prediction import prediction_page
+
+    chart = band_chart(predicted.bands, f"{Path(predicted.source).name}, predicted by {predicted.aircraft}")
+    page, picture = (folder / name for name in PREDICT_FILES)
+    write_whole(picture, png_bytes(draw_chart(chart)))
+    write_whole(page, prediction_page(predicted.lines[0], predicted.bands, chart).encode())
+    return page, picture

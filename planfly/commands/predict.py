@@ -1,0 +1,93 @@
+"""``planfly predict``: predict a logged flight blindly, as bands of 95 %."""
+
+import argparse
+import math
+from typing import TYPE_CHECKING
+
+import planfly
+from planfly.commands.check import LOGS
+from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, file_completer, number_parser, with_completer
+from planfly.terminal.command_parser import LineParser
+from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.options import (
+    aircraft_and_wind_options,
+    call_api,
+    imported_log_options,
+    result_options,
+    world_options,
+)
+from planfly.terminal.output import write_json_if_requested
+
+if TYPE_CHECKING:
+    from planfly import Predicted
+
+
+def predict_options(command_line: LineParser) -> None:
+    """Add the parser of ``planfly predict``."""
+    parser = command_line.command(
+        "predict",
+        "predict a logged flight that a model has not seen, as bands of 95 %%, and count how often it is inside",
+        "planfly predict flight.columns.toml --aircraft ./mine --out predicted",
+    )
+    with_completer(
+        parser.add_argument("log", metavar=LOGS, help="a log, or a flight log written by 'planfly import'"),
+        file_completer("mcap", *IMPORTED_LOG_SUFFIXES),
+    )
+    group = parser.group("prediction: --aircraft is required")
+    group.add_argument(
+        "--by",
+        choices=("controls", "mission"),
+        help="follow the logged controls over windows of 2 s, or fly the mission with the autopilot's model in the"
+        " logged wind (default: controls, if the log has them)",
+    )
+    group.add_argument(
+        "--from",
+        dest="start",
+        metavar="S",
+        type=number_parser("start"),
+        help="with --by controls: start of the judged part, s of the log; the rows before it calibrate the bands"
+        " (default: the --until of the identification, or the middle of the log)",
+    )
+    imported_log_options(parser)
+    world_options(parser)
+    aircraft_and_wind_options(parser)
+    result_options(parser, "folder for predict.html and predict.png (default: none)")
+
+
+def predict(args: argparse.Namespace) -> int:
+    """Predict a log, and print how much of the flight is inside each band."""
+    result = call_api(planfly.predict, args)
+    print("\n".join(result.lines))
+    for file in result.files:
+        print(f"predicted {file}")
+    write_json_if_requested(args, lambda: _answer(result))
+    return FLYABLE
+
+
+def _answer(result: "Predicted") -> object:
+    from planfly.terminal.answers import PredictAnswer, PredictedQuantity
+
+    def known(value: float) -> float | None:
+        return None if math.isnan(value) else value
+
+    quantities = [
+        PredictedQuantity(
+            name=band.name,
+            unit=band.unit,
+            inside=known(band.inside),
+            half_width=known(band.half_width),
+            unchanged_half_width=known(band.unchanged),
+        )
+        for band in result.bands
+    ]
+    return PredictAnswer(
+        exit_code=FLYABLE,
+        by=result.by,
+        aircraft=result.aircraft,
+        start_s=result.start,
+        end_s=result.end,
+        draws=result.draws,
+        windows=result.windows,
+        quantities=quantities,
+        files=[str(file) for file in result.files],
+    )
