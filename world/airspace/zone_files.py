@@ -43,6 +43,8 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
         data = json.loads(text, parse_constant=_reject_constant)
     except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
+    # A large file takes several times its size: the text, and each feature once it is read, are released.
+    del text
     if not isinstance(data, dict):
         raise ScenarioError(f"{source}: expected a GeoJSON object, got {type(data).__name__}", file=source)
     if is_ed269(data):
@@ -55,11 +57,14 @@ def geojson_zones(text: str, source: str) -> Iterator[Found]:
         if not isinstance(features, list):
             raise ScenarioError(f"{source}: features: expected a list", file=source, field="features")
         located_features = [(f"features[{k}]", feature) for k, feature in enumerate(features)]
+        features.clear()
     elif geojson_type == "Feature":
         located_features = [("feature", data)]
     else:
         located_features = [("geometry", {"type": "Feature", "geometry": data})]
-    for k, (location, feature) in enumerate(located_features):
+    located_features.reverse()
+    for k in range(len(located_features)):
+        location, feature = located_features.pop()
         if is_ed318(feature):
             yield from ed318_zones(feature, location, k, source)
         else:
@@ -298,7 +303,7 @@ _EMPTY = "outlines that enclose no area are ignored"
 _SWAPPED = "lower and upper limits in the wrong order are swapped"
 _NO_BAND = "upper limits of 0, or equal to the lower one, mean no ceiling"
 # Maximum size of a file, bytes.
-MAX_BYTES = 64 * 2**20
+MAX_BYTES = 48 * 2**20
 # Maximum number of corners of all zones of a file: arcs of OpenAir make hundreds of corners of a few bytes.
 MAX_FILE_CORNERS = 1_500_000
 

@@ -3,6 +3,7 @@
 import json
 import time
 import tomllib
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from tests.soak import at_most
 from tests.world.made.made_scenario import SMALL
 from world.airspace import zone_files
 from world.airspace.zone_entries import FLIGHT_LEVEL_ERROR, zone_entries
-from world.airspace.zone_files import MAX_BYTES, geojson_zones, kml_zones
+from world.airspace.zone_files import MAX_BYTES, geojson_zones, kml_zones, read_zone_file
 from world.airspace.zones import Cylinder, Polygon
 from world.errors import PlanflyError, ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
@@ -344,7 +345,7 @@ BAD_FILES = {
     "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "contains no zone"),
     "none.kml": (b"<kml/>", "contains no zone"),
     "latin.geojson": (b'{"type": "\xe9"}', "not a text file in UTF-8 (byte 10)"),
-    "large.kml": (b" " * (MAX_BYTES + 1), "67,108,865 bytes: a file of zones has at most 67,108,864"),
+    "large.kml": (b" " * (MAX_BYTES + 1), "50,331,649 bytes: a file of zones has at most 50,331,648"),
     "pole.geojson": (
         json.dumps(LAKE).replace("46.02", "89.5").encode(),
         "feature (lake): rings_deg.0.2: latitude 89.5: allowed -89..89",
@@ -411,7 +412,7 @@ def test_a_million_of_each_is_a_line_at_once(tmp_path: Path) -> None:
             load_scenario(str(tmp_path / name))
     for name in ("z.geojson", "z.kml"):
         (tmp_path / name).write_text(" " * 10**8)
-        with pytest.raises(ScenarioError, match="bytes: a file of zones has at most 67,108,864"):
+        with pytest.raises(ScenarioError, match="bytes: a file of zones has at most 50,331,648"):
             zone_files.read_zone_file(tmp_path / name, name)
     assert time.process_time() - started < at_most(2.0)
 
@@ -565,3 +566,18 @@ def test_a_fence_of_openair_beside_a_scenario(tmp_path: Path) -> None:
     scenario = read_named_fences([str(path)]).add_to_scenario(load_scenario(str(tmp_path / "small.toml")))
     assert [zone.name for zone in scenario.zones] == ["CTR (D)"]
     assert scenario.notes == (f"{path}: 1 zone keeps nobody out: class G, open to all",)
+
+
+def test_a_large_geojson_file_takes_at_most_eight_times_its_size(tmp_path: Path) -> None:
+    """Traced memory: 6.9 times its size, and 10.3 times if the text and the features read are not released."""
+    ring = [[-84.0 + 1e-4 * k, 36.0 + 1e-8 * k * k] for k in range(400)]
+    ring.append(ring[0])
+    feature = {"type": "Feature", "properties": {"name": "Z"}, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+    file = tmp_path / "large.geojson"
+    file.write_text(json.dumps({"type": "FeatureCollection", "features": [feature] * 100}), encoding="utf-8")
+    tracemalloc.start()
+    zones = read_zone_file(file, "large").zones
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(zones) == 100
+    assert peak < 8.0 * file.stat().st_size
