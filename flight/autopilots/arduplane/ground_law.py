@@ -6,8 +6,8 @@ and demands:
 Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp): wings level until the ground speed has
 been above 5 m/s, in 4.6 for two seconds; then the course over the ground at that time is held as heading, less the yaw
 since the launch.  Full throttle, speed by pitch, never below the pitch of the item; bank limited to LEVEL_ROLL_LIMIT up
-to TKOFF_LVL_ALT, unrestricted from three times that height.  It ends above the item's altitude, and the next leg begins
-at the aircraft.
+to TKOFF_LVL_ALT, unrestricted from three times that height.  It ends above the item's altitude, or TKOFF_PLIM_SEC after
+leveling off began.  The next leg begins at the aircraft, and is flown without a line.
 
 Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the line beyond the landing point, on the glide of
 `flight.autopilots.arduplane.landing`.  The approach stage begins when the aircraft is lined up, or at once after a
@@ -25,14 +25,16 @@ import numpy as np
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
-    airspeed_target,
     control_as_ardupilot,
     control_attitude,
     initialise_memory,
-    update_tecs,
     update_terrain_lookahead,
 )
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
+from flight.autopilots.arduplane.tecs import (
+    airspeed_target,
+    update_tecs,
+)
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
@@ -101,6 +103,8 @@ GROUND_STATE = record_dtype(
     "heading",  # rad, heading that is held (`steer_state.hold_course_cd`)
     # m below the end, where leveling off began; 0 before (`auto_state.height_below_takeoff_to_level_off_cm`).
     "leveling_height",
+    "leveling_start",  # s since the release (`takeoff_state.level_off_start_time_ms`)
+    ("rotation_complete", np.bool_),  # `auto_state.rotation_complete`
     "max_airspeed",  # m/s, maximum equivalent airspeed since the launch (`auto_state.highest_airspeed`)
     # Landing.
     ("landing_leg", np.int64),
@@ -135,6 +139,8 @@ _COURSE_SPEED_MPS = 5.0
 _HEADING_HOLD_DELAY_S = 2.0
 # L1's frequency times its period: sqrt(2) pi.
 _HEADING_GAIN = 4.4428
+# Lowest pitch of a rotation after TKOFF_ROTATE_SPD, rad.
+_MIN_ROTATION_PITCH_RAD = math.radians(5.0)
 # A take-off levels off only above this height over home, m.
 _MIN_LEVELING_HEIGHT_M = 10.0
 # The aircraft is lined up within this angle of the landing line, rad ...
@@ -310,15 +316,42 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
         )
         work.memory.speed_command = target_airspeed * eas2tas
         update_tecs(state, estimated, stage_parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK)
-        if ground.max_airspeed < arduplane.parameters.takeoff_rotation:
-            memory.pitch_demand = arduplane.parameters.takeoff_ground_pitch
+        _limit_rotation_pitch(estimated, arduplane.parameters, ground, memory)
     throttle_demand = ground.takeoff_throttle if ground.time >= ground.motor_start else 0.0
     max_step = ground.throttle_slew * dt
     throttle = min(work.commands.throttle + max_step, max(work.commands.throttle - max_step, throttle_demand))
     memory.throttle_demand = throttle
     control_attitude(state, estimated, work.gains, work.memory, stage_parameters, memory, eas2tas, work.commands, dt)
-    if estimated.up > ground.takeoff_end_altitude:
+    if estimated.up > ground.takeoff_end_altitude or _is_leveled(arduplane.parameters, ground):
         _begin_first_leg(estimated, waypoints, pieces, work.memory, ground, memory)
+
+
+@inner
+def _is_leveled(parameters: Record, ground: Record) -> bool:
+    """Return True once a take-off has been leveling off for TKOFF_PLIM_SEC.
+
+    Follows `Plane::check_takeoff_timeout_level_off`.
+    """
+    return ground.leveling_height > 0.0 and ground.time - ground.leveling_start > parameters.takeoff_leveling
+
+
+@inner
+def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
+    """Limit the pitch demand until the rotation is complete, if TKOFF_ROTATE_SPD is set.
+
+    Below that airspeed the pitch is TKOFF_GND_PITCH; then, up to AIRSPEED_CRUISE over the ground, it grows with the
+    ground speed, from at least five degrees (`Plane::takeoff_calc_pitch`).
+    """
+    if ground.rotation_complete:
+        return
+    ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
+    if ground.max_airspeed < parameters.takeoff_rotation:
+        memory.pitch_demand = parameters.takeoff_ground_pitch
+    elif parameters.takeoff_rotation > 0.0 and ground_speed <= parameters.airspeed_cruise:
+        pitch = max(_MIN_ROTATION_PITCH_RAD, ground_speed / parameters.airspeed_cruise * ground.takeoff_pitch)
+        memory.pitch_demand = min(ground.takeoff_pitch, pitch)
+    else:
+        ground.rotation_complete = True
 
 
 @inner
@@ -356,7 +389,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
         and estimated.velocity_up > 0.1
         and estimated.up - ground.home_up >= _MIN_LEVELING_HEIGHT_M
     ):
-        ground.leveling_height = remaining_height
+        ground.leveling_height, ground.leveling_start = remaining_height, ground.time
     return 1.0
 
 
@@ -386,10 +419,11 @@ def _demand_heading(state: Record, estimated: Record, parameters: Record, ground
 def _begin_first_leg(
     estimated: Record, waypoints: Records, pieces: Records, guidance: Record, ground: Record, memory: Record
 ) -> None:
-    """Begin the leg that follows the take-off at the aircraft's position."""
+    """Begin the leg that follows the take-off at the aircraft's position, without a line (`Plane::set_next_WP`)."""
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    waypoints[ground.leg + 1].without_crosstrack = True
     # Go to the first piece of that leg.
     while pieces[guidance.piece].leg < ground.leg and guidance.piece + 1 < pieces.shape[0]:
         guidance.piece += 1

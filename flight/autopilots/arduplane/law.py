@@ -1,4 +1,4 @@
-"""Implement ArduPlane's control law as compiled code, with its memory, bank and altitude demands, TECS and a tick."""
+"""Implement ArduPlane's control law as compiled code, with its memory, the altitude demand of a leg, and a tick."""
 
 import math
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.navigator import navigate_legs, target_position
-from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, FULL_LOAD_FACTOR_LIMIT, IMMEDIATE_CLIMB
+from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS, IMMEDIATE_CLIMB
+from flight.autopilots.arduplane.tecs import airspeed_target, limited_nav_roll, update_tecs
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
@@ -70,6 +71,8 @@ ARDUPILOT_MEMORY = record_dtype(
     "max_sink_scaler",  # 0..1, fraction of the maximum sink rate that is demanded (`_max_sink_scaler`)
     # 1 with throttle or pitch at its upper limit, -1 at its lower limit (`_thr_clip_status`, `_SEBdot_dem_clip`).
     ("saturation", np.int64),
+    ("is_throttle_saturated", np.bool_),  # True with the throttle at its upper limit (`_thr_clip_status`)
+    ("bad_descent", np.bool_),  # True while the demanded airspeed is too high for the aircraft (`_flags.badDescent`)
     # True while speed has priority over altitude, until the altitude demand is reached (`_flags.underspeed`).
     ("underspeed", np.bool_),
     "time_above_underspeed_threshold",  # s since the airspeed was last below it (from `_underspeed_start_ms`)
@@ -84,6 +87,8 @@ ARDUPILOT_MEMORY = record_dtype(
     "tas_rate",  # m/s^2, along the nose, mean removed (`_vel_dot` without `_vel_dot_lpf`)
     "tas_rate_mean",  # m/s^2 (`_vel_dot_lpf`)
     "tas_demand",  # m/s, within its rate limits (`_TAS_dem_adj`)
+    "tas_rate_demand_mean",  # m/s^2, smoothed rate of the demand (`_TAS_rate_dem_lpf`)
+    "tas_max_drop",  # m/s, by which the maximum airspeed is lowered while the throttle is saturated (from `_TASmax`)
     # m/s, equivalent, last raise of the airspeed for a minimum ground speed (`groundspeed_undershoot`).
     "ground_speed_undershoot",
     # Energy: `AP_TECS::_update_throttle_with_airspeed` and `_update_pitch`.
@@ -101,122 +106,10 @@ ARDUPLANE_NUMBERS = ARDUPLANE.itemsize // 8
 
 
 # ----------------------------------------------------------------------
-# Bank demand for a lateral acceleration, within the limits of the parameters and the airspeed.
+# Altitude demand along a leg.
 
-# Lower bound of the bank limit when low airspeed reduces it, rad.
-MIN_ROLL_LIMIT_RAD = math.radians(25.0)
-
-
-@inner
-def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> float:
-    """Return the bank for a lateral acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.
-
-    Follows `AP_L1_Control::nav_roll_cd`.
-
-    pitch: rad.
-    """
-    cos_pitch = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
-    bank = math.atan(lateral_acceleration / (GRAVITY * cos_pitch))
-    return min(parameters.roll_limit, max(-parameters.roll_limit, bank))
-
-
-@inner
-def min_airspeed(bank: float, parameters: Record) -> float:
-    """Return the minimum equivalent airspeed in a demanded bank (rad), m/s.
-
-    It is AIRSPEED_MIN divided by the root of cos bank, for the load factor of the turn; or, if AIRSPEED_STALL is
-    stated, AIRSPEED_STALL divided by that root, but at least AIRSPEED_MIN (`AP_TECS::_update_speed`).
-    """
-    if parameters.stall_prevention <= 0.0:
-        return parameters.airspeed_min
-    load_factor_root = 1.0 / math.sqrt(math.cos(min(math.radians(85.0), abs(bank))))
-    if parameters.airspeed_stall > 0.0:
-        return max(parameters.airspeed_min, parameters.airspeed_stall * load_factor_root)
-    return parameters.airspeed_min * load_factor_root
-
-
-@inner
-def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank: float) -> float:
-    """Return the bank that an airspeed allows without a stall, rad, but at least a given bank.
-
-    airspeed: flown, m/s.  min_level_airspeed: minimum of straight flight, equivalent or true like ``airspeed``, m/s.
-    min_bank: rad.
-    """
-    speed_ratio = max(1.0, airspeed / min_level_airspeed)
-    return max(min_bank, math.acos(min(1.0, 1.0 / (speed_ratio * speed_ratio))))
-
-
-@inner
-def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
-    """Return the bank for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and the stall, rad.
-
-    Follows `Plane::calc_nav_roll` and `Plane::update_load_factor`.
-
-    pitch: rad.  airspeed: equivalent, m/s.
-    """
-    bank = nav_roll(lateral_acceleration, pitch, parameters)
-    if parameters.stall_prevention <= 0.0:
-        return bank
-    min_level_airspeed, min_bank = parameters.airspeed_min, MIN_ROLL_LIMIT_RAD
-    if parameters.is_4_7:
-        # `Plane::apply_load_factor_roll_limits`.
-        if parameters.airspeed_stall > 0.0:
-            min_level_airspeed = parameters.airspeed_stall
-            if int(parameters.flight_options) & FULL_LOAD_FACTOR_LIMIT:
-                min_bank = 0.0
-        min_bank = max(min_bank, parameters.level_roll_limit)
-    roll_limit = load_factor_roll_limit(airspeed, min_level_airspeed, min_bank)
-    return min(roll_limit, max(-roll_limit, bank))
-
-
-# ----------------------------------------------------------------------
-# Altitude and speed control: the altitude demand along a leg, and TECS.
-#
-# TECS (Total Energy Control System, Lambregts, AIAA 83-2239) sets throttle from the error in total energy, and pitch
-# from the error in the balance between potential and kinetic energy.  The meaning of its parameters is from ArduPilot's
-# documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list).  The formulas were found by
-# regression of ArduPlane 4.6's flight logs (messages TECS, TEC2, TEC3); they reproduce the logged pitch demands to
-# eight digits.
-#
-# Energies are per kilogram, m^2/s^2; their rates m^2/s^3.  Speeds are true airspeeds.  Names as in AP_TECS: SPE and SKE
-# are potential and kinetic energy, STE their sum, SEB their balance.
-
-# Ratio of ArduPlane's airspeed reading to the true airspeed: the sensor noise raises the mean pressure.  Measured in
-# logs of 20 flights of ArduPlane 4.6 in planfly's physics: 1.0024 to 1.0030, in still air and in turbulence alike.
-AIRSPEED_READING = 1.0027
-# Fraction of a new sensor reading (ARSP.Airspeed) that enters ArduPlane's airspeed (CTUN.As), ten times a second, for
-# use at the next update.  From ArduPlane's logs.
-_READING_FRACTION = 0.3
-# Time constant of the smoothed STE rate error for throttle damping, s.
-_STE_RATE_LAG_S = 0.5
-# Damping ratio of the complementary filter that combines the airspeed reading and the acceleration.
-_FILTER_DAMPING_RATIO = 1.414
-# How far the SEB integrator may demand beyond the pitch limits, rad.
-_PITCH_OVERSHOOT_RAD = math.radians(5.0)
-# How far the STE integrator may demand beyond the throttle limits, 0..1.
-_THROTTLE_OVERSHOOT_FRACTION = 0.1
-# Limit of the SKE integrator, as a fraction of the pitch range in either direction.
-_SKE_INTEGRATOR_FRACTION = 0.25
-# Limit of the STE integrator, as a fraction of the throttle range.
-_STE_INTEGRATOR_FRACTION = 0.5
-# Fraction of the maximum energy rate that a change of airspeed may use.
-_SPEED_RATE_FRACTION = 0.5
-# Band below full throttle in which the demand is treated as saturated, 0..1.  Noise of airspeed and acceleration makes
-# the demand touch the limit now and then: the band is three standard deviations.  Climbs at full throttle depend on it:
-# with 0.003 to 0.005 the least clearances of 20 ArduPlane flights are met within 1.2 m; without it one is 9 m off.
-_SATURATION_BAND_FRACTION = 0.003
-# A raise of the airspeed for a minimum ground speed falls by no less than this, m/s.
-_GROUND_SPEED_HYSTERESIS_MPS = 1.2
 # An RTL that climbs before its turn demands this much more than the climb, m.
 _RTL_CLIMB_EXTRA_M = 10.0
-# Underspeed begins below this ratio of airspeed to AIRSPEED_MIN ...
-_UNDERSPEED_RATIO = 0.9
-# ... with the throttle at or above this fraction of its maximum.
-_FULL_THROTTLE_FRACTION = 0.95
-# Underspeed ends when the altitude demand is reached, or at this ratio of airspeed to AIRSPEED_MIN ...
-_UNDERSPEED_EXIT_RATIO = 1.15
-# ... this long after the airspeed rose above the underspeed threshold, s.
-_UNDERSPEED_EXIT_DELAY_S = 3.0
 
 
 @inner
@@ -408,259 +301,6 @@ def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Re
         (estimated.east - memory.from_east) * leg_e + (estimated.north - memory.from_north) * leg_n
     ) / leg_length_squared
     return min(memory.from_up, end_altitude + slope_descent * (1.0 - min(1.0, max(0.0, progress))))
-
-
-@inner
-def _update_speed(state: Record, estimated: Record, parameters: Record, memory: Record, dt: float) -> None:
-    """Estimate airspeed and its rate with a complementary filter of acceleration and airspeed.
-
-    Follows `AP_TECS::update_50hz` for the acceleration and `AP_TECS::_update_speed` for the filter.
-
-    The acceleration along the nose gives the fast changes, and the measured airspeed gives the slow changes.  An
-    accelerometer along the nose, with gravity removed, measures changes of the velocity over the ground, including its
-    vertical part: at the start of a climb that is more than the airspeed gains.
-    """
-    cos_pitch = math.cos(state.pitch)
-    acceleration = (estimated.velocity_east - memory.last_velocity_east) * math.sin(state.yaw) * cos_pitch
-    acceleration += (estimated.velocity_north - memory.last_velocity_north) * math.cos(state.yaw) * cos_pitch
-    acceleration += (estimated.velocity_up - memory.last_velocity_up) * math.sin(state.pitch)
-    acceleration = acceleration / dt if memory.has_last_velocity else 0.0
-    memory.has_last_velocity = True
-    memory.last_velocity_east, memory.last_velocity_north = estimated.velocity_east, estimated.velocity_north
-    memory.last_velocity_up = estimated.velocity_up
-    filter_frequency = parameters.tecs_speed_frequency
-    airspeed_error = memory.airspeed_smoothed - memory.tas
-    memory.airspeed_smoothed += _READING_FRACTION * (AIRSPEED_READING * state.airspeed - memory.airspeed_smoothed)
-    memory.tas_rate_correction += airspeed_error * filter_frequency * filter_frequency * dt
-    memory.tas = max(
-        3.0,
-        memory.tas
-        + (acceleration + memory.tas_rate_correction + airspeed_error * filter_frequency * _FILTER_DAMPING_RATIO) * dt,
-    )
-    memory.tas_rate_mean += (acceleration - memory.tas_rate_mean) * dt / (dt + parameters.tecs_time)
-    memory.tas_rate = acceleration - memory.tas_rate_mean
-
-
-@inner
-def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas_min: float, dt: float) -> bool:
-    """Return True while speed has priority over altitude (`AP_TECS::_detect_underspeed`).
-
-    tas_min: AIRSPEED_MIN as a true airspeed, m/s.
-
-    After an engine failure underspeed lasts until the aircraft meets a slope that leads down: it glides at
-    AIRSPEED_MIN, and does not become as slow again (seen in 14 flights).
-    """
-    is_slow = memory.tas < _UNDERSPEED_RATIO * tas_min
-    memory.time_above_underspeed_threshold = 0.0 if is_slow else memory.time_above_underspeed_threshold + dt
-    if (
-        memory.underspeed
-        and memory.tas >= _UNDERSPEED_EXIT_RATIO * tas_min
-        and memory.time_above_underspeed_threshold > _UNDERSPEED_EXIT_DELAY_S
-    ):
-        memory.underspeed = False
-    is_full_throttle = memory.throttle_demand >= _FULL_THROTTLE_FRACTION * parameters.throttle_max
-    memory.underspeed = (is_slow and is_full_throttle) or (memory.underspeed and estimated.up < memory.altitude_demand)
-    return memory.underspeed
-
-
-@inner
-def airspeed_target(
-    state: Record,
-    estimated: Record,
-    commanded_airspeed: float,
-    target: Record,
-    parameters: Record,
-    memory: Record,
-    eas2tas: float,
-) -> float:
-    """Return the target equivalent airspeed for a commanded one, raised for a minimum ground speed, within limits, m/s.
-
-    target: the leg's end, with the minimum ground speed.
-
-    The undershoot of the ground speed along the heading is added to the measured airspeed.  The raise is in whole
-    m/s, and falls only by more than a hysteresis (`Plane::calc_airspeed_errors`,
-    `Plane::calc_gndspeed_undershoot`).
-    """
-    target_airspeed = commanded_airspeed
-    if target.min_ground_speed > 0.0:
-        forward_ground_speed = estimated.velocity_east * math.sin(state.yaw) + estimated.velocity_north * math.cos(
-            state.yaw
-        )
-        required_airspeed = (memory.airspeed_smoothed + target.min_ground_speed - forward_ground_speed) / eas2tas
-        undershoot = float(math.floor(max(0.0, required_airspeed - commanded_airspeed) + 0.5))
-        if (
-            undershoot >= memory.ground_speed_undershoot
-            or memory.ground_speed_undershoot - undershoot >= _GROUND_SPEED_HYSTERESIS_MPS
-        ):
-            memory.ground_speed_undershoot = undershoot
-        target_airspeed += memory.ground_speed_undershoot
-    return min(parameters.airspeed_max, max(parameters.airspeed_min, target_airspeed))
-
-
-@inner
-def update_tecs(
-    state: Record, estimated: Record, parameters: Record, memory: Record, tas_target: float, eas2tas: float, dt: float
-) -> None:
-    """Update the throttle and pitch demands for the altitude demand and a target airspeed (m/s, true).
-
-    Follows `AP_TECS::update_pitch_throttle`: `_update_speed`, `_detect_underspeed`, `_update_speed_demand`,
-    `_update_energies`, `_update_throttle_with_airspeed` and `_update_pitch`.
-
-    state: a record of `flight.dynamics.state.STATE`.  eas2tas: ratio of true to equivalent airspeed.  The other
-    parameters are those of `update_height_demand`.
-    """
-    _update_speed(state, estimated, parameters, memory, dt)
-    tas = memory.tas
-    tas_min = min_airspeed(nav_roll(memory.lateral_acceleration, state.pitch, parameters), parameters) * eas2tas
-    # Where the aircraft fails to climb as demanded, full throttle is assumed to give less.
-    ste_rate_max = GRAVITY * parameters.tecs_climb_max * memory.max_climb_scaler
-    ste_rate_min = -GRAVITY * parameters.tecs_sink_min
-    is_underspeed = detect_underspeed(estimated, parameters, memory, tas_min, dt)
-    limited_tas_target = tas_min if is_underspeed else max(tas_min, tas_target)
-    tas_change = limited_tas_target - memory.tas_demand
-    max_tas_change = _SPEED_RATE_FRACTION * ste_rate_max / tas * dt
-    min_tas_change = _SPEED_RATE_FRACTION * ste_rate_min / tas * dt
-    memory.tas_demand = max(tas_min, memory.tas_demand + min(max_tas_change, max(min_tas_change, tas_change)))
-    spe_error = GRAVITY * (memory.altitude_demand - estimated.up)
-    ske_error = 0.5 * (memory.tas_demand * memory.tas_demand - tas * tas)
-    max_spe_error = max(0.0, 0.5 * (tas * tas - tas_min * tas_min))
-    tas_max = parameters.airspeed_max * eas2tas
-    min_spe_error = min(0.0, 0.5 * (tas * tas - tas_max * tas_max))
-    spe_rate, ske_rate = GRAVITY * estimated.velocity_up, tas * memory.tas_rate
-    limited_spe_error = min(max_spe_error, max(min_spe_error, spe_error))
-    _update_throttle(
-        state,
-        parameters,
-        memory,
-        spe_error,
-        limited_spe_error + ske_error,
-        spe_rate + ske_rate,
-        ste_rate_max,
-        ste_rate_min,
-        dt,
-    )
-    if is_underspeed:
-        memory.throttle_demand = parameters.throttle_max
-    _update_pitch(state, parameters, memory, spe_error, ske_error, spe_rate, ske_rate, is_underspeed, dt)
-
-
-@inner
-def _update_throttle(
-    state: Record,
-    parameters: Record,
-    memory: Record,
-    spe_error: float,
-    ste_error: float,
-    ste_rate: float,
-    ste_rate_max: float,
-    ste_rate_min: float,
-    dt: float,
-) -> None:
-    """Set the throttle demand from the STE error (m^2/s^2) and the STE rate (m^2/s^3).
-
-    Follows `AP_TECS::_update_throttle_with_airspeed`.
-
-    spe_error: m^2/s^2.
-    ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
-    """
-    throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
-    ste_rate_per_throttle = (ste_rate_max - ste_rate_min) / (throttle_max - parameters.throttle_min)
-    ste_rate_demand = min(ste_rate_max, max(ste_rate_min, spe_error / parameters.tecs_time))
-    memory.ste_rate_error += (ste_rate_demand - ste_rate - memory.ste_rate_error) * dt / (dt + _STE_RATE_LAG_S)
-    tilt = math.sin(state.roll) * math.cos(state.pitch)
-    roll_compensation = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
-    throttle = parameters.throttle_cruise + (ste_rate_demand + roll_compensation) / ste_rate_per_throttle
-    throttle_per_ste = 1.0 / (parameters.tecs_time * ste_rate_per_throttle)
-    throttle += throttle_per_ste * (ste_error + parameters.tecs_throttle_damping * memory.ste_rate_error)
-    integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
-    integrator_max = min(
-        integrator_limit, max(-integrator_limit, throttle_max - throttle + _THROTTLE_OVERSHOOT_FRACTION)
-    )
-    integrator_min = min(
-        integrator_limit, max(-integrator_limit, parameters.throttle_min - throttle - _THROTTLE_OVERSHOOT_FRACTION)
-    )
-    memory.ste_integrator += throttle_per_ste * parameters.tecs_integral * ste_error * dt
-    memory.ste_integrator = min(integrator_max, max(integrator_min, memory.ste_integrator))
-    if parameters.throttle_slew > 0.0:
-        max_step = parameters.throttle_slew * (throttle_max - throttle_min) * dt
-        throttle = min(memory.last_throttle_demand + max_step, max(memory.last_throttle_demand - max_step, throttle))
-    memory.last_throttle_demand = throttle
-    throttle += memory.ste_integrator
-    memory.throttle_demand = min(throttle_max, max(throttle_min, throttle))
-    memory.saturation = (
-        1
-        if throttle >= throttle_max - _SATURATION_BAND_FRACTION
-        else (-1 if throttle <= parameters.throttle_min else 0)
-    )
-
-
-@inner
-def wind_up_ste_integrator(parameters: Record, memory: Record) -> None:
-    """Set the STE integrator to its value at full throttle, as ArduPlane does at every update of a climb-out.
-
-    `AP_TECS::_update_throttle_with_airspeed` does so during take-off and an aborted landing; the throttle stays open
-    for a while after that.
-    """
-    throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
-    integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
-    memory.ste_integrator = min(
-        integrator_limit,
-        max(-integrator_limit, throttle_max - memory.last_throttle_demand + _THROTTLE_OVERSHOOT_FRACTION),
-    )
-
-
-@inner
-def _update_pitch(
-    state: Record,
-    parameters: Record,
-    memory: Record,
-    spe_error: float,
-    ske_error: float,
-    spe_rate: float,
-    ske_rate: float,
-    is_underspeed: bool,
-    dt: float,
-) -> None:
-    """Set the pitch demand from the balance between potential and kinetic energy.
-
-    Follows `AP_TECS::_update_pitch`.  spe_error, ske_error: m^2/s^2.  spe_rate, ske_rate: m^2/s^3.
-    """
-    ske_weight = 1.0 if is_underspeed else min(1.0, parameters.tecs_speed_weight)
-    spe_weight = 0.0 if is_underspeed else min(1.0, 2.0 - parameters.tecs_speed_weight)
-    pitch_max = parameters.pitch_limit_max
-    if parameters.tecs_pitch_max > 0.0:
-        pitch_max = min(pitch_max, parameters.tecs_pitch_max)
-    pitch_min = parameters.pitch_limit_min
-    if parameters.tecs_pitch_min < 0.0:
-        pitch_min = max(pitch_min, parameters.tecs_pitch_min)
-    seb_rate_per_pitch = memory.tas * GRAVITY
-    seb_rate_demand = spe_weight * (spe_error / parameters.tecs_time + GRAVITY * memory.climb_rate_demand)
-    seb_rate_demand -= ske_weight * ske_error / parameters.tecs_time
-    unlimited_seb_rate_demand = seb_rate_demand
-    seb_rate_demand = min(
-        GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, unlimited_seb_rate_demand)
-    )
-    seb_rate_error = seb_rate_demand - (spe_weight * spe_rate - ske_weight * ske_rate)
-    seb_rate_demand_total = seb_rate_demand + parameters.tecs_pitch_damping * seb_rate_error
-    memory.ske_integrator -= ske_weight * ske_error / parameters.tecs_time * dt
-    integrator_limit = _SKE_INTEGRATOR_FRACTION * (pitch_max - pitch_min) * seb_rate_per_pitch
-    memory.ske_integrator = min(integrator_limit, max(-integrator_limit, memory.ske_integrator))
-    memory.seb_integrator += parameters.tecs_integral * seb_rate_error * dt
-    integrator_max = (
-        (pitch_max + _PITCH_OVERSHOOT_RAD) * seb_rate_per_pitch - seb_rate_demand_total - memory.ske_integrator
-    )
-    integrator_min = (
-        (pitch_min - _PITCH_OVERSHOOT_RAD) * seb_rate_per_pitch - seb_rate_demand_total - memory.ske_integrator
-    )
-    memory.seb_integrator = min(integrator_max, max(integrator_min, memory.seb_integrator))
-    pitch = (seb_rate_demand_total + memory.seb_integrator + memory.ske_integrator) / seb_rate_per_pitch
-    if pitch > pitch_max or unlimited_seb_rate_demand > seb_rate_demand:
-        memory.saturation = 1
-    elif pitch < pitch_min or unlimited_seb_rate_demand < seb_rate_demand:
-        memory.saturation = -1
-    pitch = min(pitch_max, max(pitch_min, pitch))
-    max_step = parameters.tecs_vertical_acceleration / memory.tas * dt
-    memory.pitch_demand = min(memory.pitch_demand + max_step, max(memory.pitch_demand - max_step, pitch))
 
 
 # ----------------------------------------------------------------------

@@ -352,7 +352,7 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
     done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins, at the aircraft.
     """
     if not memory.is_in_rtl:
-        memory.is_in_rtl = True
+        memory.is_in_rtl, memory.reached_loiter_target = True, False
         memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
@@ -408,7 +408,8 @@ def _loiter_acceleration(
 ) -> float:
     """Return the lateral acceleration of a loiter, m/s^2 (`AP_L1_Control::update_loiter`).
 
-    It steers straight to the center until the circle demands the sharper turn, and then around the circle.
+    It steers straight to the center until the circle demands the sharper turn, and then around the circle.  A circle
+    that was reached stays reached, even if a gust or an unachievable radius takes the aircraft out of it.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north
@@ -428,7 +429,7 @@ def _loiter_acceleration(
     circle_acceleration = direction * (
         pd_correction + tangential_velocity * tangential_velocity / max(0.5 * radius, distance)
     )
-    memory.reached_loiter_target = not (
-        radial_error > 0.0 and direction * capture_acceleration < direction * circle_acceleration
-    )
-    return circle_acceleration if memory.reached_loiter_target else capture_acceleration
+    if radial_error > 0.0 and direction * capture_acceleration < direction * circle_acceleration:
+        return capture_acceleration
+    memory.reached_loiter_target = True
+    return circle_acceleration

@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple, get_args
 
+from flight.autopilots.arduplane.parameters import TABLE
+from flight.autopilots.arduplane.renamed_parameters import NAMES_BEFORE_4_7, NAMES_SINCE_4_7, describe_renamed
 from flight.autopilots.parameter_files import MAX_BYTES, parse_parameters
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
@@ -21,13 +23,6 @@ _PROGRAM_RELEASE = re.compile(r"\bV?(\d{1,2})\.(\d{1,2})")
 _COMMENTED_RELEASES = (
     re.compile(r"^\s*#.*\bArduPlane[ :]+V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE),
     re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE),
-)
-# Names that exist from 4.7 on.
-_NAMES_SINCE_4_7 = ("ALT_SLOPE_MIN", "ALT_SLOPE_MAXHGT", "CLIMB_SLOPE_HGT")
-# Names that exist up to 4.6: those that 4.5 and 4.6 renamed, too.
-_NAMES_UP_TO_4_6 = (
-    *("GLIDE_SLOPE_MIN", "GLIDE_SLOPE_THR", "LIM_ROLL_CD", "LIM_PITCH_MAX", "LIM_PITCH_MIN", "TRIM_PITCH_CD"),
-    *("TRIM_ARSPD_CM", "ARSPD_FBW_MIN", "ARSPD_FBW_MAX", "ALT_HOLD_RTL", "LAND_PITCH_CD", "MIN_GNDSPD_CM"),
 )
 
 
@@ -86,8 +81,8 @@ def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
         if found := pattern.search(text):
             return FileRelease(f"{int(found[1])}.{int(found[2])}", found[0].lstrip("# \t").removeprefix("NOTE: "))
     stated = list(names)
-    newer = [name for name in stated if name in _NAMES_SINCE_4_7]
-    older = [name for name in stated if name in _NAMES_UP_TO_4_6]
+    newer = [name for name in stated if name in NAMES_SINCE_4_7]
+    older = [name for name in stated if name in NAMES_BEFORE_4_7]
     if bool(newer) == bool(older):
         return None
     return FileRelease("4.7", newer[0]) if newer else FileRelease("4.6", older[0])
@@ -103,20 +98,31 @@ class ReleaseChoice(NamedTuple):
 def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
     """Return the release to simulate: the stated one, or the parameter file's, or the newest.
 
+    A note names the parameters of the file that the release names otherwise.
+
     params: path of the parameter file.  Raises ParameterError if it cannot be read.
     """
     if params is None:
         return ReleaseChoice(stated or NEWEST_ARDUPLANE)
     file = Path(params)
     text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
-    found = file_release(text, parse_parameters(text, params))
+    names = list(parse_parameters(text, params))
+    found = file_release(text, names)
+    version, notes = _choose_for_file(stated, found, params)
+    if renamed := describe_renamed(names, TABLE.by_any_name, version):
+        notes = (*notes, f"{params}: {renamed}")
+    return ReleaseChoice(version, notes)
+
+
+def _choose_for_file(
+    stated: ArduPlaneVersion | None, found: FileRelease | None, params: str
+) -> tuple[ArduPlaneVersion, tuple[str, ...]]:
+    """Return the release to simulate with a file of a release, and a note if they differ.  params: the file's path."""
     if found is None:
-        return ReleaseChoice(stated or NEWEST_ARDUPLANE)
+        return stated or NEWEST_ARDUPLANE, ()
     major, minor = map(int, found.release.split("."))
     version = stated or _nearest((major, minor))
     if version == found.release:
-        return ReleaseChoice(version)
+        return version, ()
     because = ", as named" if stated else ", the nearest release that planfly simulates"
-    return ReleaseChoice(
-        version, (f"{params} is of ArduPlane {found.release} ({found.evidence}): {version} flies it{because}",)
-    )
+    return version, (f"{params} is of ArduPlane {found.release} ({found.evidence}): {version} flies it{because}",)

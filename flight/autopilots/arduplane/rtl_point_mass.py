@@ -6,7 +6,7 @@ demands with the lags of ArduPlane's controllers.  The least clearance is within
 (`tests/flight/autopilots/arduplane/test_rtl_point_mass.py`).
 
 After an engine failure the law does not know that there is no thrust: it demands full throttle, slows down until it is
-in underspeed (`flight.autopilots.arduplane.law.detect_underspeed`), holds its minimum airspeed from then on, and
+in underspeed (`flight.autopilots.arduplane.tecs.detect_underspeed`), holds its minimum airspeed from then on, and
 dives onto its slope where it meets the slope.  Fourteen such flights of ArduPlane are reproduced as well
 (`tests/flight/autopilots/arduplane/test_engine_out.py`).
 """
@@ -24,15 +24,17 @@ from flight.autopilots.arduplane.law import (
     NAVIGATION_TICK,
     PITCH_LAG,
     ROLL_LAG,
-    airspeed_target,
-    limited_nav_roll,
     update_height_demand,
-    update_tecs,
-    wind_up_ste_integrator,
 )
 from flight.autopilots.arduplane.navigator import LANDING_JOIN_ALTITUDE_TOLERANCE_M, is_past_finish_line, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.point_mass import PointMass, advance_point_mass, angle_of_attack, excess_power
+from flight.autopilots.arduplane.tecs import (
+    airspeed_target,
+    limited_nav_roll,
+    update_tecs,
+    wind_up_ste_integrator,
+)
 from flight.dynamics.state import STATE
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import WAYPOINT

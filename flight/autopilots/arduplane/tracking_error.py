@@ -16,10 +16,12 @@ from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     NAVIGATION_TICK,
     ROLL_LAG,
-    limited_nav_roll,
 )
 from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE_M, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.tecs import (
+    limited_nav_roll,
+)
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import ERRORS, MOTION
 from world.arrays import Floats

@@ -12,9 +12,12 @@ import math
 import numpy as np
 
 from aircraft.envelope import GRAVITY
-from flight.autopilots.arduplane.law import MIN_ROLL_LIMIT_RAD, load_factor_roll_limit
 from flight.autopilots.arduplane.point_mass import PointMass, excess_power
 from flight.autopilots.arduplane.rtl_point_mass import ENGINE_FAILURE_REACTION_S, ReturnEnvironment
+from flight.autopilots.arduplane.tecs import (
+    MIN_ROLL_LIMIT_RAD,
+    load_factor_roll_limit,
+)
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from logs.verdict.returns.glide_map import GlideAltitudes, GlideMap, steps
 from world.arrays import Codes, Floats

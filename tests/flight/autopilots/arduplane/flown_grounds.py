@@ -32,7 +32,8 @@ FLIGHTS: dict[str, dict[str, Any]] = json.loads((FOLDER / "flights.json").read_t
 HOME = (9500.0, -5000.0, 335.055)
 # The kept landings are of 4.6.0-dev, whose flare pushed the nose down on a field higher than home
 # (`AP_TECS::_update_height_demand` up to 4.6.2): it touched down up to so many metres before the corrected flare.
-LATER_M = 40.0
+# A flight of 4.6.3 on such a field touched down later still than the law (`kept_releases`, low-pitch: 30 m).
+LATER_M = 45.0
 RAIL = Launch("catapult", math.radians(280.0), 20.0, 6.0, math.radians(12.0))
 
 

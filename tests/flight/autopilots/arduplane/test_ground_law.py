@@ -6,8 +6,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.ground_law import APPROACHING, GROUND_STATE, ON_GLIDE, _update_stage
-from flight.simulation.tick import ENDS, GROUND, NO_MOTOR
+from aircraft.catalog import find_again
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.ground_law import (
+    APPROACHING,
+    ARDUPLANE_GROUND,
+    FLARING,
+    GROUND_STATE,
+    ON_GLIDE,
+    _begin_first_leg,
+    _demand_heading,
+    _is_leveled,
+    _limit_rotation_pitch,
+    _tick_landing,
+    _update_stage,
+)
+from flight.dynamics.state import STATE
+from flight.guidance.path import PIECE
+from flight.simulation.tick import ENDS, GROUND, NO_MOTOR, WORKSPACE
 from tests.flight.autopilots.arduplane.flown_grounds import (
     FLIGHTS,
     HOME,
@@ -19,9 +35,10 @@ from tests.flight.autopilots.arduplane.flown_grounds import (
     kept,
     make_ground_setup,
 )
-from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record
+from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, record, waypoints
 from tests.soak import SOAK
 from world.airfield import LandingStrip, Launch
+from world.scenario_tables import ArduPlaneVersion
 
 # In every run those whose slope, flare and wind differ most.
 ALWAYS = ("a", "b", "d")
@@ -136,7 +153,9 @@ def test_small_aircraft_are_thrown_and_land(aircraft: str, speed: float | None) 
 
 def test_the_heading_is_held_that_the_launch_had_and_the_climb_ends_above_its_height() -> None:
     """In calm air the course is the launch's: 20 degrees off the first leg it stays so until 60 m over home."""
-    flown = fly(circuit(Launch("catapult", math.radians(70.0), 20.0, 6.0, 0.2), None, wind=(0.0, 0.0)))
+    launch = Launch("catapult", math.radians(70.0), 20.0, 6.0, 0.2)
+    # Without TKOFF_PLIM_SEC it does not level off before.
+    flown = fly(circuit(launch, None, wind=(0.0, 0.0), TKOFF_PLIM_SEC=0.0))
     track = flown.track
     end = int(np.argmax(track.position[:, 2] > 60.0))
     course = math.atan2(*(track.position[end, :2] - track.position[0, :2]).tolist())
@@ -196,6 +215,109 @@ def test_after_a_loiter_to_an_altitude_the_approach_begins_at_once(after_loiter:
     # 900 m before the point, at a tenth of the leg, 40 degrees and 80 m off the line.
     _update_stage(flying(up=500.0), parameters(), ground, own, (900.0, 0.1, math.radians(40.0), 80.0))
     assert ground.stage == (APPROACHING if after_loiter else ON_GLIDE)
+
+
+@pytest.mark.parametrize(("by_demand", "entry_sink"), [(False, 3.0), (True, 1.5)])
+def test_the_flare_begins_with_the_flown_sink_rate_and_in_47_with_the_demanded_one(
+    by_demand: bool, entry_sink: float
+) -> None:
+    """`AP_TECS::_update_height_demand` begins with `_climb_rate` in 4.6.3 and with `_hgt_rate_dem` in 4.7."""
+    ground = record(GROUND_STATE, stage=APPROACHING, flares_by_demand=by_demand)
+    own = memory(climb_rate_demand=-1.5)
+    # 2 m over the point, below LAND_FLARE_ALT of 3 m; it sinks at 3 m/s where 1.5 m/s are demanded.
+    _update_stage(flying(up=2.0, climb=-3.0), parameters(), ground, own, (50.0, 0.9, 0.0, 0.0))
+    assert (ground.stage, ground.entry_sink, ground.entry_height) == (FLARING, entry_sink, 2.0)
+
+
+@pytest.mark.parametrize("version", ["4.6", "4.7"])
+def test_each_release_flares_by_its_own_sink_rate(version: ArduPlaneVersion) -> None:
+    setup = circuit(None, STRIP)
+    aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
+    assert isinstance(setup.autopilot, ArduPlane)
+    own = record(ARDUPLANE_GROUND)
+    setup.autopilot.in_release(version).from_ground(setup.ground_ways, aircraft, ()).initialise_records(
+        record(WORKSPACE), own
+    )
+    assert own.ground.flares_by_demand == (version == "4.7")
+
+
+@pytest.mark.parametrize(("version", "updates"), [("4.6", 21), ("4.7", 1)])
+def test_a_take_off_holds_its_course_after_two_seconds_and_in_47_at_once(
+    version: ArduPlaneVersion, updates: int
+) -> None:
+    """`Plane::verify_takeoff`: 4.6 waits two seconds above 5 m/s over the ground, 4.7 does not; at 10 Hz."""
+    ground, own, settings = record(GROUND_STATE), memory(), parameters(version)
+    state = record(STATE, yaw=0.0)
+    count = 0
+    while not ground.is_heading_held and count < 100:
+        _demand_heading(state, flying(course=0.3), settings, ground, own)
+        count += 1
+    assert count in (updates, updates - 1)
+    assert ground.heading == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(("stage", "airspeed"), [(ON_GLIDE, 25.0), (APPROACHING, 20.0)])
+def test_before_the_approach_stage_the_landing_leg_is_flown_at_cruise_airspeed(stage: int, airspeed: float) -> None:
+    """`AP_Landing::type_slope_get_target_airspeed_cm`: AIRSPEED_CRUISE in the stage NORMAL."""
+    own = record(ARDUPLANE_GROUND)
+    own.memory = memory(time_to_update=0.0)
+    own.parameters = parameters(AIRSPEED_CRUISE=25.0, AIRSPEED_MIN=15.0, AIRSPEED_MAX=30.0)
+    own.stage_parameters = own.parameters
+    own.ground.stage, own.ground.airspeed, own.ground.glide_start_altitude = stage, 20.0, 500.0
+    # The point is 2 km to the north and 100 m lower; the aircraft is 200 m off the line and flies across it.
+    own.ground.north, own.ground.up = 2000.0, -100.0
+    work = record(WORKSPACE)
+    work.timing.dt = 1.0 / 120.0
+    work.state.airspeed = 25.0
+    work.estimated = flying(east=200.0, north=100.0, up=0.0, course=1.2)
+    _tick_landing(work, own, waypoints((0.0, 2000.0, 0.0))[0])
+    assert own.ground.stage == stage
+    assert work.memory.speed_command == pytest.approx(airspeed)
+
+
+@pytest.mark.parametrize(
+    ("fastest", "ground_speed", "degrees"),
+    [
+        # Below TKOFF_ROTATE_SPD of 15 m/s: TKOFF_GND_PITCH.
+        (14.0, 14.0, 2.0),
+        # Then the item's 12 degrees times the ground speed over AIRSPEED_CRUISE of 25 m/s, at least 5 degrees.
+        (16.0, 20.0, 9.6),
+        (16.0, 8.0, 5.0),
+        # Above AIRSPEED_CRUISE over the ground: as without a rotation.
+        (26.0, 25.1, 12.0),
+    ],
+)
+def test_a_rotation_raises_the_pitch_with_the_ground_speed(fastest: float, ground_speed: float, degrees: float) -> None:
+    """`Plane::takeoff_calc_pitch`."""
+    ground = record(GROUND_STATE, max_airspeed=fastest, takeoff_pitch=math.radians(12.0))
+    own = memory(pitch_demand=math.radians(12.0))
+    settings = parameters(TKOFF_ROTATE_SPD=15.0, TKOFF_GND_PITCH=2.0, AIRSPEED_CRUISE=25.0, AIRSPEED_MAX=30.0)
+    estimated = flying()
+    estimated.velocity_east, estimated.velocity_north = ground_speed, 0.0
+    _limit_rotation_pitch(estimated, settings, ground, own)
+    assert math.degrees(own.pitch_demand) == pytest.approx(degrees)
+    # Once the rotation is complete, a gust does not begin it again.
+    estimated.velocity_east = 10.0
+    own.pitch_demand = math.radians(12.0)
+    _limit_rotation_pitch(estimated, settings, ground, own)
+    assert ground.rotation_complete == (degrees == 12.0)
+
+
+@pytest.mark.parametrize(("seconds", "is_over"), [(1.9, False), (2.1, True)])
+def test_a_take_off_ends_when_it_has_leveled_off_for_its_seconds(seconds: float, is_over: bool) -> None:
+    """`Plane::check_takeoff_timeout_level_off`: TKOFF_PLIM_SEC, 2 s, after leveling off began, at any height."""
+    ground = record(GROUND_STATE, leveling_height=8.0, leveling_start=10.0, time=10.0 + seconds)
+    assert bool(_is_leveled(parameters(), ground)) == is_over
+    ground.leveling_height = 0.0
+    assert not _is_leveled(parameters(), ground)
+
+
+def test_the_first_leg_after_a_take_off_has_no_line() -> None:
+    """`Plane::verify_takeoff` clears `next_wp_crosstrack`: only the first leg is flown from the aircraft itself."""
+    legs = waypoints((0.0, 0.0, 500.0), (0.0, 1000.0, 500.0), (1000.0, 1000.0, 500.0))
+    work, ground, own = record(WORKSPACE), record(GROUND_STATE), memory()
+    _begin_first_leg(flying(), legs, np.zeros(1, PIECE), work.memory, ground, own)
+    assert legs["without_crosstrack"].tolist() == [False, True, False]
 
 
 def test_home_is_where_kept_flights_began() -> None:

@@ -14,17 +14,19 @@ from aircraft.envelope import GRAVITY
 from benchmarks.against_arduplane import BINARY, compare, flown_figures
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.law import (
-    AIRSPEED_READING,
     ARDUPILOT_MEMORY,
     ROLL_LAG,
-    airspeed_target,
     control_attitude,
-    limited_nav_roll,
-    min_airspeed,
     update_height_demand,
-    update_tecs,
 )
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.tecs import (
+    AIRSPEED_READING,
+    airspeed_target,
+    limited_nav_roll,
+    min_airspeed,
+    update_tecs,
+)
 from flight.dynamics.state import COMMANDS
 from flight.guidance.gains import GAINS
 from flight.guidance.inner_loops import GUIDANCE_MEMORY, steer_elevator
@@ -66,6 +68,8 @@ def test_counts_are_whole_and_all_else_are_numbers() -> None:
         "loiter_complete",
         "is_in_rtl",
         "rtl_climb_complete",
+        "is_throttle_saturated",
+        "bad_descent",
         "underspeed",
     }
     assert all(kind == np.float64 for kind in kinds.values() if kind not in (np.int64, np.bool_))
@@ -214,7 +218,8 @@ def test_what_cannot_be_followed_waits(held: int) -> None:
 
 
 def weighed(own: Record, seen: Record, at: Record, **values: float) -> None:
-    update_tecs(seen, at, parameters(**values), own, 25.0, 1.0, DT)
+    usual = {"AIRSPEED_CRUISE": 25.0, "AIRSPEED_MAX": 40.0}
+    update_tecs(seen, at, parameters(**usual | values), own, 25.0, 1.0, DT)
 
 
 def steady(**values: Any) -> Record:
@@ -297,7 +302,8 @@ def test_pitch_and_throttle_keep_their_limits(high: float, degrees: float, throt
     own = steady()
     for _ in range(200):
         own.altitude_demand = 500.0 + high
-        weighed(own, reading(), flying(), THR_MIN=10.0, AIRSPEED_MAX=35.0)
+        # With this damping the demand is beyond the limits without its integrators: 5 m/s x 2.5 at 25 m/s.
+        weighed(own, reading(), flying(), THR_MIN=10.0, AIRSPEED_MAX=35.0, TECS_PTCH_DAMP=1.5)
     assert math.degrees(own.pitch_demand) == pytest.approx(degrees)
     assert own.throttle_demand == throttle
     assert own.saturation == (1 if high > 0.0 else -1)
@@ -346,6 +352,89 @@ def test_the_least_airspeed_grows_with_the_load_in_a_bank(bank_deg: float, preve
     values = parameters(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0, STALL_PREVENTION=prevents)
     update_tecs(reading(), flying(), values, own, 18.0, 1.0, DT)
     assert own.tas_demand == pytest.approx(least, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("airspeed", "loss"),
+    [
+        # At AIRSPEED_CRUISE and below: nine tenths of the energy rate of TECS_SINK_MIN.
+        (25.0, 0.9 * 2.0 * GRAVITY / 25.0),
+        (20.0, 0.9 * 2.0 * GRAVITY / 25.0),
+        # At AIRSPEED_MAX: of TECS_SINK_MAX; halfway the mean of both.
+        (40.0, 0.9 * 5.0 * GRAVITY / 40.0),
+        (32.5, 0.9 * 0.5 * (2.0 / 25.0 + 5.0 / 40.0) * GRAVITY),
+    ],
+)
+def test_the_tas_demand_falls_with_nine_tenths_of_the_energy_rate(airspeed: float, loss: float) -> None:
+    """`AP_TECS::_update_speed_demand`."""
+    own = steady(tas=airspeed, airspeed_smoothed=airspeed, last_velocity_north=airspeed, tas_demand=airspeed)
+    made = parameters(AIRSPEED_CRUISE=25.0, AIRSPEED_MAX=40.0)
+    seen, at = record(MOTION, up=500.0, velocity_north=airspeed), state(airspeed=airspeed / AIRSPEED_READING)
+    update_tecs(at, seen, made, own, 10.0, 1.0, DT)
+    assert own.tas_demand == pytest.approx(airspeed - loss * DT, rel=1e-4)
+
+
+def test_the_demanded_rate_of_the_kinetic_energy_drives_the_throttle() -> None:
+    """`AP_TECS::_update_energies`: V times the demanded rate, less its mean over TECS_TIME_CONST."""
+    own, made = steady(), parameters(AIRSPEED_CRUISE=25.0, AIRSPEED_MAX=40.0)
+    update_tecs(reading(), flying(), made, own, 30.0, 1.0, DT)
+    rate, per_throttle = 0.5 * 5.0 * GRAVITY / 25.0, (5.0 + 2.0) * GRAVITY
+    demanded_rate = 25.0 * rate * (1.0 - DT / (DT + 5.0))
+    ste_error = 0.5 * ((25.0 + rate * DT) ** 2 - 25.0**2)
+    damped = 0.5 * demanded_rate * DT / (DT + 0.5)
+    expected = 0.45 + (demanded_rate + (ste_error + damped) / 5.0) / per_throttle
+    assert own.last_throttle_demand == pytest.approx(min(expected, 0.45 + 1.0 * DT))
+
+
+def test_at_full_throttle_the_highest_airspeed_falls_to_the_cruise_airspeed() -> None:
+    """`AP_TECS::_update_speed`: down with half of the rate of TECS_SINK_MIN, up with half of TECS_CLMB_MAX's."""
+    own, made = steady(tas_demand=35.0), parameters(AIRSPEED_CRUISE=25.0, AIRSPEED_MAX=35.0)
+    for count in (1, 2):
+        own.is_throttle_saturated = True
+        update_tecs(reading(), flying(), made, own, 35.0, 1.0, DT)
+        assert own.tas_demand == pytest.approx(35.0 - count * 0.5 * 2.0 * GRAVITY / 25.0 * DT, rel=1e-4)
+    own.tas_max_drop = 9.99
+    own.is_throttle_saturated = True
+    update_tecs(reading(), flying(), made, own, 35.0, 1.0, DT)
+    assert own.tas_max_drop == 10.0
+    own.is_throttle_saturated = False
+    update_tecs(reading(), flying(), made, own, 35.0, 1.0, DT)
+    assert own.tas_max_drop == pytest.approx(10.0 - 0.5 * 5.0 * GRAVITY / 25.0 * DT, rel=1e-2)
+
+
+def test_a_descent_at_full_throttle_gives_up_the_airspeed() -> None:
+    """`AP_TECS::_detect_bad_descent`: an STE error above 200 m^2/s^2, sinking, at 90 % of the throttle or more."""
+    made = parameters(AIRSPEED_CRUISE=25.0, AIRSPEED_MAX=40.0)
+    for climb, before, demand, begins in (
+        (-3.0, 1.0, 33.0, True),  # 0.5 (33^2 - 25^2) = 232
+        (-3.0, 1.0, 32.0, False),  # 199
+        (3.0, 1.0, 33.0, False),
+        (-3.0, 0.2, 33.0, False),
+    ):
+        own = steady(tas_demand=demand, last_throttle_demand=before)
+        update_tecs(reading(), flying(climb=climb), made, own, demand, 1.0, DT)
+        assert bool(own.bad_descent) == begins, (climb, before, demand)
+    # While it lasts, the minimum airspeed is demanded; it ends with the energy error.
+    own = steady(tas_demand=33.0, last_throttle_demand=1.0, bad_descent=True)
+    update_tecs(reading(), flying(), made, own, 33.0, 1.0, DT)
+    assert own.tas_demand < 33.0
+    assert own.bad_descent
+    own.tas_demand = 24.0
+    update_tecs(reading(), flying(), made, own, 33.0, 1.0, DT)
+    assert not own.bad_descent
+
+
+def test_beyond_a_pitch_limit_the_integrators_fade() -> None:
+    """`AP_TECS::_update_pitch`: each update leaves 1 - dt / (dt + TECS_TIME_CONST) of them."""
+    # 50 m low: 5 m/s of climb and their damping demand 63.7 of the 64.2 m^2/s^3 that 15 degrees are.
+    own = steady(altitude_demand=550.0, seb_integrator=10.0, ske_integrator=5.0)
+    weighed(own, reading(), flying())
+    kept = 1.0 - DT / (DT + 5.0)
+    assert (own.seb_integrator, own.ske_integrator) == pytest.approx((10.0 * kept, 5.0 * kept))
+    # Within the limits they grow: 1 m low is an error of g / 5.
+    own = steady(altitude_demand=501.0, seb_integrator=10.0, ske_integrator=5.0)
+    weighed(own, reading(), flying())
+    assert (own.seb_integrator, own.ske_integrator) == pytest.approx((10.0 + 0.3 * GRAVITY / 5.0 * DT, 5.0))
 
 
 # ----------------------------------------------------------------------

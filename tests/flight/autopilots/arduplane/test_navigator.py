@@ -129,6 +129,17 @@ def test_around_a_loiter_it_turns_with_its_radius(side: float) -> None:
     assert own.lateral_acceleration == pytest.approx(side * 25.0**2 / 120.0)
 
 
+def test_a_circle_that_was_reached_stays_reached_outside_it() -> None:
+    """`AP_L1_Control::update_loiter` since 4.6.0: a gust or a radius that cannot be flown does not end it."""
+    way = circle_route()
+    # 300 m outside, flying outwards: the center is aimed at.
+    seen = flying(0.0, -500.0, 0.0, math.pi)
+    for reached in (True, False):
+        own = memory(from_north=-5000.0, loiter_started=True, reached_loiter_target=reached)
+        navigate_legs(seen, way, parameters(), own, 1.0, 0.1)
+        assert bool(own.reached_loiter_target) == reached
+
+
 def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
     way = waypoints(
         (0, 0, 500), (0, 1000, 500), (100, 1100, 500), loiter_radius=120.0, centre_east=0.0, centre_north=1000.0

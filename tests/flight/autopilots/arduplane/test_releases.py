@@ -6,13 +6,25 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.parameters import TABLE, ArduPilotParameters
 from flight.autopilots.arduplane.releases import choose_release, simulated_release
+from flight.autopilots.arduplane.renamed_parameters import NAMES_BEFORE_4_7, RENAMED, name_in_release
 from flight.autopilots.autopilot import ParameterValue, StoredAutopilot, StoredParameters
 from flight.autopilots.catalog import autopilot_of_log
+from flight.autopilots.parameter_files import LONGEST_NAME
 from world.errors import ParameterError
 from world.scenario import load_scenario, with_flight
 from world.scenario_tables import ArduPlaneVersion, FlightTable
+
+
+def notes_of(text: str, file: Path, version: str) -> tuple[str, ...]:
+    """Return the note on a renamed parameter of a file, if it has one."""
+    new_names = {"LIM_ROLL_CD": "ROLL_LIMIT_DEG"} | (
+        {"GLIDE_SLOPE_MIN": "ALT_SLOPE_MIN", "GLIDE_SLOPE_THR": "ALT_SLOPE_MAXHGT"} if version == "4.7" else {}
+    )
+    return tuple(
+        f"{file}: {old} is named {new} in ArduPlane {version}" for old, new in new_names.items() if old in text
+    )
 
 
 @pytest.mark.parametrize(
@@ -36,7 +48,7 @@ def test_a_parameter_file_selects_its_release(text: str, version: str, tmp_path:
     file.write_text(text, encoding="utf-8")
     table = FlightTable(params=str(file))
     made = ArduPlane.load(table, load_aircraft("aerosonde"), "a")
-    assert (made.version, made.parameter_notes) == (version, ())
+    assert (made.version, made.parameter_notes) == (version, notes_of(text, file, version))
     assert f"the simulated ArduPlane {version} with the parameters of" in made.described("aerosonde")
 
 
@@ -62,7 +74,7 @@ def test_a_file_of_another_release_is_noted_in_one_line(
 ) -> None:
     file = tmp_path / "mine.param"
     file.write_text(text, encoding="utf-8")
-    assert choose_release(stated, str(file)).notes == (f"{file} {note}",)
+    assert choose_release(stated, str(file)).notes[0] == f"{file} {note}"
 
 
 def test_the_newest_release_is_the_default_and_a_scenario_states_it() -> None:
@@ -113,8 +125,9 @@ def test_a_parameter_of_47_is_not_used_by_46() -> None:
     assert [made.record().is_4_7 for made in (newer, older)] == [True, False]
 
 
-# Names in 4.5, 4.6 and 4.7 with the same value, as the conversion tables of ArduPlane/Parameters.cpp relate them.
-RENAMED = [
+# The same value under the name before 4.5, under the name of 4.6, and under the name of 4.7 (ArduPlane's release notes,
+# conversion tables of ArduPlane/Parameters.cpp): every renamed parameter that the control law reads.
+READ_UNDER_OLD_NAMES = [
     ("GLIDE_SLOPE_MIN 21", "GLIDE_SLOPE_MIN 21", "ALT_SLOPE_MIN 21"),
     ("GLIDE_SLOPE_THR 7", "GLIDE_SLOPE_THR 7", "ALT_SLOPE_MAXHGT 7"),
     ("TRIM_ARSPD_CM 1500", "AIRSPEED_CRUISE 15", "AIRSPEED_CRUISE 15"),
@@ -130,9 +143,37 @@ RENAMED = [
 ]
 
 
-@pytest.mark.parametrize("names", RENAMED)
+@pytest.mark.parametrize("names", READ_UNDER_OLD_NAMES)
 def test_a_renamed_parameter_is_read_under_each_of_its_names(names: tuple[str, str, str]) -> None:
     made = [ArduPilotParameters.of_text(text, "a") for text in names]
     assert made[0].by_origin("file") == made[1].by_origin("file") == made[2].by_origin("file")
     assert made[2].by_origin("file") == {names[2].split()[0]: float(names[2].split()[1])}
     assert [one.unused for one in made] == [(), (), ()]
+
+
+def test_every_renamed_parameter_is_read_or_not_used_and_named_in_one_line(tmp_path: Path) -> None:
+    read = {text.split()[0] for names in READ_UNDER_OLD_NAMES for text in names}
+    for release, new_names in RENAMED.items():
+        for old, new in new_names.items():
+            assert len(new) <= LONGEST_NAME, new
+            # No name is renamed twice, and none is both old and new.
+            assert new not in NAMES_BEFORE_4_7, new
+            assert name_in_release(old, "4.7") == new
+            assert name_in_release(new, "4.6") == (old if release == "4.7" else new)
+            assert (old in TABLE.by_any_name, new in TABLE.by_any_name) == (old in read, new in read), old
+    file = tmp_path / "old.param"
+    for old in NAMES_BEFORE_4_7:
+        file.write_text(f"{old} 7\nWP_RADIUS 60\n", encoding="utf-8")
+        (note,) = choose_release("4.7", str(file)).notes[1:]
+        new = name_in_release(old, "4.7")
+        said = f"{old} is named {new} in ArduPlane 4.7" if old in read else f"not used: {old} ({new})"
+        assert note == f"{file}: {said}"
+
+
+def test_a_file_of_47_that_46_flies_states_the_older_name(tmp_path: Path) -> None:
+    file = tmp_path / "new.param"
+    file.write_text("ALT_SLOPE_MIN 20\nAIRSPEED_CRUISE 20\n", encoding="utf-8")
+    notes = choose_release("4.6", str(file)).notes
+    assert notes[1:] == (f"{file}: ALT_SLOPE_MIN is named GLIDE_SLOPE_MIN in ArduPlane 4.6",)
+    # A name of the release that flies needs no note.
+    assert choose_release("4.7", str(file)).notes == ()
