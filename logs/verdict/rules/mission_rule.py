@@ -184,6 +184,10 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
     texts = setup.autopilot.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
+    # The route notes a loiter that is flown with another radius.
+    unflown_radius = setup.autopilot.loiter_rules.unflown
+    if unflown_radius and unflown_radius in setup.route.notes and setup.source is None:
+        texts = [*texts, unflown_radius]
     settings = [(None, text) for text in texts]
     for seq, text in [*remarks, *settings]:
         yield make_finding(
