@@ -48,7 +48,6 @@ LONGER = {
     "logs/views/exports/log_files.py:_make_topics": 91,
     "logs/views/profile.py:profile_chart": 64,
     "planfly/api/drafting.py:new_scenario": 61,
-    "planfly/api/identifying.py:identify_aircraft": 65,
     "planfly/api/optimising.py:optimise": 66,
     "planfly/campaigns/pictures.py:draw_go_no_go": 72,
     "planfly/campaigns/pictures.py:narrow_figure": 62,

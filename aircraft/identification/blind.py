@@ -65,9 +65,10 @@ QUANTITIES = (
     BlindQuantity("track", "m"),
     BlindQuantity("power", "W"),
 )
-# Columns of the height rate and the height.
+# Columns of the height rate, the height and the power.
 _HEIGHT_RATE = 3
 _HEIGHT = 4
+_POWER = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +178,7 @@ class BlindPrediction:
                 for base, chosen in zip(draws, blocks, strict=True)
             ]
         )
+        flights[:, :, :, _POWER] = np.maximum(0.0, flights[:, :, :, _POWER])
         low, high = band_limits(flights)
         times = self._times[self._starts[:, np.newaxis] + _rows(self._count)].ravel()
         made = []

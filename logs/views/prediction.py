@@ -12,16 +12,17 @@ from world.arrays import Floats
 _MAX_STEP_RATIO = 5.0
 
 
-def band_chart(bands: Sequence[Band], title: str) -> Chart:
-    """Return a panel for each quantity, with its band and the flight, over time or distance.
+def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Chart:
+    """Return a panel for each quantity, with its band and the flight.
+
+    by_time: True for bands over the time of the log, s, False for bands over the distance along the legs, m.
 
     >>> time = np.arange(4.0)
     >>> chart = band_chart([Band("bank", "deg", time, time - 1.0, time + 1.0, time)], "a flight")
     >>> [panel.title for panel in chart.panels], chart.unit
     (['bank'], 's')
     """
-    is_by_time = any(band.name == "height rate" for band in bands) or len(bands) == 1
-    factor = 1.0 if is_by_time else 1e-3
+    factor = 1.0 if by_time else 1e-3
     panels = []
     for band in bands:
         if not np.isfinite(band.flown).any():
@@ -34,7 +35,7 @@ def band_chart(bands: Sequence[Band], title: str) -> Chart:
         top = float(np.nanmax([high, flown]))
         share = Label(f"{100.0 * band.inside:.0f} % inside", float(along[0]), top, "end", prefer=(1, -1))
         panels.append(Panel(band.name, band.unit.replace("deg", "°"), layers, min_span=1.0, labels=(share,)))
-    along_name, unit = ("time of the log", "s") if is_by_time else ("along the legs", "km")
+    along_name, unit = ("time of the log", "s") if by_time else ("along the legs", "km")
     return Chart(title, along_name, unit, tuple(panels), page_height=170, print_height=1.3)
 
 

@@ -16,6 +16,7 @@ from logs.importers.motion_log import read_motion
 from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.checks import check_estimate
+from planfly.identification.drive_check import DriveConflict
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
 from planfly.identification.records import (
@@ -75,6 +76,7 @@ class IdentifiedAircraft:
     without_current: logs without battery current, if other logs have it; then the current of no log is used.
     slow: logs with few rows per second.
     wide: numbers with a wide interval, each with the flight that would narrow the interval.
+    conflict: conflict of drag and power, which widens the interval of the power; None without one.
     """
 
     aircraft: Aircraft
@@ -86,6 +88,7 @@ class IdentifiedAircraft:
     without_current: tuple[str, ...] = ()
     slow: tuple[SlowLog, ...] = ()
     wide: tuple[WideNumber, ...] = ()
+    conflict: DriveConflict | None = None
 
 
 @needs_extra("identification")
@@ -148,10 +151,24 @@ def identify_aircraft(
     with stage("drawing", "drawing an identification"):
         files["identify.html"] = _report_page(identified, predicted, check, target.name)
     write_own_folder(target, {name: text.encode() for name, text in files.items()})
-    slow = slow_logs([motion_log for motion_log, _, _ in log_parts])
-    aircraft, wide = read_aircraft(target), _find_wide_numbers(identified)
+    return _make_result(read_aircraft(target), identified, predicted, records)
+
+
+def _make_result(
+    aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
+) -> IdentifiedAircraft:
+    climb, sink, power = _intervals(identified)
     return IdentifiedAircraft(
-        aircraft, estimate, *_intervals(identified), predicted, without_current(records), slow, wide
+        aircraft=aircraft,
+        estimate=identified.estimate,
+        climb=climb,
+        sink=sink,
+        power=power,
+        predicted=predicted,
+        without_current=without_current(records),
+        slow=slow_logs(identified.logs),
+        wide=_find_wide_numbers(identified),
+        conflict=identified.drive_conflict(),
     )
 
 
@@ -258,7 +275,9 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
         )
     )
     logs = tuple((Path(log.source).name, log.sha256) for log in identified.logs)
-    wide = tuple(wide_number.text for wide_number in _find_wide_numbers(identified))
+    conflict = identified.drive_conflict()
+    conflicts = () if conflict is None else (conflict.text,)
+    wide = (*conflicts, *(wide_number.text for wide_number in _find_wide_numbers(identified)))
     check_name = None if check is None else Path(check).name
     return identification_page(
         IdentificationFacts(name, identified.estimate, logs, numbers, predicted, check_name, wide)
@@ -283,10 +302,13 @@ def _intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
         return factor * float(lower), factor * float(value[0]), factor * float(upper)
 
     degrees = math.degrees(1.0)
+    lower_power, power, upper_power = interval(best.power, samples.power)
+    if (conflict := identified.drive_conflict()) is not None:
+        upper_power = max(upper_power, conflict.largest_power)
     return (
         interval(best.climb, samples.climb, degrees),
         interval(best.sink, samples.sink, degrees),
-        interval(best.power, samples.power),
+        (lower_power, power, upper_power),
     )
 
 

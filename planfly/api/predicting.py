@@ -68,6 +68,7 @@ class Predicted:
     source: file of the log.  aircraft: name of the aircraft.
     lines: description for people.
     files: written files.
+    leg_ends: distance along the legs at which each ends, m; empty by the controls.
     """
 
     by: PredictBy
@@ -80,6 +81,7 @@ class Predicted:
     aircraft: str
     lines: tuple[str, ...]
     files: tuple[Path, ...] = ()
+    leg_ends: tuple[float, ...] = ()
 
 
 @needs_extra("identification")
@@ -263,7 +265,10 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
         f" {DRAWS} flights with other aircraft, wind and turbulence; no band is fitted to the log"
     )
     lines = (heading, *_band_lines(bands))
-    return Predicted("mission", bands, len(flights), 0, stretch.start, stretch.end, str(path), aircraft.name, lines)
+    ends = tuple(flights[0].ends.tolist())
+    return Predicted(
+        "mission", bands, len(flights), 0, stretch.start, stretch.end, str(path), aircraft.name, lines, leg_ends=ends
+    )
 
 
 def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
@@ -292,7 +297,8 @@ def _write_page(folder: Path, predicted: Predicted) -> tuple[Path, ...]:
     from logs.views.prediction import band_chart
     from logs.views.report.prediction import prediction_page
 
-    chart = band_chart(predicted.bands, f"{Path(predicted.source).name}, predicted by {predicted.aircraft}")
+    title = f"{Path(predicted.source).name}, predicted by {predicted.aircraft}"
+    chart = band_chart(predicted.bands, title, by_time=predicted.by == "controls")
     page, picture = (folder / name for name in PREDICT_FILES)
     write_whole(picture, png_bytes(draw_chart(chart)))
     write_whole(page, prediction_page(predicted.lines[0], predicted.bands, chart).encode())

@@ -250,6 +250,8 @@ def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
         print("  performance only: fewer than 10 rows of inertial sensors or outputs a second do not show the moments")
     for log in result.slow:
         print(f"  rows     {log.source}: {log.hertz:.1f} a second of sensors or outputs; {log.setting} records more")
+    if result.conflict is not None:
+        print(f"  conflict {result.conflict.text}")
     for wide_number in result.wide:
         print(f"  wide     {wide_number.text}")
     for line in result.estimate.silent():

@@ -44,16 +44,17 @@ _TABLE_ROWS = 15
 def base_model(aircraft: Aircraft) -> BaseModel:
     """Return the model values of an aircraft.
 
-    Raises FlightError for an aircraft without steady flight at cruise, and for a motor model that has neither the form
-    of the Aerosonde's nor that of the Zagi's and X8's.
+    A motor in the form of the Aerosonde's or of the Zagi's and X8's keeps that form; another one becomes tables.
+
+    Raises FlightError for an aircraft without steady flight at cruise.
 
     >>> from aircraft.catalog import load_aircraft
     >>> numbers = base_model(load_aircraft("aerosonde")).coefficients
     >>> round(numbers.lift_alpha, 2), round(numbers.pitch_elevator, 2), round(numbers.drag_zero, 3)
     (5.61, -0.99, 0.043)
     """
-    motor = read_motor(aircraft)
-    return _Probe(aircraft).base_model(motor, reacts=_has_torque_reaction(aircraft))
+    probe, motor = _Probe(aircraft), read_motor(aircraft)
+    return probe.base_model(probe.motor_table() if motor is None else motor, reacts=_has_torque_reaction(aircraft))
 
 
 def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
@@ -228,11 +229,8 @@ def _parse_model(aircraft: Aircraft) -> ElementTree.Element | None:
         return None
 
 
-def read_motor(aircraft: Aircraft) -> Motor:
-    """Return the constants of a model's motor or propeller disc.
-
-    Raises FlightError for a motor model of another form.
-    """
+def read_motor(aircraft: Aircraft) -> Motor | None:
+    """Return the constants of a model's motor or propeller disc, or None for a motor model of another form."""
     try:
         root = ElementTree.parse(aircraft.model_file).getroot()
         functions = {function.get("name", ""): function for function in root.iter("function")}
@@ -240,12 +238,7 @@ def read_motor(aircraft: Aircraft) -> Motor:
             return _read_propeller_disc(functions, aircraft.battery_voltage)
         return _read_electric_motor(functions, aircraft.battery_voltage)
     except (KeyError, ValueError, IndexError, StopIteration, OSError, ElementTree.ParseError):
-        allowed = "expected a motor in the form of aircraft/aerosonde/aerosonde.xml or aircraft/x8/x8.xml"
-        raise FlightError(
-            f"{aircraft.model_file}: its motor cannot be identified: {allowed}",
-            file=aircraft.model_file,
-            allowed=allowed,
-        ) from None
+        return None
 
 
 def _function_values(function: ElementTree.Element) -> list[float]:

@@ -22,6 +22,7 @@ from flight.dynamics.trim import straight
 from flight.guidance.model_gains import gains_of_model, gains_text
 from flight.mission_files.wpl import waypoints_text
 from logs.importers.motion import MotionLog
+from planfly.identification.drive_check import DriveConflict, drive_conflict
 from planfly.identification.manoeuvres import identification_mission
 from planfly.identification.model_text import identified_xml
 from planfly.identification.servos import ServoOutput
@@ -90,6 +91,11 @@ class Identified:
             performance(self.numbers, self.estimate.values, self.cruise, DENSITY),
             performance(self.numbers, self.draws, self.cruise, DENSITY),
         )
+
+    def drive_conflict(self) -> DriveConflict | None:
+        """Return the conflict of the estimate's drag and power in level flight, or None."""
+        best, _ = self.performance()
+        return drive_conflict(float(best.drag[0]) * self.cruise, float(best.power[0]), self.numbers.mass)
 
 
 def make_identified(
@@ -265,6 +271,8 @@ def posterior_text(identified: Identified) -> str:
     _, samples = identified.performance()
     # Standard deviation of the logarithm; if it exceeds 1, nothing is known of the value.
     power = min(1.0, float(np.std(np.log(np.maximum(samples.power, 1.0)))))
+    if (conflict := identified.drive_conflict()) is not None:
+        power = min(1.0, max(power, math.log(conflict.largest_power / conflict.power) / 1.96))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
     fastest = fastest_level(identified.numbers, identified.draws, DENSITY)
     log_fractions = estimate.of_log()

@@ -11,6 +11,7 @@ from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.motor import Motor
+from aircraft.identification.motor_table import MotorTable
 from aircraft.identification.parameters import INDEX, PARAMETERS
 from aircraft.identification.propeller_disc import PropellerDisc
 from aircraft.xml_text import number
@@ -243,6 +244,8 @@ def _motor_functions(motor: Motor) -> dict[str, str]:
             return shared | _electric_functions(motor)
         case PropellerDisc():
             return shared | _disc_functions(motor)
+        case MotorTable():
+            return shared | _table_functions(motor)
     raise TypeError(type(motor).__name__)
 
 
@@ -263,6 +266,34 @@ def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
         " </max>",
         "torque-n_m": "<product> <v> 0 </v> <p> motor/throttle-norm </p> </product>",
         "battery-power-w": f"<product> {power} <p> motor/thrust-n </p> <sum> {exit_property} {_AIR} </sum> </product>",
+        "battery-current-a": "<quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>",
+    }
+
+
+def _table_functions(motor: MotorTable) -> dict[str, str]:
+    """Return functions that look up the tables at the airspeed that has the same advance ratio at the base's speed."""
+    speed = "<p> ident/motor-speed </p>"
+    density_ratio = f"<quotient> {_RHO} <v> {number(motor.density)} </v> </quotient>"
+
+    def table(values: Floats) -> str:
+        header = "  ".join(number(throttle) for throttle in motor.throttles.tolist())
+        rows = "\n".join(
+            "  ".join(number(value) for value in (airspeed, *row))
+            for airspeed, row in zip(motor.airspeeds.tolist(), values.tolist(), strict=True)
+        )
+        return f"""<table> <independentVar lookup="row"> motor/scaled-airspeed-mps </independentVar>
+          <independentVar lookup="column"> motor/throttle-norm </independentVar>
+          <tableData>\n{header}\n{rows}\n</tableData> </table>"""
+
+    def scaled(values: Floats, factor: str, power: int) -> str:
+        return f"<product> {factor} {density_ratio} {power * speed} {table(values)} </product>"
+
+    load = "<p> ident/propeller-torque </p>"
+    return {
+        "scaled-airspeed-mps": f"<quotient> {_AIR} {speed} </quotient>",
+        "thrust-n": scaled(motor.pull * motor.thrusts, "<p> ident/thrust </p>", 2),
+        "torque-n_m": scaled(motor.load * motor.torques, load, 2),
+        "battery-power-w": scaled(motor.load * motor.powers, load, 3),
         "battery-current-a": "<quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>",
     }
 

@@ -10,6 +10,7 @@ import pytest
 import planfly
 from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
 from aircraft.identification.electric_motor import ElectricMotor
+from aircraft.identification.motor_table import MotorTable
 from aircraft.identification.parameters import prior_means
 from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
@@ -17,7 +18,6 @@ from flight.dynamics.trim import straight
 from planfly.identification.base_numbers import base_model, is_flying_wing, scale_model
 from planfly.identification.model_text import identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
-from world.errors import FlightError
 
 # Beard and McLain, Small Unmanned Aircraft, second edition, appendix E.2.
 BOOK = {
@@ -85,10 +85,46 @@ def test_a_stubbier_wing_has_more_induced_drag() -> None:
     assert scale_model(base, 11.0, base.span, base.area).coefficients == base.coefficients
 
 
-def test_an_engine_that_burns_fuel_is_refused_in_one_line() -> None:
-    with pytest.raises(FlightError, match="its motor cannot be identified") as refused:
-        base_model(load_aircraft("c172x"))
-    assert "\n" not in str(refused.value)
+@pytest.mark.parametrize("name", ["ultrastick25e", "c172x"])
+def test_a_motor_of_another_form_becomes_tables(name: str) -> None:
+    """In level flight at cruise, the thrust of the tables carries the drag, and their power is JSBSim's."""
+    aircraft = load_aircraft(name)
+    numbers = base_model(aircraft)
+    assert isinstance(numbers.motor, MotorTable)
+    fdm = Fdm(aircraft)
+    trim = straight(fdm, aircraft.airspeed, 500.0)
+    assert trim is not None
+    fdm.balance(trim.vector())
+    flow = np.full(1, aircraft.airspeed), np.full(1, trim.throttle), np.full(1, numbers.motor.density)
+    thrust, current = numbers.motor.thrust_and_current(*flow)
+    pounds = sum(fdm.properties.getter(f"forces/fb{axis}-aero-lbs")() * weight for axis, weight in _along(trim.alpha))
+    # Linear interpolation in the tables is within 2 %.
+    assert float(thrust[0]) * math.cos(trim.alpha) == pytest.approx(-pounds * 4.448222, rel=0.02)
+    assert float(current[0]) * max(1.0, numbers.motor.voltage) == pytest.approx(float(fdm.read().power), rel=0.02)
+
+
+def _along(alpha: float) -> tuple[tuple[str, float], ...]:
+    """Return the shares of the body axes' forces along the path of level flight."""
+    return ("x", math.cos(alpha)), ("z", math.sin(alpha))
+
+
+def test_an_identified_ultra_stick_without_a_log_flies_as_its_base(tmp_path: Path) -> None:
+    """The tables in the identified model give the base's throttle and power in level flight."""
+    base = load_aircraft("ultrastick25e")
+    folder = tmp_path / "own"
+    shutil.copytree(base.folder, folder)
+    text = identified_xml(base, "own", base_model(base), prior_means())
+    (folder / "ultrastick25e.xml").unlink()
+    (folder / "own.xml").write_text(text, encoding="utf-8")
+    (folder / "ultrastick25e.toml").rename(folder / "own.toml")
+    powers = []
+    for aircraft in (base, read_aircraft(folder)):
+        fdm = Fdm(aircraft)
+        trim = straight(fdm, base.airspeed, 500.0)
+        assert trim is not None
+        fdm.balance(trim.vector())
+        powers.append((trim.throttle, float(fdm.read().power)))
+    assert powers[1] == pytest.approx(powers[0], rel=0.02)
 
 
 # Beard and McLain, first edition, appendix E.1, with a span efficiency of 0.9, and Gryte et al. 2018 (x8_param.mat).
