@@ -136,8 +136,8 @@ def test_shifts_are_what_plain_sums_say() -> None:
     faster = estimate.shifts["airspeed (as the wind triangle has it)"]
     _, sd = estimate.airspeed
     assert faster[INDEX["aileron-power"]] == pytest.approx(-2.0 * sd * value[INDEX["aileron-power"]], rel=0.5)
-    # Bayes' rule with the prior's deviation p leaves p s / hypot(p, s) of a deviation s, which includes the shift.  With
-    # a value of 1, a shift of 0.23 and a prior of 0.4, that is 0.20.
+    # Bayes' rule with the prior's deviation p leaves p s / hypot(p, s) of a deviation s, which includes the shift.
+    # With a value of 1, a shift of 0.23 and a prior of 0.4, that is 0.20.
     for name in ("dihedral-effect", "weathercock"):
         k = INDEX[name]
         prior_sd, shifted = PARAMETERS[k].sd, abs(float(shift[k]))
