@@ -68,6 +68,7 @@ EVERY = {
         Given(("recover", "broken.mcap", "--out", "new.mcap"), (3,), "new.mcap"),
         Given(("import", "tight.BIN", "new.mcap"), (0, 3, 4), "new.mcap"),
         Given(("refly", "imported.mcap", "--out", "out"), (0, 3, 4), "out"),
+        Given(("predict", "imported.mcap", "--aircraft", "aerosonde", "--out", "out"), (0, 3, 4), "out"),
         Given(("campaign", *_CAMPAIGN, "--flights", "2"), (0, 3, 4), "out"),
         Given(("winds", *_CAMPAIGN, "--flights", "8", "--directions", "4"), (0, 3, 4), "out"),
         Given(("paper", "--problems", "7", "--runs", "1", "--jobs", "1", "--out", "out"), target="out"),
