@@ -103,6 +103,7 @@ class LandingStrip:
     length, width: size of the ground that is suitable for landing, m.
     approach: length of the straight final before the landing point, m.
     slope: glide slope of the final, rad below level.
+    height_sd: standard deviation of the strip's surveyed height, m; None if only the elevation file states its height.
     If approach or slope is None, a plan chooses a value that the autopilot and the aircraft can fly.
     """
 
@@ -113,6 +114,7 @@ class LandingStrip:
     width: float = 40.0
     approach: float | None = None
     slope: float | None = None
+    height_sd: float | None = None
 
     def landing_course(self, wind: Wind, amsl: float) -> float | None:
         """Return the landing course, rad: the stated one, or into the wind at ``amsl`` (m AMSL).
@@ -205,7 +207,7 @@ def make_landing(
     _position_on_ground("landing", position, source, ground, bounds)
     course = None if isinstance(table.course_deg, str) else math.radians(table.course_deg)
     slope = None if table.slope_deg is None else math.radians(table.slope_deg)
-    return LandingStrip(*position, course, table.length_m, table.width_m, table.approach_m, slope)
+    return LandingStrip(*position, course, table.length_m, table.width_m, table.approach_m, slope, table.height_sd_m)
 
 
 def make_return_requirements(

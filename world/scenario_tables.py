@@ -574,6 +574,8 @@ class LandingTable(PositionTable):
     length_m, width_m: size of the strip, which is centred on the landing point.
     approach_m: length of the straight final before the landing point.
     slope_deg: glide slope of the final, below level.
+    height_sd_m: standard deviation of the strip's surveyed height.  If it is not given, the height is only known from
+        the elevation file, and a campaign varies it with the terrain.
     If approach_m or slope_deg is not given, a plan chooses a value that the autopilot and the aircraft can fly.
     """
 
@@ -584,6 +586,7 @@ class LandingTable(PositionTable):
     width_m: Annotated[float, within(5.0, 500.0)] = 40.0
     approach_m: Annotated[float, within(200.0, 5000.0)] | None = None
     slope_deg: Annotated[float, within(1.0, 20.0)] | None = None
+    height_sd_m: Annotated[float, within(0.0, 20.0)] | None = None
 
     @model_validator(mode="after")
     def _check_position(self) -> "LandingTable":

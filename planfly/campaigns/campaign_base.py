@@ -35,12 +35,22 @@ from planfly.workflow.make_plan import Advance, make_plan
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
 from planfly.workflow.pipeline import OffNominal
 from planner.plan import Plan, plan_json, read_plan
+from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
 from world.files import write_whole
 from world.scenario import Scenario
 from world.scenario_tables import WindTable
 from world.terrain import Terrain
 from world.wind import Wind
+
+# Distance beyond the ends of a strip over which its survey holds, m: the flare and the last of the final.
+_SURVEYED_DISTANCE_M = 200.0
+# Distance over which the survey's error passes into that of the elevation file, m.
+_SURVEY_BLEND_DISTANCE_M = 1000.0
+# Distance over which the size of a terrain pixel is measured, m.
+_PROBE_DISTANCE_M = 100.0
+# Stream of random numbers for the error of a strip's survey, apart from those of the flight's other draws.
+_STRIP_ERROR_STREAM = 71
 
 
 @dataclass(frozen=True)
@@ -249,8 +259,10 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     """
     values = draw.values
     scenario = _with_drawn_wind(base.scenario, values, wind)
-    if values["terrain_height"] and scenario.terrain is not None:
-        scenario = replace(scenario, terrain=_raise_terrain(scenario.terrain, values["terrain_height"]))
+    if scenario.terrain is not None:
+        strip_error = _draw_strip_error(scenario.landing, draw.seed)
+        terrain = vary_terrain(scenario.terrain, values["terrain_height"], scenario.landing, strip_error)
+        scenario = replace(scenario, terrain=terrain)
     battery = base.airframe.battery * values["battery"]
     draws = base.dispersions.draws
     limits = _limits_in_wind(base.airframe, scenario, is_drawn=draws is not None)
@@ -278,8 +290,33 @@ def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: Gi
     return replace(scenario, spec=scenario.spec.model_copy(update={"wind": wind_table}), wind=wind)
 
 
-def _raise_terrain(terrain: Terrain, height: float) -> Terrain:
-    return replace(terrain, heights=(terrain.heights + np.float32(height)).astype(np.float32))
+def _draw_strip_error(strip: LandingStrip | None, seed: int) -> float | None:
+    """Return the error of a strip's surveyed height in a flight, m; None if its height was not surveyed."""
+    if strip is None or strip.height_sd is None:
+        return None
+    return float(np.random.default_rng([seed, _STRIP_ERROR_STREAM]).normal(0.0, strip.height_sd))
+
+
+def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, strip_error: float | None) -> Terrain:
+    """Return a terrain whose heights differ by an error, m, but at a surveyed strip by the error of the survey.
+
+    The error changes linearly from ``strip_error``, within the strip and `_SURVEYED_DISTANCE_M` beyond its ends, to
+    ``error``, `_SURVEY_BLEND_DISTANCE_M` further away.  strip_error: m; None if the strip was not surveyed.
+    """
+    if strip is None or strip_error is None:
+        return replace(terrain, heights=terrain.heights + np.float32(error)) if error else terrain
+    # Metres on the map for each column and row, from the columns and rows for each metre about the strip.
+    centre = np.array(terrain.to_pixel(strip.east, strip.north)).ravel()
+    probes = ((strip.east + _PROBE_DISTANCE_M, strip.north), (strip.east, strip.north + _PROBE_DISTANCE_M))
+    steps = [np.array(terrain.to_pixel(*probe)).ravel() - centre for probe in probes]
+    metres_per_pixel = np.linalg.inv(np.column_stack(steps) / _PROBE_DISTANCE_M)
+    rows, columns = np.indices(terrain.heights.shape)
+    offsets = np.stack([columns - centre[0], rows - centre[1]])
+    distances = np.hypot(*np.tensordot(metres_per_pixel, offsets, axes=1))
+    surveyed_distance = 0.5 * strip.length + _SURVEYED_DISTANCE_M
+    weights = np.clip((distances - surveyed_distance) / _SURVEY_BLEND_DISTANCE_M, 0.0, 1.0)
+    errors = strip_error + weights * (error - strip_error)
+    return replace(terrain, heights=(terrain.heights + errors).astype(np.float32))
 
 
 def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -> Limits:
