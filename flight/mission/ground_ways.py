@@ -126,7 +126,7 @@ def _along_and_right(position: Floats, start: Floats, course: float) -> tuple[Fl
 
 
 @dataclass(frozen=True, slots=True)
-class GroundWays:
+class GroundPhases:
     """Take-off and landing of a flight; None for one that is not simulated.
 
     notes: reasons why a launch or a strip of the scenario is not flown, in sentences.
@@ -141,25 +141,27 @@ class GroundWays:
         return self.take_off is not None or self.approach is not None
 
 
-def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> GroundWays:
+def find_ground_phases(scenario: Scenario, mission: Mission, route: Route, min_airspeed: float) -> GroundPhases:
     """Find the take-off and the landing of a mission that a flight in the scenario simulates.
 
     slowest: minimum level-flight speed, m/s, which sets the launch speed if the scenario states none.
 
     >>> from world.scenario import load_scenario
-    >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None, 15.0))
+    >>> bool(find_ground_phases(load_scenario("tight"), Mission(None, ()), None, 15.0))
     False
     """
     take_off_problem = approach_problem = ""
     take_off = approach = None
     if scenario.launch is not None:
-        take_off, take_off_problem = _find_take_off(scenario, mission, route, slowest)
+        take_off, take_off_problem = _find_take_off(scenario, mission, route, min_airspeed)
     if scenario.landing is not None:
         approach, approach_problem = _find_approach(scenario, mission, route)
-    return GroundWays(take_off, approach, tuple(note for note in (take_off_problem, approach_problem) if note))
+    return GroundPhases(take_off, approach, tuple(note for note in (take_off_problem, approach_problem) if note))
 
 
-def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> tuple[TakeOff | None, str]:
+def _find_take_off(
+    scenario: Scenario, mission: Mission, route: Route, min_airspeed: float
+) -> tuple[TakeOff | None, str]:
     """Return the take-off, or the reason why it is not simulated."""
     launch, base = scenario.launch, home_place(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
@@ -180,7 +182,7 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
     course = launch.course if launch.course is not None else math.atan2(first_leg[0], first_leg[1])
     home = np.array([*home_position, float(ground)])
     end_altitude, pitch = float(route.waypoints[index, 2]), climb_pitch(item)
-    speed, acceleration = launch.release_speed(slowest), launch.acceleration(slowest)
+    speed, acceleration = launch.release_speed(min_airspeed), launch.acceleration(min_airspeed)
     return TakeOff(launch, item.seq, home, course, end_altitude, base.up, pitch, index, speed, acceleration), ""
 
 
@@ -213,7 +215,7 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     ), ""
 
 
-def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | None) -> Route:
+def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
     """Return the airborne part of a route, to which the usual rules apply.
 
     first_leg_start: point where the take-off ends and the first leg starts, (3,) m; None for the start of the route.
@@ -221,35 +223,35 @@ def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | Non
     The leg to the landing point is omitted; the numbers of legs and waypoints do not change.
     """
     points = np.array(route.waypoints)
-    if ways.take_off is not None and first_leg_start is not None:
-        points[: ways.take_off.waypoint + 1] = first_leg_start
+    if ground_phases.take_off is not None and first_leg_start is not None:
+        points[: ground_phases.take_off.waypoint + 1] = first_leg_start
         # Earlier waypoints are not flown: place each slightly before the next, so that every leg has a length.
-        for index in range(ways.take_off.waypoint - 1, -1, -1):
+        for index in range(ground_phases.take_off.waypoint - 1, -1, -1):
             next_leg = points[index + 1, :2] - points[index + 2, :2]
             points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
-    moved_route = replace(route, waypoints=points, notes=flown_notes(route, ways))
+    moved_route = replace(route, waypoints=points, notes=flown_notes(route, ground_phases))
     return (
         moved_route
-        if ways.approach is None or ways.approach.leg < 1
-        else part_of_route(moved_route, 0, ways.approach.leg)
+        if ground_phases.approach is None or ground_phases.approach.leg < 1
+        else part_of_route(moved_route, 0, ground_phases.approach.leg)
     )
 
 
-def shown_waypoints(route: Route, ways: GroundWays) -> Floats:
+def shown_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
     """Return a route's waypoints for pictures and tables, (w, 3) m, with flown ends on the ground.
 
     The route itself starts at the altitude at which a take-off ends, and its leg to a landing point is level.
     """
     points = np.array(route.waypoints)
-    if ways.take_off is not None:
-        points[ways.take_off.waypoint, 2] = ways.take_off.home[2]
-    if ways.approach is not None:
-        points[ways.approach.leg + 1, 2] = ways.approach.point[2]
+    if ground_phases.take_off is not None:
+        points[ground_phases.take_off.waypoint, 2] = ground_phases.take_off.home[2]
+    if ground_phases.approach is not None:
+        points[ground_phases.approach.leg + 1, 2] = ground_phases.approach.point[2]
     return points
 
 
-def flown_notes(route: Route, ways: GroundWays) -> tuple[str, ...]:
+def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
     """Return a route's notes, without the note on the landing if that is simulated."""
-    if ways.approach is None:
+    if ground_phases.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

@@ -17,7 +17,7 @@ from flight.dynamics.model_program import UnsupportedModel
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
-from flight.mission.ground_ways import GroundWays
+from flight.mission.ground_ways import GroundPhases
 from flight.simulation.airborne import Airborne
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
@@ -248,13 +248,13 @@ class Flight(Airborne):
         """
         gains = load_gains(aircraft)
         self._chosen_engine = engine or setup.engine
-        self._ways, gear = setup.ground_ways, None
-        if self._ways:
-            gear = gear_of(self._ways)
+        self._ground_phases, gear = setup.ground_phases, None
+        if self._ground_phases:
+            gear = gear_of(self._ground_phases)
             contacts = contacts_of(aircraft, gear)
-            self._from_ground = setup.autopilot.from_ground(self._ways, aircraft, contacts)
+            self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts)
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
-        if self._ways:
+        if self._ground_phases:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
         # Guidance knows the model, but not the differences of the aircraft from it.
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
@@ -277,7 +277,7 @@ class Flight(Airborne):
         """
         previous, previous_memory = self._work, self._workspace.own
         # The aircraft is in the air, even if the new mission starts with a take-off.
-        self._ways = GroundWays()
+        self._ground_phases = GroundPhases()
         self._lay_out(setup, self.fdm.aircraft, local_map)
         for name in _DIVERSION_RECORDS:
             setattr(self._work, name, getattr(previous, name))
@@ -312,14 +312,14 @@ class Flight(Airborne):
     def _start_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
         """Start the aircraft trimmed in the air, or release it on the launcher with an elevator command."""
         self._start_trimmed(setup.mission.source, start)
-        if self._ways.take_off is not None:
-            release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)
+        if self._ground_phases.take_off is not None:
+            release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ground_phases.take_off)
             commands = (elevator, 0.0, 0.0, self._from_ground.released_throttle)
             self._work.commands = release(self.fdm, release_state, commands)
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
 
     def _law(self, setup: FlightSetup) -> Autopilot:
-        return self._from_ground if self._ways else setup.autopilot
+        return self._from_ground if self._ground_phases else setup.autopilot
 
     def _fly(self, count: int) -> int:
         return self._loop(count)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flight.mission.edits import places
+from flight.mission.edits import movable_indices
 from flight.mission.from_plan import acceptance_radii
 from flight.mission.items import AMSL, LANDINGS, OVER_HOME, Command, Mission, MissionItem
 from flight.mission.placing import PlacedMission, place_stops
@@ -67,14 +67,14 @@ class MissionContext:
         return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
 
     def item_positions(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
-        """Return east, north and altitude AMSL of each place of `flight.mission.edits.places`, (n, 3) m.
+        """Return east, north and altitude AMSL of each place of `flight.mission.edits.movable_indices`, (n, 3) m.
 
         The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
         that it states, NaN if not known.
         """
         placed = self.place_mission(mission) if placed is None else placed
         heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
-        items = [mission.items[k] for k in places(mission)]
+        items = [mission.items[k] for k in movable_indices(mission)]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [
             self._stated_altitude(mission, item, x, y)
@@ -111,7 +111,7 @@ class MissionContext:
         """Adapt the acceptance radii of a planned mission to its turns near an item."""
         if not self.planned:
             return mission
-        item_indices = places(mission)
+        item_indices = movable_indices(mission)
         position = int(np.searchsorted(item_indices, index))
         nearby = item_indices[max(0, position - 2) : position + 3]
         points = self._planned_positions(mission, nearby)

@@ -46,7 +46,7 @@ from flight.autopilots.autopilot import (
 )
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.guidance.equivalent_airspeed import true_by_equivalent
-from flight.mission.ground_ways import Approach, GroundWays, TakeOff
+from flight.mission.ground_ways import Approach, GroundPhases, TakeOff
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
@@ -381,9 +381,13 @@ class ArduPlane(Autopilot):
         """Return the altitude gained in updrafts while ArduPlane holds airspeed and cannot sink fast enough, m."""
         return height_in_updrafts(sink, turbulence)
 
-    def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
+    def from_ground(
+        self, ground_phases: GroundPhases, aircraft: Aircraft, contacts: Sequence[Contact]
+    ) -> "ArduPlaneFromGround":
         """Return the same controllers with take-off and landing."""
-        return ArduPlaneFromGround(self.parameters, ways=ways, aircraft=aircraft, contacts=tuple(contacts))
+        return ArduPlaneFromGround(
+            self.parameters, ground_phases=ground_phases, aircraft=aircraft, contacts=tuple(contacts)
+        )
 
     def with_parameters(self, **values: float) -> "ArduPlane":
         """Return ArduPlane's control law with the given parameters changed; it replaces a recorded program."""
@@ -394,12 +398,12 @@ class ArduPlane(Autopilot):
 class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     """ArduPlane's law with take-off, landing, or both.
 
-    ways: take-off and landing that are flown.
+    ground_phases: take-off and landing that are flown.
     contacts: points where the aircraft touches the ground.
     """
 
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE_GROUND
-    ways: GroundWays = field(kw_only=True)
+    ground_phases: GroundPhases = field(kw_only=True)
     aircraft: Aircraft = field(kw_only=True)
     contacts: tuple[Contact, ...] = field(kw_only=True)
 
@@ -416,7 +420,7 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     @property
     def motor_start(self) -> float:
         """Time of the motor start, s after the release; inf if it never starts."""
-        take_off = self.ways.take_off
+        take_off = self.ground_phases.take_off
         if take_off is None:
             return -math.inf
         return motor_start(take_off.acceleration, take_off.speed, take_off.launch.incline, self.parameters)
@@ -445,10 +449,10 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
             ground.is_support[index] = contact.stands
         ground.turnover_speed = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
         ground.stage = IN_AIR
-        if self.ways.take_off is not None:
-            self._begin_take_off(self.ways.take_off, ground)
-        if self.ways.approach is not None:
-            self._begin_landing(self.ways.approach, ground)
+        if self.ground_phases.take_off is not None:
+            self._begin_take_off(self.ground_phases.take_off, ground)
+        if self.ground_phases.approach is not None:
+            self._begin_landing(self.ground_phases.approach, ground)
 
     def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
         parameters, launch = self.parameters, take_off.launch

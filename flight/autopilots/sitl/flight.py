@@ -204,24 +204,24 @@ class SitlFlight(ProgramFlight):
     _stack: contextlib.ExitStack
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, binary: Path) -> None:
-        self._binary, self._ways, gear = binary, setup.ground_ways, None
-        if self._ways:
-            gear = gear_of(self._ways)
-            self._from_ground = setup.autopilot.from_ground(self._ways, aircraft, contacts_of(aircraft, gear))
+        self._binary, self._ground_phases, gear = binary, setup.ground_phases, None
+        if self._ground_phases:
+            gear = gear_of(self._ground_phases)
+            self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts_of(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
         self._rail = self._trim_on_rail(setup)
         self._start_disturbances(setup)
         self._mission = uploaded_mission(setup)
-        if self._ways:
+        if self._ground_phases:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
             self._from_ground.initialise_records(self.memory, self._workspace.own)
         # Compiled here, while no autopilot waits for it.
-        tick = self._ground_tick if self._ways else autopilot_tick
+        tick = self._ground_tick if self._ground_phases else autopilot_tick
         tick(self._workspace.block.copy(), self._ground.heights)
 
     def _law(self, setup: FlightSetup) -> Autopilot:
-        return self._from_ground if self._ways else setup.autopilot
+        return self._from_ground if self._ground_phases else setup.autopilot
 
     @property
     def _ground_tick(self) -> Tick:
@@ -294,11 +294,11 @@ class SitlFlight(ProgramFlight):
         For a take-off, return the rail of the launch.
         """
         start, points = self._find_start(setup), setup.route.waypoints
-        if self._ways.take_off is not None:
+        if self._ground_phases.take_off is not None:
             self._start_trimmed(setup.mission.source, start)
             aircraft = self.fdm.aircraft
-            self._release = find_release(setup, self.map, self._ground, aircraft, self._ways.take_off)
-            return launch_rail(self._release, self._ways.take_off)
+            self._release = find_release(setup, self.map, self._ground, aircraft, self._ground_phases.take_off)
+            return launch_rail(self._release, self._ground_phases.take_off)
         first_leg = points[1, :2] - points[0, :2]
         release_position = points[0, :2] - first_leg / np.hypot(*first_leg) * max(
             RUN_IN, RUN_IN_SECONDS * start.airspeed

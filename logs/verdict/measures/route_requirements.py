@@ -22,7 +22,7 @@ from aircraft.path_limits import (
 )
 from flight.guidance.path import FlyByPath, path_polyline
 from flight.mission.fences import fence_zones
-from flight.mission.ground_ways import GroundWays
+from flight.mission.ground_ways import GroundPhases
 from flight.mission.route import Route
 from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup
@@ -283,7 +283,7 @@ class FlownGround:
     landing_start_row: row of the track at which the landing began; the last row without a landing.
     """
 
-    procedures: GroundWays
+    procedures: GroundPhases
     whole_route: "RouteRequirements"
     track: Track
     takeoff_end_row: int

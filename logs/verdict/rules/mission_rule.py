@@ -200,7 +200,7 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
 
 def _mission_parts(setup: FlightSetup) -> MissionParts:
     """Collect the properties of a mission on which the effect of settings depends."""
-    items, procedures = setup.mission.items, setup.ground_ways
+    items, procedures = setup.mission.items, setup.ground_phases
     commands = {item.command for item in items}
     pairs = itertools.pairwise(_flown_items(setup.mission))
     return MissionParts(

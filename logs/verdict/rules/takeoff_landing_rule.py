@@ -144,7 +144,7 @@ def _slope_finding(
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {math.degrees(abs(slope)):.1f}°"
     is_within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
-    ground_phases = requirements.setup.ground_ways
+    ground_phases = requirements.setup.ground_phases
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
     reason += "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"

@@ -67,7 +67,7 @@ def touchdown_findings(
     """Judge a flown landing; before a flight, only report a strip that is too short."""
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
-        planned_approach = requirements.setup.ground_ways.approach if geometric else None
+        planned_approach = requirements.setup.ground_phases.approach if geometric else None
         return (
             []
             if planned_approach is None

@@ -199,6 +199,6 @@ def test_after_a_loiter_to_an_altitude_the_approach_begins_at_once(after_loiter:
 
 
 def test_home_is_where_kept_flights_began() -> None:
-    take_off = fly_kept("a").setup.ground_ways.take_off
+    take_off = fly_kept("a").setup.ground_phases.take_off
     assert take_off is not None
     assert take_off.home == pytest.approx(HOME, abs=0.05)
