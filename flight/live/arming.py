@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.flight_process import MissionJudged, Place
+from flight.live.flight_process import LoiterCenter, MissionJudged
 from flight.live.telemetry import (
     ACTIVE,
     AUTO,
@@ -48,7 +48,7 @@ class ArmingState:
     last_verdict: last verdict on the mission; None without a mission.
     force: PFLY_FORCE.
     end_requested: True if the flight must end.
-    place: loiter center of a requested diversion in its new mode; None without a request.
+    loiter_center: loiter center of a requested diversion in its new mode; None without a request.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
@@ -59,7 +59,7 @@ class ArmingState:
     last_verdict: MissionJudged | None = None
     force: bool = False
     end_requested: bool = False
-    place: Place | None = None
+    loiter_center: LoiterCenter | None = None
     mission_state: int = NO_MISSION
 
     @property
@@ -133,17 +133,17 @@ class ArmingState:
             return self._divert(AUTO if should_continue else LOITER)
         return CommandResult(ACCEPTED) if should_continue else CommandResult(DENIED, "pause denied: not in flight")
 
-    def go_to(self, place: Place) -> CommandResult:
+    def go_to(self, center: LoiterCenter) -> CommandResult:
         """Fly to a position and loiter there, in GUIDED."""
         if not self.flying:
             return CommandResult(DENIED, "go-to denied: not in flight")
-        self.mode, self.place = GUIDED, place
+        self.mode, self.loiter_center = GUIDED, center
         self.mission_state = PAUSED
         return CommandResult(ACCEPTED)
 
     def restart_mission(self) -> None:
         """Continue the mission from the item that was set in flight."""
-        self.place = Place()
+        self.loiter_center = LoiterCenter()
 
     def set_flight_mode(self, mode: int) -> None:
         """Set the mode and the mission state of a diverted flight."""
@@ -156,7 +156,7 @@ class ArmingState:
             return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
             self.set_flight_mode(mode)
-            self.place = Place()
+            self.loiter_center = LoiterCenter()
         return CommandResult(ACCEPTED)
 
     def on_mission_uploaded(self) -> None:
@@ -188,7 +188,7 @@ class ArmingState:
         """Disarm the vehicle after its flight, ready to fly again."""
         self.flying = self.armed = self.end_requested = False
         self.mission_state = COMPLETE if is_completed and self.mode == AUTO else NOT_STARTED
-        self.mode, self.place = MANUAL, None
+        self.mode, self.loiter_center = MANUAL, None
 
     def _arming_refusal(self, is_forced: bool) -> str:
         if self.last_verdict is None:

@@ -26,7 +26,7 @@ from flight.mission.items import (
     is_located,
     item_problem,
     on_grid,
-    renumbered,
+    renumber_items,
 )
 from world.errors import MissionError
 
@@ -147,7 +147,7 @@ def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home
         rally=lists[MissionType.RALLY],
         source="upload",
     )
-    return renumbered(mission), shift
+    return renumber_items(mission), shift
 
 
 def _is_home(item: MissionItem) -> bool:

@@ -20,8 +20,8 @@ from flight.live.flight_process import (
     FlightJudged,
     FlightRequest,
     JudgeMission,
+    LoiterCenter,
     MissionJudged,
-    Place,
     ProcessReady,
     StartFlight,
     read_event,
@@ -376,9 +376,9 @@ class Vehicle:
         if self.arming.end_requested:
             self.arming.end_requested = False
             self._send_request(EndFlight())
-        if self.arming.place is not None:
-            self._divert(self.arming.place)
-            self.arming.place = None
+        if self.arming.loiter_center is not None:
+            self._divert(self.arming.loiter_center)
+            self.arming.loiter_center = None
         if self.arming.starts:
             self.arming.on_flight_started()
             self._progress.start_flight()
@@ -415,17 +415,17 @@ class Vehicle:
         self._send_request(JudgeMission(mission, self._mission_number, self._law_parameters))
         self._refresh()
 
-    def _divert(self, place: Place) -> None:
+    def _divert(self, center: LoiterCenter) -> None:
         """Divert the aircraft to the mission's current item, to home, or to a loiter."""
         mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
             mission = mission_from_item(mission, self.status.current - shift)
-        self._send_request(DivertFlight(self.arming.mode, mission, place))
+        self._send_request(DivertFlight(self.arming.mode, mission, center))
 
     def _go_to(self, item: MissionItem) -> str:
         """Fly to an item's position; return the reason for a refusal, or ""."""
-        return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
+        return self.arming.go_to(LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _handle_diversion(self, event: FlightDiverted) -> None:
         if event.problem:
@@ -497,7 +497,7 @@ class Vehicle:
         elif isinstance(event, FlightDiverted):
             self._handle_diversion(event)
         elif isinstance(event, FlightEnded):
-            self._handle_flight_end(event.ended)
+            self._handle_flight_end(event.end_reason)
         elif isinstance(event, ProcessReady):
             self._crash_count = 0
             self._ready = True

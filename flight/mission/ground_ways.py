@@ -12,7 +12,7 @@ import numpy as np
 
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import LANDING_NOTE
-from flight.mission.placing import home_place
+from flight.mission.placing import home_point
 from flight.mission.route import Route, part_of_route
 from world.airfield import LandingStrip, Launch
 from world.arrays import Floats
@@ -67,7 +67,7 @@ class TakeOff:
         position = np.array([*(self.home[:2] + rail_length * cos_incline * direction), self.home[2] + height])
         return position, self.speed * np.array([*(cos_incline * direction), sin_incline])
 
-    def described(self) -> str:
+    def description(self) -> str:
         """Return a description of the start of the flight."""
         method_text = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
         course = math.degrees(self.course) % 360.0
@@ -163,7 +163,7 @@ def _find_take_off(
     scenario: Scenario, mission: Mission, route: Route, min_airspeed: float
 ) -> tuple[TakeOff | None, str]:
     """Return the take-off, or the reason why it is not simulated."""
-    launch, base = scenario.launch, home_place(mission, scenario.origin, scenario.terrain)
+    launch, base = scenario.launch, home_point(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
     route_items = route.items.tolist()
     index = next((k for k, seq in enumerate(route_items) if seq >= 0), 0)
@@ -208,7 +208,7 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     final_leg = leg_end[:2] - leg_start[:2]
     course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
     point = np.array([leg_end[0], leg_end[1], ground])
-    wind, home = scenario.wind.along(course, ground)[0], home_place(mission, scenario.origin, scenario.terrain)
+    wind, home = scenario.wind.along(course, ground)[0], home_point(mission, scenario.origin, scenario.terrain)
     base = ground if home is None else home.up
     return Approach(
         strip, int(route.items[last_leg]), last_leg - 1, point, course, length, float(leg_start[2]), wind, base

@@ -279,14 +279,14 @@ class Mission:
     autopilot: str = field(default="", compare=False)
 
 
-def renumbered(mission: Mission) -> Mission:
+def renumber_items(mission: Mission) -> Mission:
     """Return a mission with its items numbered from 1 without gaps, as ground stations number them.
 
     Number 0 is home in both forms. The targets of jumps are renumbered too; the target of a jump to a missing item
     stays missing.
 
     >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
-    >>> [item.seq for item in renumbered(Mission(None, way)).items]
+    >>> [item.seq for item in renumber_items(Mission(None, way)).items]
     [1, 2, 3]
     """
     numbers = {item.seq: number for number, item in enumerate(mission.items, 1)}
@@ -302,11 +302,11 @@ def renumbered(mission: Mission) -> Mission:
     return replace(mission, items=tuple(items))
 
 
-def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
+def shift_numbers(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
     """Return items with a number added to each seq, and to the targets of jumps.
 
     >>> jump = MissionItem(3, int(Command.DO_JUMP), 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-    >>> [(item.seq, item.params[0]) for item in shifted([jump], 1)]
+    >>> [(item.seq, item.params[0]) for item in shift_numbers([jump], 1)]
     [(4, 2.0)]
     """
     shifted_items = []

@@ -130,7 +130,7 @@ class RoutePoint:
     arc: float = 0.0
 
 
-class Unjoined(NamedTuple):
+class UnjoinedStop(NamedTuple):
     """A stop that is not at its stated position in the route, because no tangent joins it to a circle.
 
     item, circle: seq of the stop's item, and seq of the circle's item.
@@ -168,7 +168,7 @@ def lay_out_waypoints(
     own_radius: OwnRadius,
     slopes: SpiralSlopes,
     rules: LoiterRules = USUAL_LOITERS,
-) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
+) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
     """Lay out the waypoints of a route along straight legs and around loiter circles.
 
     Return the waypoints, and the stops that are not at their stated positions.
@@ -181,7 +181,7 @@ def lay_out_waypoints(
     Stops inside the previous or next circle are omitted, with a note, because no straight leg joins them. Raises
     MissionError if a loiter is too wide or too long to lay out.
     """
-    unjoined: list[Unjoined] = []
+    unjoined: list[UnjoinedStop] = []
     nodes = _make_nodes(source, stops, notes, own_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
@@ -215,7 +215,7 @@ def _make_nodes(
     notes: Notes,
     own_radius: OwnRadius,
     rules: LoiterRules,
-    unjoined: list[Unjoined],
+    unjoined: list[UnjoinedStop],
 ) -> list[Node]:
     """Return points and circles in flying order, each joined to the next by a tangent.
 
@@ -240,12 +240,12 @@ def _make_nodes(
                     inner_node.distance_to(node) < _SAME_PLACE_M and abs(inner_node.up - node.up) <= _SAME_ALTITUDE_M
                 )
                 if inner_node.stop.item >= 0 and inner_node.stop.command not in TAKEOFFS and not is_passed_anyway:
-                    unjoined.append(Unjoined(inner_node.stop.item, stop.item, is_circle=False))
+                    unjoined.append(UnjoinedStop(inner_node.stop.item, stop.item, is_circle=False))
         previous = nodes[-1] if nodes else None
         if previous is not None and previous.turn != 0.0 and not is_joined(previous, node):
             if node.turn == 0.0:
                 _note_omitted_stop(stop, previous.stop, notes)
-                unjoined.append(Unjoined(stop.item, previous.stop.item, is_circle=False))
+                unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=False))
                 continue
             # Two loiters with the same stated radius and center may differ by the growth at their altitudes.
             previous_stated_radius, stated_radius = (
@@ -258,7 +258,7 @@ def _make_nodes(
                 or abs(previous_stated_radius - stated_radius) >= _SAME_PLACE_M
                 or not is_same_direction
             ):
-                unjoined.append(Unjoined(stop.item, previous.stop.item, is_circle=True))
+                unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=True))
             notes.add(
                 f"its circle has no tangent from that of item {previous.stop.item}: flown on that circle", stop.item
             )

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from flight.mission.items import Command, Mission
-from flight.mission.placing import return_places
-from flight.mission.return_path import ReturnPlace, ReturnRules
+from flight.mission.placing import return_points
+from flight.mission.return_path import ReturnPoint, ReturnRules
 from flight.mission.route import Route
 from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip, strip_slopes
 from world.arrays import Floats
@@ -43,7 +43,7 @@ def field_notes(
     """
     rally_problems: tuple[str, ...] = ()
     try:
-        return_targets = return_places(mission, scenario.origin, scenario.terrain)
+        return_targets = return_points(mission, scenario.origin, scenario.terrain)
     except MissionError as error:
         # Rally points of another field: only an RTL would fly to them, and such an RTL is refused itself.
         return_targets, rally_problems = (), (str(error),)
@@ -89,7 +89,7 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
 
 
 def _note_rally_points(
-    points: tuple[ReturnPlace, ...], route: Route, scenario: Scenario, rules: ReturnRules
+    points: tuple[ReturnPoint, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
     """Note rally points below ground, and rally points beyond the distance limit of any RTL from the route."""
     for point in points:
@@ -117,7 +117,7 @@ def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
     return float(np.hypot(*(leg_starts + fractions[:, None] * leg_vectors - np.array(point)).T).min())
 
 
-def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
+def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
     """Note an RTL to home whose altitude is below the ground under its loiter."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return

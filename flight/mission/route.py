@@ -21,7 +21,7 @@ from flight.mission.loiter_circles import (
     PlacedStop,
     RoutePoint,
     SpiralSlopes,
-    Unjoined,
+    UnjoinedStop,
     lay_out_waypoints,
 )
 from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedLanding, PlacedMission, place_stops
@@ -32,9 +32,9 @@ from flight.mission.return_path import (
     ReturnCircle,
     ReturnRules,
     choose_target,
-    described_return,
-    lay_return,
-    nearest_landing,
+    nearest_landing_sequence,
+    rtl_note,
+    rtl_waypoints,
 )
 from world.arrays import Floats
 from world.errors import MissionError
@@ -94,7 +94,7 @@ class Route:
     return_to: ReturnCircle | None = None
     straight_to: int = -1
     stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    unjoined: tuple[Unjoined, ...] = ()
+    unjoined: tuple[UnjoinedStop, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
     above_ground: Floats = field(default_factory=lambda: np.zeros(0))
     min_ground_speed: Floats = field(default_factory=lambda: np.zeros(0))
@@ -383,7 +383,7 @@ def make_route(
     limits: Limits | None = None,
     rules: RouteRules = USUAL_ROUTE_RULES,
 ) -> Route:
-    """Return the route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
+    """Return the route of a mission on the map about ``origin``: `place_stops`, then `route_through_stops`.
 
     terrain: None if unknown; heights above terrain are then an error.
     default_airspeed: airspeed until the mission sets one, m/s (the cruiseSpeed of a `.plan` file, a ground station's
@@ -408,10 +408,10 @@ def make_route(
     >>> route.started
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
-    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
+    return route_through_stops(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
 
 
-def lay_route(
+def route_through_stops(
     placed: PlacedMission,
     default_airspeed: float,
     fly_over: bool,
@@ -425,7 +425,7 @@ def lay_route(
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
-    >>> lay_route(placed, 25.0, fly_over=False).airspeed.tolist()
+    >>> route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist()
     [25.0]
     """
     mission, notes = placed.mission, Notes()
@@ -444,7 +444,7 @@ def lay_route(
         return_fields, landing = _append_return(placed, return_stop.stop, points, returns, limits, notes)
         if landing is not None:
             points += lay_out([_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in landing.stops])[0]
-    _check_place_count(mission.source, len(points))
+    _check_point_count(mission.source, len(points))
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
@@ -490,7 +490,7 @@ def _height_above_ground(stop: ItineraryStop) -> float:
     return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else math.nan
 
 
-def _check_place_count(source: str, point_count: int) -> None:
+def _check_point_count(source: str, point_count: int) -> None:
     """Raise MissionError if a route has fewer than two points."""
     if point_count < 2:
         message = f"{source}: {point_count} place to fly to: expected at least two different ones"
@@ -514,7 +514,7 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
 
 def _lay_out_waypoints(
     source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[PlacedStop]
-) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
+) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
     return lay_out_waypoints(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
 
 
@@ -542,7 +542,7 @@ def _find_landing(placed: PlacedMission, position: tuple[float, float, float], n
 
     Return None and add a note if the simulated RTL does not continue to that sequence.
     """
-    start = nearest_landing(position, placed.landing_starts)
+    start = nearest_landing_sequence(position, placed.landing_starts)
     landing = next((landing for landing in placed.landings if landing.start == start), None)
     if start is not None and landing is None:
         reason = "begins with the landing itself" if start.lands else "does not lead to a landing"
@@ -586,7 +586,7 @@ def _append_return(
     the allowed range.
     """
     source, start = placed.mission.source, points[-1].position
-    home, *rally = placed.return_places
+    home, *rally = placed.return_points
     target = choose_target(rules, start, home, rally)
     target_altitude = target.position[2]
     if not LOWEST <= target_altitude <= HIGHEST:
@@ -608,18 +608,18 @@ def _append_return(
     next_text = (
         "" if landing is None else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed)}"
     )
-    notes.add(described_return(target, rules, start[2], next_text), stop.item)
-    if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
+    notes.add(rtl_note(target, rules, start[2], next_text), stop.item)
+    if rules.may_use_landing and any(item.command in LANDINGS for item in placed.mission.items):
         notes.add(
             "the mission's landing is also a place to return to, which is not simulated: the "
             f"return is to {target.name}",
             stop.item,
         )
-    if rules.instead:
-        notes.add(rules.instead, stop.item)
+    if rules.deviation_note:
+        notes.add(rules.deviation_note, stop.item)
     start_index = len(points) - 1
-    next_place = None if landing is None else landing.start.place
-    points += lay_return(points, stop, target, rules, ability, next_place)
+    next_position = None if landing is None else landing.start.place
+    points += rtl_waypoints(points, stop, target, rules, ability, next_position)
     circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)
     return {"return_from": start_index, "return_to": circle}, landing
 

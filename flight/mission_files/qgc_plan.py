@@ -29,7 +29,7 @@ from flight.mission.items import (
     item_problem,
     on_grid,
     position_problem,
-    renumbered,
+    renumber_items,
 )
 from world.errors import MissionError
 from world.scenario_file import first_fault
@@ -390,7 +390,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         survey_plans=tuple(plans),
         autopilot=autopilot,
     )
-    return renumbered(mission)
+    return renumber_items(mission)
 
 
 def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
@@ -485,7 +485,7 @@ def plan_file_text(mission: Mission) -> str:
     both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0 for planfly's own
     guidance, which no ground station knows.
     """
-    mission = renumbered(mission)
+    mission = renumber_items(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
     modes = _altitude_modes(mission.items)
     data = {

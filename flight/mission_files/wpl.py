@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
 
-from flight.mission.fences import fence_shapes, numbered
+from flight.mission.fences import fence_shapes, number_items
 from flight.mission.items import (
     FENCES,
     LANDINGS,
@@ -22,7 +22,7 @@ from flight.mission.items import (
     item_problem,
     on_grid,
     position_problem,
-    renumbered,
+    renumber_items,
 )
 from world.errors import MissionError
 from world.files import TextLine
@@ -117,13 +117,13 @@ def parse_waypoints(text: str, source: str) -> Mission:
         raise MissionError(f"{source}: no items after the header", file=source)
     warnings = _collect_warnings(rows, *_split_home(rows))
     home, body = _split_home(_renumbered_rows(rows))
-    fences = numbered([row.item for row in body if row.item.command in FENCES])
+    fences = number_items([row.item for row in body if row.item.command in FENCES])
     fence_shapes(fences, source)
     return Mission(
         home=home,
         items=tuple(row.item for row in body if row.item.command not in _COMMANDS_WITH_OWN_FILES),
         fences=fences,
-        rally=numbered([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
+        rally=number_items([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
         warnings=tuple(warnings),
         source=source,
     )
@@ -253,7 +253,7 @@ def waypoints_text(mission: Mission) -> str:
 
     A NaN is written as 0, which is this form's value for "unset". Fences and rally points have files of their own.
     """
-    return _file_text(mission.home, renumbered(mission).items)
+    return _file_text(mission.home, renumber_items(mission).items)
 
 
 def fence_text(mission: Mission) -> str:
@@ -351,7 +351,7 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
         )
     params = (float(len(ring) - 1), 0.0, 0.0, 0.0)
     command = int(Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION)
-    return numbered([MissionItem(0, command, int(Frame.GLOBAL), params, lat, lon, 0.0) for lat, lon in ring[:-1]])
+    return number_items([MissionItem(0, command, int(Frame.GLOBAL), params, lat, lon, 0.0) for lat, lon in ring[:-1]])
 
 
 def _content_lines(text: str) -> list[tuple[int, str]]:

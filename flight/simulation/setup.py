@@ -278,7 +278,7 @@ class FlightSetup:
         if not self.autopilot.flies_ground:
             title = self.autopilot.title
             return GroundPhases(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
-        ground_phases = find_ground_phases(self.scenario, self.mission, self.route, self.slowest_launched)
+        ground_phases = find_ground_phases(self.scenario, self.mission, self.route, self.default_launch_speed)
         if (
             self.autopilot.flies_both_ends
             and ground_phases
@@ -290,7 +290,7 @@ class FlightSetup:
         return ground_phases
 
     @property
-    def slowest_launched(self) -> float:
+    def default_launch_speed(self) -> float:
         """Minimum level-flight speed at the start of the route, m/s: the default launch speed."""
         return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
 
@@ -304,7 +304,7 @@ class FlightSetup:
         """Description of the flight's start, with the reasons why the scenario's launch or landing is not flown."""
         ground_phases, started = self.ground_phases, self.route.started
         if ground_phases.take_off is not None:
-            started = ground_phases.take_off.described()
+            started = ground_phases.take_off.description()
         return "; ".join([*([started] if started else []), *ground_phases.notes])
 
     @property

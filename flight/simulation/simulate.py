@@ -21,7 +21,7 @@ from flight.mission.ground_ways import GroundPhases
 from flight.simulation.airborne import Airborne
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
-from flight.simulation.start import Start, find_release, gear_of, release
+from flight.simulation.start import Start, default_gear, find_release, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import FlightError, StartError
@@ -179,10 +179,10 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
     >>> [(len(block.rows), block.ended) for block in simulate(flight)]
     [(60, ''), (12, 'ground contact')]
     """
-    ended = ""
-    while not ended:
-        rows, ended = flight.block(round(BLOCK / flight.dt))
-        yield FlightBlock(rows, ended, min(float(flight.memory.distance), flight.path.length))
+    end_reason = ""
+    while not end_reason:
+        rows, end_reason = flight.block(round(BLOCK / flight.dt))
+        yield FlightBlock(rows, end_reason, min(float(flight.memory.distance), flight.path.length))
 
 
 def fly_to_end(flight: Airborne) -> SimulatedFlight:
@@ -207,10 +207,10 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
     ('completed', 12, True)
     """
     blocks = list(simulate(flight))
-    return SimulatedFlight(track_of(blocks), blocks[-1].ended, flight.path)
+    return SimulatedFlight(join_blocks(blocks), blocks[-1].ended, flight.path)
 
 
-def track_of(blocks: Sequence[FlightBlock]) -> Track:
+def join_blocks(blocks: Sequence[FlightBlock]) -> Track:
     """Join the rows of blocks to a track."""
     return as_track(join_rows([block.rows for block in blocks]))
 
@@ -250,7 +250,7 @@ class Flight(Airborne):
         self._chosen_engine = engine or setup.engine
         self._ground_phases, gear = setup.ground_phases, None
         if self._ground_phases:
-            gear = gear_of(self._ground_phases)
+            gear = default_gear(self._ground_phases)
             contacts = contacts_of(aircraft, gear)
             self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts)
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
@@ -260,7 +260,7 @@ class Flight(Airborne):
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._trim_at_start(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
-        autopilot = self._law(setup).law
+        autopilot = self._flying_autopilot(setup).law
         autopilot.initialise_records(self.memory, self._workspace.own)
         self._start_disturbances(setup)
         self._compiled, self.engine = self._choose_engine(autopilot)
@@ -318,10 +318,10 @@ class Flight(Airborne):
             self._work.commands = release(self.fdm, release_state, commands)
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
 
-    def _law(self, setup: FlightSetup) -> Autopilot:
+    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
         return self._from_ground if self._ground_phases else setup.autopilot
 
-    def _fly(self, count: int) -> int:
+    def _fly_ticks(self, count: int) -> int:
         return self._loop(count)
 
     def _choose_engine(self, autopilot: Autopilot) -> tuple[CompiledModel | None, str]:

@@ -119,7 +119,7 @@ class Release:
     ground: float
 
 
-def gear_of(ground_phases: GroundPhases) -> Gear:
+def default_gear(ground_phases: GroundPhases) -> Gear:
     """Return the gear for a model without contacts: wheels for a take-off from a runway, otherwise a belly."""
     return (
         "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"

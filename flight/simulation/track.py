@@ -194,7 +194,7 @@ _STEPS_PER_UNIT = np.exp2(
 )
 
 
-def quantised(rows: Rows) -> Rows:
+def quantise(rows: Rows) -> Rows:
     """Return a copy of flown rows (t,) rounded to the resolution of `DIGITS`, without negative zeros.
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.

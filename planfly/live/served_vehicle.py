@@ -58,11 +58,11 @@ def _make_vehicle(
     airframe = served_scenario.airframe
     autopilot_settings = airframe.autopilot.parameters
     parameters = vehicle_parameters(
-        flown=partial(autopilot_parameters, served_scenario.scenario),
+        autopilot_values=partial(autopilot_parameters, served_scenario.scenario),
         not_flown=() if autopilot_settings is None else autopilot_settings.not_flown,
         airspeed=airframe.airspeed,
-        slowest=airframe.aircraft.airspeed_min,
-        fastest=airframe.aircraft.airspeed_max,
+        min_airspeed=airframe.aircraft.airspeed_min,
+        max_airspeed=airframe.aircraft.airspeed_max,
         max_bank_deg=math.degrees(airframe.max_bank),
         system=SYSTEM,
         speed=speed,

@@ -10,7 +10,7 @@ from typing import Literal, TypeGuard
 from flight.autopilots.autopilot import Autopilot
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
-from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
+from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import judged_surveys
 from logs.verdict.rule_words import RULE_WORDS
@@ -169,8 +169,8 @@ class _Trials:
             if not lost_legs.isdisjoint(range(survey.first, survey.last))
         ]
         self._surveys = [all_surveys[number] for number in self._numbers]
-        self._current_turn_around = min(turn_around_of(setup.route, survey) for survey in self._surveys)
-        reasons = (kept_layout(setup.mission, setup.route, survey) for survey in self._surveys)
+        self._current_turn_around = min(min_turn_around(setup.route, survey) for survey in self._surveys)
+        reasons = (layout_obstacle(setup.mission, setup.route, survey) for survey in self._surveys)
         self.kept = next((reason for reason in reasons if reason), "")
         self.nearest: NearMiss | None = None
 

@@ -9,7 +9,7 @@ from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
 from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, FlightBlock, simulate, track_of
+from flight.simulation.simulate import Flight, FlightBlock, join_blocks, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
@@ -232,7 +232,7 @@ def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: Crash
             task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
         if end_reason:
             break
-    return track_of(blocks), end_reason
+    return join_blocks(blocks), end_reason
 
 
 def _judge_unflown(

@@ -316,12 +316,12 @@ class ArduPlane(Autopilot):
             climb_first=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
             first_bank=min(parameters.level_roll_limit, parameters.roll_limit),
             sink=parameters.tecs_sink_max or math.inf,
-            least_slope=parameters.altitude_slope_min,
+            min_slope_height=parameters.altitude_slope_min,
             rally_limit=parameters.rally_limit,
             includes_home=parameters.rally_includes_home > 0.0,
             slope_to_stated_height=True,
             lands=_LANDS.get(int(parameters.rtl_autoland), ""),
-            instead=_RETURN_PATH if int(parameters.rtl_autoland) == 4 else "",
+            deviation_note=_RETURN_PATH if int(parameters.rtl_autoland) == 4 else "",
         )
 
     @property

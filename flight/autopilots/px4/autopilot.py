@@ -258,7 +258,7 @@ class Px4(Autopilot):
         1, also use a mission's landing, which is not simulated.
 
         >>> rules = Px4(Px4Parameters.defaults()).return_rules
-        >>> rules.includes_home, rules.rally_height, rules.instead
+        >>> rules.includes_home, rules.rally_height, rules.deviation_note
         (False, 100.0, '')
         """
         parameters = self.parameters
@@ -271,8 +271,8 @@ class Px4(Autopilot):
             includes_home=return_type in (0, 3),
             holds_height=True,
             rally_height=parameters["RTL_RETURN_ALT"],
-            landing_counts=return_type == 1,
-            instead=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
+            may_use_landing=return_type == 1,
+            deviation_note=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
         )
 
     @property

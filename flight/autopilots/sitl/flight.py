@@ -27,7 +27,7 @@ from flight.mission.itinerary import UNLIMITED
 from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import GROUND_PATIENCE
-from flight.simulation.start import Release, find_release, gear_of, release
+from flight.simulation.start import Release, default_gear, find_release, release
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -206,7 +206,7 @@ class SitlFlight(ProgramFlight):
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, binary: Path) -> None:
         self._binary, self._ground_phases, gear = binary, setup.ground_phases, None
         if self._ground_phases:
-            gear = gear_of(self._ground_phases)
+            gear = default_gear(self._ground_phases)
             self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts_of(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
@@ -220,7 +220,7 @@ class SitlFlight(ProgramFlight):
         tick = self._ground_tick if self._ground_phases else autopilot_tick
         tick(self._workspace.block.copy(), self._ground.heights)
 
-    def _law(self, setup: FlightSetup) -> Autopilot:
+    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
         return self._from_ground if self._ground_phases else setup.autopilot
 
     @property
@@ -377,7 +377,7 @@ class SitlFlight(ProgramFlight):
             self._lockstep.error = (north, east, up, velocity_north, velocity_east, velocity_up)
         return status
 
-    def _fly(self, count: int) -> int:
+    def _fly_ticks(self, count: int) -> int:
         with self._errors_name_program(CrashError):
             return self._loop(count)
 

@@ -477,7 +477,7 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 @functools.lru_cache(maxsize=8)
 def _turnaround_parts(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
     """Return the waypoints and legs of all turnarounds, including the paths onto the first line and off the last."""
-    ends = [pair for survey in surveys for pair in survey.ways_onto_lines()]
+    ends = [pair for survey in surveys for pair in survey.transitions()]
     return (
         frozenset(i for first, last in ends for i in range(first, last + 1)),
         frozenset(i for first, last in ends for i in range(first, last)),

@@ -102,7 +102,7 @@ def aborted(pitch: float = math.radians(10.0), height: float = 50.0) -> tuple[Re
     for name in ("east", "north", "up"):
         start[f"velocity_{name}"] = real[f"velocity_{name}_mps"][0]
     places = landing_sequence(setup.mission, setup.scenario.origin, setup.scenario.terrain, 6)
-    landing = places[0]._replace(onward=places[1:])
+    landing = places[0]._replace(next_stops=places[1:])
     top = world.home.up + height
     found = fly_go_arounds(start, top, pitch, [landing], world.parameters, world.aircraft, world.environment)
     return found.flown[0], found.ways[0]
