@@ -34,8 +34,8 @@ class TakeOff:
     item: number of the mission item.
     home: (3,) m, on the ground.
     course: launch course, rad on the map.
-    top: altitude at the end of the take-off, m AMSL.
-    base: altitude of home, m AMSL, the reference of the autopilot's heights.
+    end_altitude: altitude at the end of the take-off, m AMSL.
+    home_altitude: altitude of home, m AMSL, the reference of the autopilot's heights.
     pitch: minimum climb pitch, rad.
     waypoint: index of the route's waypoint at which the mission continues.
     speed: ground speed at the end of the launch, m/s.
@@ -46,8 +46,8 @@ class TakeOff:
     item: int
     home: Floats
     course: float
-    top: float
-    base: float
+    end_altitude: float
+    home_altitude: float
     pitch: float
     waypoint: int
     speed: float
@@ -62,7 +62,7 @@ class TakeOff:
         if launch.method == "runway":
             return self.home.copy(), np.zeros(3)
         cos_incline, sin_incline = math.cos(launch.incline), math.sin(launch.incline)
-        rail_length = launch.run if launch.method == "catapult" else 0.0
+        rail_length = launch.effective_length if launch.method == "catapult" else 0.0
         height = _RAIL_HEIGHT_M + rail_length * sin_incline if launch.method == "catapult" else _HAND_RELEASE_HEIGHT_M
         position = np.array([*(self.home[:2] + rail_length * cos_incline * direction), self.home[2] + height])
         return position, self.speed * np.array([*(cos_incline * direction), sin_incline])
@@ -86,10 +86,10 @@ class Approach:
     leg: index of the route's last leg, which leads to the landing point.
     point: landing point at the altitude that the mission states, (3,) m.
     course: landing course, rad.
-    run: length of the leg, m.
-    begin: altitude at the start of the leg, m AMSL.
+    length: length of the leg, m.
+    start_altitude: altitude at the start of the leg, m AMSL.
     tail_wind: tail wind at the landing point on the landing course, m/s.
-    base: altitude of home, m AMSL; the landing point's altitude if the mission has no home.
+    home_altitude: altitude of home, m AMSL; the landing point's altitude if the mission has no home.
     """
 
     strip: LandingStrip
@@ -97,10 +97,10 @@ class Approach:
     leg: int
     point: Floats
     course: float
-    run: float
-    begin: float
+    length: float
+    start_altitude: float
     tail_wind: float
-    base: float
+    home_altitude: float
 
     def place(self, position: Floats) -> tuple[Floats, Floats]:
         """Return the distances of positions (n, 3) past the landing point and right of its course, (n,) m each."""

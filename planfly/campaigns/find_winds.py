@@ -153,7 +153,7 @@ def find_winds(
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """
     search, stored_flights = _Search(goal, base), _StoredFlights(store)
-    progress = _Pace(search, len(stored_flights.flown), advance)
+    progress = _ProgressReport(search, len(stored_flights.flown), advance)
     with ExitStack() as stack:
         pool: WorkerPool | None = None
         while requests := search.next_round():
@@ -290,7 +290,7 @@ def _fly_round(
     search: _Search,
     missing_requests: list[RequestedFlight],
     stored_flights: _StoredFlights,
-    progress: "_Pace",
+    progress: "_ProgressReport",
 ) -> None:
     remaining_requests = iter(missing_requests)
     requests: dict[FlightRequest, RequestedFlight] = {}
@@ -308,7 +308,7 @@ def _fly_round(
         progress.report(len(stored_flights.flown))
 
 
-class _Pace:
+class _ProgressReport:
     """Periodic progress report.  stored_count: number of flights in the table at the start."""
 
     def __init__(self, search: _Search, stored_count: int, advance: Advance | None) -> None:

@@ -227,7 +227,7 @@ class ServedFlights:
 
 
 def _loiter_item(current_item: MissionItem, center: LoiterCenter) -> MissionItem:
-    """Return a loiter around a place; values that the place does not state are taken from `current_item`."""
+    """Return a loiter around a center; values that the center does not state are taken from `current_item`."""
     has_position = math.isfinite(center.lat_deg) and math.isfinite(center.lon_deg)
     item_at_altitude = (
         replace(current_item, frame=center.frame, alt=center.alt) if math.isfinite(center.alt) else current_item

@@ -208,9 +208,9 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
         track, end_reason = _simulate_and_record(task, flight, None)
         return _judge_rows(task, requirements, track, end_reason, flight.engine)
     with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S) as recorder:
-        track, recorder.ended = _simulate_and_record(task, flight, recorder)
+        track, recorder.end_reason = _simulate_and_record(task, flight, recorder)
         rows = thin_track(track, task.every)
-        judged_flight = _judge_rows(task, requirements, rows, recorder.ended, flight.engine)
+        judged_flight = _judge_rows(task, requirements, rows, recorder.end_reason, flight.engine)
         for event in judged_flight.events:
             recorder.event(event.time, event.text, event.level)
         summary = return_summary(flight.setup, judged_flight.track) if task.returns else None

@@ -462,7 +462,11 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
             takeoff_slew(parameters),
             parameters.takeoff_throttle or parameters.throttle_max,
         )
-        ground.home_up, ground.takeoff_end_altitude, ground.launch_up = take_off.base, take_off.top, take_off.home[2]
+        ground.home_up, ground.takeoff_end_altitude, ground.launch_up = (
+            take_off.home_altitude,
+            take_off.end_altitude,
+            take_off.home[2],
+        )
         ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when the aircraft moved at 5 m/s, at which its course over the ground is known.
         acceleration = take_off.acceleration
@@ -484,11 +488,11 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
         landing_altitude = float(approach.point[2])
         glide = self.landing_glide(
-            approach.begin - landing_altitude, approach.run, approach.tail_wind, landing_altitude
+            approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
         )
         ground.has_landing, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
-        ground.glide_start_altitude, ground.slope = approach.begin, glide.slope
+        ground.glide_start_altitude, ground.slope = approach.start_altitude, glide.slope
         # `AP_TECS::_update_height_demand`.
         ground.flares_by_demand = self.parameters.version != "4.6"
         ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance

@@ -84,7 +84,7 @@ def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> Uploa
     if home is None or ground_phases.take_off is None or ground_phases.approach is None:
         raise ValueError("a mission from the ground to the ground needs a home, a take-off and a landing")
     if math.isnan(home.alt):
-        home = replace(home, alt=ground_phases.take_off.base)
+        home = replace(home, alt=ground_phases.take_off.home_altitude)
     items = []
     for item in mission.items:
         p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)

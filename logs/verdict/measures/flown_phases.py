@@ -46,7 +46,7 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
     """Return the row where the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
     if procedures.take_off is None:
         return 0
-    is_above = track.position[:, 2] > procedures.take_off.top
+    is_above = track.position[:, 2] > procedures.take_off.end_altitude
     return int(np.argmax(is_above)) if is_above.any() else len(track) - 1
 
 

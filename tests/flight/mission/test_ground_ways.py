@@ -44,7 +44,7 @@ def test_without_a_course_it_is_launched_along_the_first_leg_and_without_a_pitch
     assert take_off is not None
     assert take_off.course == pytest.approx(math.radians(90.0), abs=1e-3)
     assert take_off.pitch == DEFAULT_CLIMB_PITCH
-    assert (take_off.top, take_off.base) == pytest.approx((60.0, 0.0))
+    assert (take_off.end_altitude, take_off.home_altitude) == pytest.approx((60.0, 0.0))
 
 
 def test_the_landing_is_that_of_the_last_leg_and_its_wind() -> None:
@@ -52,7 +52,7 @@ def test_the_landing_is_that_of_the_last_leg_and_its_wind() -> None:
     assert approach is not None
     assert (approach.leg, approach.item) == (3, 5)
     assert approach.point == pytest.approx([500.0, 600.0, 0.0], abs=0.02)
-    assert approach.run == pytest.approx(600.0, abs=0.05)
+    assert approach.length == pytest.approx(600.0, abs=0.05)
     # From 60 degrees at 5 m/s, to the west: cos 30 of it from behind.
     assert approach.tail_wind == pytest.approx(4.33, abs=0.01)
     along, aside = approach.place(np.array([[450.0, 610.0, 0.0], [520.0, 595.0, 0.0]]))

@@ -57,12 +57,12 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     flown, real = fly_kept(flight), kept(flight, "landing")
     approach, track = flown.approach, flown.track
     glide = flown.setup.autopilot.landing_glide(
-        approach.begin - approach.point[2], approach.run, approach.tail_wind, float(approach.point[2])
+        approach.start_altitude - approach.point[2], approach.length, approach.tail_wind, float(approach.point[2])
     )
     assert flown.flight.ended == "completed"
     along, aside = approach.place(np.stack([real["east_m"], real["north_m"]], axis=1))
     over = real["amsl_m"] - approach.point[2]
-    final = (along < -glide.flare_distance - 10.0) & (along > -approach.run + 100.0)
+    final = (along < -glide.flare_distance - 10.0) & (along > -approach.length + 100.0)
     way, off = approach.place(np.asarray(track.position, dtype=np.float64))
     if flight != "d":  # where the last descent was too steep to be flown straight
         # As far before the point as ArduPlane's is kept.
