@@ -73,7 +73,7 @@ class TakeOff:
         course = math.degrees(self.course) % 360.0
         return (
             f"NAV_TAKEOFF (item {self.item}): launched {method_text} at home, {self.home[2]:.1f} m AMSL, on course"
-            f" {course:.0f} degrees; the first leg begins above {self.top:.1f} m AMSL"
+            f" {course:.0f} degrees; the first leg begins above {self.end_altitude:.1f} m AMSL"
         )
 
 

@@ -329,13 +329,13 @@ class _Steps:
             )
             index = None if index is None else index + 1
 
-    def _late_commands(self, early: int) -> list[int]:
+    def _late_commands(self, early_index: int) -> list[int]:
         """Return the indices of the commands that ArduPlane runs on the leg to an item.
 
-        early: index of the command that ArduPlane has already run before that leg.
+        early_index: index of the command that ArduPlane has already run before that leg.
         """
         commands: list[int] = []
-        index = self._next_item(early + 1, counting=False)
+        index = self._next_item(early_index + 1, counting=False)
         while index is not None and index not in commands and not is_navigation(self.items[index].command):
             commands.append(index)
             index = self._next_item(index + 1, counting=False)

@@ -506,13 +506,14 @@ def _offset_vertical_leg(stops: list[PlacedStop], point: Floats) -> Floats:
 
 def _merge_stops(source: str, previous: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
     """Merge a stop with the previous stop at the same position, and return the merged stop."""
-    before, new_stop = previous.stop, new.stop
+    previous_stop, new_stop = previous.stop, new.stop
     climb = float(new.position[2] - previous.position[2])
     if abs(climb) >= SAME_PLACE:
         direction = "above" if climb > 0.0 else "below"
         if new_stop.command not in TAKEOFFS:
             raise MissionError(
-                f"{source}: {_stop_name(new_stop)}: {abs(climb):.1f} m straight {direction} {_stop_name(before)}:"
+                f"{source}: {_stop_name(new_stop)}: {abs(climb):.1f} m straight {direction}"
+                f" {_stop_name(previous_stop)}:"
                 " no fixed wing flies that; two places must be identical, or at least 1 m apart over the ground",
                 file=source,
                 field=_stop_name(new_stop),
@@ -521,8 +522,8 @@ def _merge_stops(source: str, previous: PlacedStop, new: PlacedStop, notes: Note
             f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", new_stop.item
         )
     else:
-        notes.add(f"at the place of {_stop_name(before)}: merged with it", new_stop.item)
-    return before if before.item >= 0 else new_stop
+        notes.add(f"at the place of {_stop_name(previous_stop)}: merged with it", new_stop.item)
+    return previous_stop if previous_stop.item >= 0 else new_stop
 
 
 def _stop_name(stop: ItineraryStop) -> str:

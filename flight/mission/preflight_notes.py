@@ -33,7 +33,7 @@ _RING_COUNT = 13
 _DIRECTION_COUNT = 72
 
 
-def field_notes(
+def preflight_notes(
     mission: Mission, route: Route, scenario: Scenario, rules: ReturnRules, parameters: Mapping[str, float]
 ) -> tuple[str, ...]:
     """Return notes on a mission's launch, landing, home, rally points and RTL.
@@ -127,10 +127,10 @@ def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: R
     ground = scenario.terrain.height(
         home[0].east + distances * np.sin(angles), home[0].north + distances * np.cos(angles)
     )
-    highest = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
-    if highest >= rules.height:
+    ground_height = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
+    if ground_height >= rules.height:
         yield (
-            f"a return circles home {rules.height:.0f} m over it, and the ground there is {highest:.0f} m over it"
+            f"a return circles home {rules.height:.0f} m over it, and the ground there is {ground_height:.0f} m over it"
             f" within {radius:.0f} m"
         )
 
@@ -148,8 +148,8 @@ _LEVEL_TEXT = "is level"
 
 def _slope_text(slope: float) -> str:
     """Return a description of a slope of the ground (m per m)."""
-    shown = f"{abs(slope):.1%}"
-    return _LEVEL_TEXT if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
+    percent_text = f"{abs(slope):.1%}"
+    return _LEVEL_TEXT if percent_text == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {percent_text}"
 
 
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:

@@ -467,10 +467,10 @@ class _ReturnBuilder:
         Choose the shorter direction; return None if there is no such tangent.
         """
         course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
-        side = math.copysign(1.0, course_error)
+        turn_sign = math.copysign(1.0, course_error)
         arcs = [
             arc
-            for arc in (self._turn_on_side(course, side * radius), self._turn_on_side(course, -side * radius))
+            for arc in (self._turn_on_side(course, turn_sign * radius), self._turn_on_side(course, -turn_sign * radius))
             if arc
         ]
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)

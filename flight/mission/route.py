@@ -346,8 +346,10 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     )
 
 
-def _lead_point(point: np.ndarray, course: float, leg_course: float, limits: Limits, side: float) -> np.ndarray | None:
-    """Return the outer end of the lead-in (side -1) or lead-out leg (side 1), or None if no turn is needed.
+def _lead_point(
+    point: np.ndarray, course: float, leg_course: float, limits: Limits, end_sign: float
+) -> np.ndarray | None:
+    """Return the outer end of the lead-in (end_sign -1) or lead-out leg (end_sign 1), or None if no turn is needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course there, rad.
@@ -356,10 +358,10 @@ def _lead_point(point: np.ndarray, course: float, leg_course: float, limits: Lim
     turn = abs(float(wrap(course - leg_course)))
     if turn < _MIN_COURSE_CHANGE_RAD:
         return None
-    radius = limits.turn_radius(*((course, leg_course) if side < 0.0 else (leg_course, course)), float(point[2]))
+    radius = limits.turn_radius(*((course, leg_course) if end_sign < 0.0 else (leg_course, course)), float(point[2]))
     # A reversal has no tangent; twice the radius shows it as a sharp corner.
     tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
-    step = side * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
+    step = end_sign * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
     return point + step * np.array([math.sin(course), math.cos(course), 0.0])
 
 
@@ -467,7 +469,7 @@ def route_through_stops(
         takeoff_ground=placed.takeoff_ground,
         landing_ground=placed.landing_ground if landing is None else landing.ground,
         **_columns_with_nan(stops, placed.home_up),
-        unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents omits these.
+        unjoined=unjoined if loiters.steers_to_center else (),  # An autopilot that flies on tangents omits these.
         open_items=_open_items(placed.itinerary, landing, reads_as_px4),
         **return_fields,
     )
@@ -562,14 +564,14 @@ def _note_circles(itinerary: Itinerary, placed_stops: list[PlacedStop], loiters:
     placed_stops: stops of the mission, without an RTL.
     """
     final_stop = placed_stops[-1].stop
-    if loiters.unflown and (
+    if loiters.unflown_note and (
         itinerary.returns or any(placed_stop.stop.loiter is not None for placed_stop in placed_stops)
     ):
-        notes.add(loiters.unflown)
+        notes.add(loiters.unflown_note)
     if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and final_stop.loiter is None:
         notes.add(loiters.end_note(), final_stop.item)
-    if loiters.before_return and itinerary.returns and final_stop.loiter is not None:
-        notes.add(loiters.before_return, final_stop.item)
+    if loiters.rtl_exit_note and itinerary.returns and final_stop.loiter is not None:
+        notes.add(loiters.rtl_exit_note, final_stop.item)
 
 
 def _append_return(

@@ -529,16 +529,16 @@ def _without_leads(
     return tuple(inner_lines)
 
 
-def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:
-    """Shorten a line to the waypoints at a distance ``lead`` (m) from the ends of its run.
+def _without_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLine:
+    """Shorten a line to the waypoints at a distance ``lead_length`` (m) from the ends of its run.
 
     Keep an end that has no such waypoint.
     """
     inner = range(line.first + 1, line.last)
-    tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead)
+    tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead_length)
 
     def points_at_lead_distance(end: int) -> list[int]:
-        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= tolerance]
+        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead_length) <= tolerance]
 
     start_points, end_points = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
     first = start_points[0] if start_points and line.first == line.begins else line.first

@@ -105,8 +105,8 @@ class Airborne(ABC):
         self._work.pixel_map = self._ground.to_pixel.record
         self.memory = self._work.memory
         self._work.timing.dt = self.dt
-        self._work.settings.slowest = 0.94 * aircraft.stall_speed
-        self._work.settings.middle = self.map.middle
+        self._work.settings.min_airspeed = 0.94 * aircraft.stall_speed
+        self._work.settings.center_longitude = self.map.center_longitude
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
         time_limit = TIME_LIMIT_FACTOR * length / _min_ground_speed(setup, self._airspeeds) + TIME_LIMIT_BASE_S
@@ -208,7 +208,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 
     waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     """
-    if not setup.autopilot.loiter_rules.at_middle:
+    if not setup.autopilot.loiter_rules.steers_to_center:
         return 0.0
     extra_lengths = dict[int, float]()
     circles = waypoints[waypoints["loiter_radius"] != 0.0]

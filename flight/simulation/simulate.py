@@ -217,8 +217,19 @@ def join_blocks(blocks: Sequence[FlightBlock]) -> Track:
 
 # Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.
 _PATH_MEMORY_FIELDS = (
-    *("piece", "leg", "distance", "cross_track", "height_error", "done", "returning", "circled", "turned", "bearing"),
-    *("cross_track_sum", "path_bank", "path_bank_rate", "roll_offset", "roll_offset_rate", "max_arc_speed"),
+    *(
+        "piece",
+        "leg",
+        "distance",
+        "cross_track",
+        "height_error",
+        "is_finished",
+        "is_in_rtl",
+        "loiter_time",
+        "loiter_angle",
+        "bearing",
+    ),
+    *("cross_track_integrator", "path_bank", "path_bank_rate", "roll_offset", "roll_offset_rate", "max_arc_speed"),
     *("l1_leg", "l1_integrator", "course_integrator", "altitude_integrator", "slope_acceleration"),
 )
 # Records that a flight keeps when it is diverted to another route.

@@ -118,9 +118,9 @@ class WindsFound:
         return 360.0 * direction / self.goal.directions
 
     def __repr__(self) -> str:
-        lowest = min(boundary.estimate for boundary in self.boundaries)
+        speed = min(boundary.estimate for boundary in self.boundaries)
         return (
-            f"<WindsFound {len(self.boundaries)} directions, {lowest:.1f} m/s the lowest; {len(self.flights)} flights>"
+            f"<WindsFound {len(self.boundaries)} directions, {speed:.1f} m/s the lowest; {len(self.flights)} flights>"
         )
 
 
@@ -209,9 +209,9 @@ class _Search:
 
     def add_result(self, request: RequestedFlight, flight: FlownFlight) -> None:
         """Add the result of a flight; flights must be added in the order in which they were requested."""
-        flyable = flight.outcome == "flyable"
+        is_flyable = flight.outcome == "flyable"
         failure_keys: set[Hashable] = {_failure_key(rule, place) for rule, place in flight.failed} or {flight.outcome}
-        failed_keys = frozenset() if flyable else frozenset(failure_keys)
+        failed_keys = frozenset() if is_flyable else frozenset(failure_keys)
         margins: dict[Hashable, float] | None = {
             _failure_key(rule, place): fraction for rule, place, fraction in flight.narrow
         }
@@ -219,7 +219,7 @@ class _Search:
             # The rules that the flight would have passed if it had continued are unknown.
             margins = None
         self.directions[request.direction].add(request.speed, request.draw, failed_keys, margins)
-        self.flown.append((request.direction, request.speed, flyable))
+        self.flown.append((request.direction, request.speed, is_flyable))
         self._failed.append(flight.failed)
         if flight.outcome == "lost":
             self.lost.append(request.number)

@@ -296,15 +296,15 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
     properties: values of the model's properties by name.
     """
     fdm = Fdm(aircraft, tried=True, variation=Variation(properties=properties))
-    angles = [steepest_trim(fdm, aircraft.airspeed, AMSL) for steepest_trim in (full_throttle, idle)]
-    fastest_trim = fastest(fdm, AMSL)
+    angles = [trim_function(fdm, aircraft.airspeed, AMSL) for trim_function in (full_throttle, idle)]
+    max_speed_trim = fastest(fdm, AMSL)
     level = straight(fdm, aircraft.airspeed, AMSL)
     if level is not None:
         fdm.balance(level.vector())
     return np.array(
         [
             *(math.nan if trim is None else trim.climb for trim in angles),
-            math.nan if fastest_trim is None else fastest_trim.airspeed,
+            math.nan if max_speed_trim is None else max_speed_trim.airspeed,
             math.nan if level is None else math.log(float(fdm.read().power)),
         ]
     )

@@ -329,7 +329,7 @@ class ArduPlane(Autopilot):
         """Rules of loiters from WP_LOITER_RAD, the air's density, and `LOITER_ALTITUDE_TOLERANCE_M`.
 
         >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiter_rules
-        >>> rules.radius, round(rules.growth(1300.0), 3)
+        >>> rules.radius, round(rules.radius_scale(1300.0), 3)
         (-80.0, 1.135)
         """
         parameters = self.parameters
@@ -337,14 +337,14 @@ class ArduPlane(Autopilot):
             radius=parameters.loiter_radius,
             radius_name="WP_LOITER_RAD",
             radius_of=radius_read,
-            growth=_radius_growth,
-            at_middle=True,
-            lines_up=True,
+            radius_scale=_radius_growth,
+            steers_to_center=True,
+            exits_on_heading=True,
             climb=parameters.tecs_climb_max,
             sink=parameters.tecs_sink_max or math.inf,
-            short=LOITER_ALTITUDE_TOLERANCE_M,
-            unflown=_bank_limit_note(parameters.navl1_lim_bank),
-            before_return=_BEFORE_RETURN,
+            altitude_tolerance=LOITER_ALTITUDE_TOLERANCE_M,
+            unflown_note=_bank_limit_note(parameters.navl1_lim_bank),
+            rtl_exit_note=_BEFORE_RETURN,
         )
 
     @property

@@ -286,11 +286,11 @@ class Px4(Autopilot):
         return LoiterRules(
             radius=parameters["NAV_LOITER_RAD"],
             radius_name="NAV_LOITER_RAD",
-            at_middle=True,
+            steers_to_center=True,
             holds_height=True,
             climb=min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"]),
             sink=min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"]),
-            short=parameters["NAV_FW_ALT_RAD"],
+            altitude_tolerance=parameters["NAV_FW_ALT_RAD"],
             ends_in_circle=True,
         )
 

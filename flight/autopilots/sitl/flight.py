@@ -78,10 +78,10 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
         end_around(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
         cross_track, distance_past = beyond_end(work.true, path.waypoint[: settings.waypoints])
-        memory.done = distance_past >= 0.0
+        memory.is_finished = distance_past >= 0.0
         # An aircraft that loiters at the mission's end, however wide, has not missed the route.
-        memory.returning = previous.loiter_radius != 0.0 and previous.stop == last.stop
-        if memory.done:
+        memory.is_in_rtl = previous.loiter_radius != 0.0 and previous.stop == last.stop
+        if memory.is_finished:
             memory.cross_track = cross_track
     return end_tick(work)
 
@@ -124,21 +124,21 @@ def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> Non
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` is the time in s.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `loiter_time` is the time, s.
     """
     offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
     distance = max(0.1, math.hypot(offset_east, offset_north))
     radial_speed = (true.velocity_east * offset_east + true.velocity_north * offset_north) / distance
     clockwise_speed = (true.velocity_east * offset_north - true.velocity_north * offset_east) / distance
     tangential_speed = math.copysign(1.0, corner.loiter_radius) * clockwise_speed
-    if memory.circled > 0.0 or (
+    if memory.loiter_time > 0.0 or (
         distance < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * abs(corner.loiter_radius))
         and tangential_speed > abs(radial_speed)
     ):
-        memory.circled += dt
+        memory.loiter_time += dt
     # An aircraft that loiters at the mission's end, however wide, has not missed it.
-    memory.returning = True
-    memory.done = memory.circled > UNLIMITED
+    memory.is_in_rtl = True
+    memory.is_finished = memory.loiter_time > UNLIMITED
 
 
 @inner

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Mission
-from flight.mission.preflight_notes import field_notes
+from flight.mission.preflight_notes import preflight_notes
 from flight.mission.return_path import USUAL_RULES, ReturnRules
 from logs.verdict.findings import NOT_FLOWN
 from logs.verdict.rules.mission_rule import mission_findings
@@ -39,7 +39,7 @@ def notes(
     setup = setup_of(*lines, home=home)
     changes |= {} if ground is None else {"terrain": ground}
     scenario: Scenario = replace(setup.scenario, **changes)
-    found = field_notes(setup.mission, setup.route, scenario, rules, parameters or {})
+    found = preflight_notes(setup.mission, setup.route, scenario, rules, parameters or {})
     return [one for one in found if ": lands on " not in one]
 
 
@@ -47,7 +47,7 @@ def landed_on(ground: Terrain | None, wind: Wind, landing: LandingStrip | None =
     """The notes on where `WAY` lands."""
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     scenario = replace(setup.scenario, terrain=ground, wind=wind, landing=landing)
-    found = field_notes(setup.mission, setup.route, scenario, USUAL_RULES, {})
+    found = preflight_notes(setup.mission, setup.route, scenario, USUAL_RULES, {})
     return [one for one in found if ": lands on " in one]
 
 
@@ -115,7 +115,7 @@ def test_home_far_from_the_launch(north: float, told: bool) -> None:
     assert notes(*WAY, home=_home(0.0, north)) == []
     setup = setup_of(*WAY, home=_home(0.0, north))
     scenario = replace(setup.scenario, home=np.array([0.0, 0.0, 100.0]))
-    said = [one for one in field_notes(setup.mission, setup.route, scenario, ReturnRules(), {}) if "home" in one]
+    said = [one for one in preflight_notes(setup.mission, setup.route, scenario, ReturnRules(), {}) if "home" in one]
     assert bool(said) is told
     assert all(one.startswith("the mission's home is 51 m from the scenario's") for one in said)
 
@@ -175,5 +175,5 @@ def test_a_landing_sequence_that_does_not_arm(value: float | None, told: bool) -
 def test_a_mission_without_home_has_no_return_to_speak_of() -> None:
     setup = setup_of(*WAY)
     nowhere = Mission(None, setup.mission.items)
-    found = field_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {})
+    found = preflight_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {})
     assert [one for one in found if ": lands on " not in one] == []
