@@ -167,9 +167,9 @@ class ZoneTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_band(self) -> "ZoneTable":
-        for side in ("floor", "ceiling"):
-            if getattr(self, f"{side}_amsl_m") is not None and getattr(self, f"{side}_agl_m") is not None:
-                raise ValueError(f"{side}_agl_m: give {side}_amsl_m or {side}_agl_m, not both")
+        for limit_name in ("floor", "ceiling"):
+            if getattr(self, f"{limit_name}_amsl_m") is not None and getattr(self, f"{limit_name}_agl_m") is not None:
+                raise ValueError(f"{limit_name}_agl_m: give {limit_name}_amsl_m or {limit_name}_agl_m, not both")
         for datum in ("amsl", "agl"):
             floor, ceiling = getattr(self, f"floor_{datum}_m"), getattr(self, f"ceiling_{datum}_m")
             if floor is not None and ceiling is not None and ceiling <= floor:

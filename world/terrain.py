@@ -55,7 +55,7 @@ class Terrain:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle with a function that locks the raster again, as compiled code distinguishes writable arrays."""
-        return _make_locked, tuple(getattr(self, field.name) for field in fields(self))
+        return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Return the ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
@@ -73,7 +73,7 @@ class Terrain:
         return float(clearance), float(fraction)
 
 
-def _make_locked(heights: Heights, *others: Any) -> Terrain:
+def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
     heights.setflags(write=False)
     return Terrain(heights, *others)
 

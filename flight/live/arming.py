@@ -63,12 +63,12 @@ class ArmingState:
     mission_state: int = NO_MISSION
 
     @property
-    def armable(self) -> bool:
+    def can_arm(self) -> bool:
         """True if arming would be accepted now."""
         return not self.is_judging and not self._arming_refusal(False)
 
     @property
-    def starts(self) -> bool:
+    def should_start(self) -> bool:
         """True if the flight must start: armed, in AUTO, and judged."""
         return (
             self.armed
@@ -113,7 +113,7 @@ class ArmingState:
             name = plane_mode.name.removeprefix("PLANE_MODE_") if plane_mode else f"mode {mode}"
             return CommandResult(DENIED, f"{name} denied: this vehicle has {', '.join(MODE_NAMES.values())}")
         if self.flying:
-            return self._divert(mode)
+            return self._change_flight_mode(mode)
         if mode in (RTL, GUIDED):
             return CommandResult(DENIED, f"{MODE_NAMES[mode]} denied: not in flight")
         if mode == AUTO and self.last_verdict is None and not self.is_judging:
@@ -130,7 +130,7 @@ class ArmingState:
     def pause(self, should_continue: bool) -> CommandResult:
         """Loiter at the aircraft's position, or continue the mission (MAV_CMD_DO_PAUSE_CONTINUE)."""
         if self.flying:
-            return self._divert(AUTO if should_continue else LOITER)
+            return self._change_flight_mode(AUTO if should_continue else LOITER)
         return CommandResult(ACCEPTED) if should_continue else CommandResult(DENIED, "pause denied: not in flight")
 
     def go_to(self, center: LoiterCenter) -> CommandResult:
@@ -150,7 +150,7 @@ class ArmingState:
         self.mode = mode
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
-    def _divert(self, mode: int) -> CommandResult:
+    def _change_flight_mode(self, mode: int) -> CommandResult:
         """Continue the flight in another mode; the current mode changes nothing."""
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")

@@ -118,9 +118,10 @@ class WindsFound:
         return 360.0 * direction / self.goal.directions
 
     def __repr__(self) -> str:
-        speed = min(boundary.estimate for boundary in self.boundaries)
+        min_speed = min(boundary.estimate for boundary in self.boundaries)
         return (
-            f"<WindsFound {len(self.boundaries)} directions, {speed:.1f} m/s the lowest; {len(self.flights)} flights>"
+            f"<WindsFound {len(self.boundaries)} directions, {min_speed:.1f} m/s the lowest;"
+            f" {len(self.flights)} flights>"
         )
 
 

@@ -154,8 +154,10 @@ class ServedFlights:
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
         no_params, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
         items = tuple(
-            MissionItem(k, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, on_grid(lat), on_grid(lon), amsl)
-            for k, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
+            MissionItem(
+                number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, on_grid(lat), on_grid(lon), amsl
+            )
+            for number, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
         with contextlib.suppress(PlanflyError):
             setup = make_setup(scenario, self._airframe, Mission(None, items), self._served.seed)

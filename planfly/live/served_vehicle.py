@@ -35,7 +35,7 @@ def serve_vehicle(
         link = Link(access)
         exit_stack.callback(link.close)
         pool = _FlightPool(options)
-        exit_stack.callback(pool.end)
+        exit_stack.callback(pool.end_processes)
         vehicle = _make_vehicle(link, pool, served_scenario, options.speed, on_message)
         host, port = link.address
         targets = ", ".join(f"{station}:{station_port}" for station, station_port in access.to)
@@ -99,7 +99,7 @@ class _FlightPool:
         self._children.append(child)
         return link_end
 
-    def end(self) -> None:
+    def end_processes(self) -> None:
         """End the processes that are still alive."""
         end_children([child for child in self._children if child.is_alive()], _CHILD_END_TIMEOUT_S)
 

@@ -31,11 +31,11 @@ def judged(*, possible: bool = True, flyable: bool = True) -> ArmingState:
 def test_armed_in_auto_with_a_verdict_starts() -> None:
     state = judged()
     assert state.arm(True, 0.0).result == ACCEPTED
-    assert not state.starts
+    assert not state.should_start
     assert state.set_mode(AUTO).result == ACCEPTED
-    assert state.starts
+    assert state.should_start
     state.on_flight_started()
-    assert (state.starts, state.flying, state.mission_state) == (False, True, ACTIVE)
+    assert (state.should_start, state.flying, state.mission_state) == (False, True, ACTIVE)
     state.on_flight_ended(True)
     assert (state.armed, state.mode, state.mission_state) == (False, MANUAL, COMPLETE)
 
@@ -49,7 +49,7 @@ def test_an_arm_command_waits_for_the_verdict() -> None:
     state = ArmingState()
     state.on_mission_uploaded()
     assert state.arm(True, 0.0).result == IN_PROGRESS
-    assert not state.armable
+    assert not state.can_arm
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> 
     target = choose_target(rules, (0.0, 1000.0, 800.0), home, [rally])
     assert (target.name, target.position[2]) == (name, up)
     assert choose_target(rules, (0.0, 1000.0, 800.0), home, []).name == "home"
-    assert bool(rules.instead) is (kind == "RTL_TYPE 3")
+    assert bool(rules.deviation_note) is (kind == "RTL_TYPE 3")
 
 
 def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
