@@ -252,7 +252,7 @@ kind = "dem"
 
 
 def _area_and_ends_text(draft: Draft) -> str:
-    (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in side) for side in draft.box)
+    (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in span) for span in draft.box)
     ends = []
     for key, place, course in (
         ("start", draft.start, "on which the aircraft begins"),

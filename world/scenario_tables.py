@@ -256,9 +256,11 @@ class AreaTable(ScenarioTable):
     @model_validator(mode="after")
     def _check_order(self) -> "AreaTable":
         for key in ("east_m", "north_m"):
-            low, high = getattr(self, key)
-            if not high - low >= 100.0:
-                raise ValueError(f"{key}: [{low:g}, {high:g}]: the second must exceed the first by at least 100")
+            min_value, max_value = getattr(self, key)
+            if not max_value - min_value >= 100.0:
+                raise ValueError(
+                    f"{key}: [{min_value:g}, {max_value:g}]: the second must exceed the first by at least 100"
+                )
         if (
             self.ceiling_amsl_m is not None
             and self.floor_amsl_m is not None

@@ -220,7 +220,7 @@ class FlightFactory(Protocol):
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission; the prepared flight is None if the mission cannot be flown."""
 
-    def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
+    def divert(self, request: DivertFlight, position: Floats) -> PreparedFlight:
         """Return the requested route from a position (3,) on the map.
 
         Raises PlanflyError if there is no such route.

@@ -96,7 +96,7 @@ def set_altitude(mission: Mission, index: int, amsl: float, current_amsl: float)
 
 
 def insertion_index(mission: Mission, previous_index: int) -> int:
-    """Return the index at which a waypoint after an item is inserted, behind all actions at that item.
+    """Return the index for a new waypoint after an item, behind all actions at that item.
 
     >>> way = [MissionItem(k, c, 3, (0.0,) * 4, 46.0, 8.0, 75.0) for k, c in ((1, 16), (2, 206), (3, 16))]
     >>> insertion_index(Mission(None, tuple(way)), 0)

@@ -81,8 +81,12 @@ def plan_mission(
         for index in (end_waypoint, end_waypoint + 1):
             builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[index]), 0.0, 0.0), points[index])
         builder.add(Command.NAV_LAND, (procedures.descent.go_around, 0.0, 0.0, 0.0), procedures.descent.point)
-    returns = plan.scenario.returns
-    rally = () if returns is None else tuple(_rally_items(plan.scenario.origin, returns.rally, home))
+    return_requirements = plan.scenario.returns
+    rally = (
+        ()
+        if return_requirements is None
+        else tuple(_rally_items(plan.scenario.origin, return_requirements.rally, home))
+    )
     return Mission(
         home=home, items=tuple(builder.items), rally=rally, cruise_speed=_round_to_thousandths(airspeed), source=source
     )

@@ -331,13 +331,13 @@ class ItemProblem(NamedTuple):
     def __str__(self) -> str:
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
-    def at(self, file: str, where: object) -> dict[str, Any]:
+    def at(self, file: str, location: object) -> dict[str, Any]:
         """Return the arguments for a `MissionError` on this problem.
 
         file: file that holds the item.
         where: beginning of the message.
         """
-        return {"message": f"{where}: {self}", "file": file, **self._asdict()}
+        return {"message": f"{location}: {self}", "file": file, **self._asdict()}
 
 
 def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:

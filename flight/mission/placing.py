@@ -179,7 +179,7 @@ def home_point(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> 
 
 
 def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[LandingStart, ...]:
-    """Return the starts of a mission's landing sequences: the first place after each DO_LAND_START.
+    """Return the starts of a mission's landing sequences: the first position after each DO_LAND_START.
 
     A mission without a home has none, since it has nowhere to return to. Without a stated altitude a start has the
     altitude of home.

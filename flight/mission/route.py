@@ -224,7 +224,7 @@ def fly_over_waypoints(
     limits: Limits | None,
     turn_distance: Callable[[float, float], float] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return True for each waypoint that the fly-by arc at the bank limit misses, and that is flown over, (w,).
+    """Return True for each waypoint that is flown over, because the fly-by arc at the bank limit misses it, (w,).
 
     points: (w, 3) m.
     airspeed: (w - 1,) m/s.
@@ -414,7 +414,7 @@ def make_route(
 
 
 def route_through_stops(
-    placed: PlacedMission,
+    placed_mission: PlacedMission,
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
@@ -430,20 +430,22 @@ def route_through_stops(
     >>> route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist()
     [25.0]
     """
-    mission, notes = placed.mission, Notes()
-    returns, loiters, reads_as_px4, turn_distance, acceptance_limit = rules
-    all_stops = _insert_gates(placed, notes) if reads_as_px4 else list(placed.stops)
+    mission, notes = placed_mission.mission, Notes()
+    return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
+    all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else list(placed_mission.stops)
     placed_stops = [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in all_stops]
-    return_stop = placed_stops.pop() if placed.itinerary.returns else None
-    direct_landing = None if return_stop is None else _find_direct_landing(placed, placed_stops, returns, notes)
+    return_stop = placed_stops.pop() if placed_mission.itinerary.returns else None
+    direct_landing = (
+        None if return_stop is None else _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
+    )
     if direct_landing is not None:
         placed_stops += [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in direct_landing.stops]
-    lay_out = partial(_lay_out_waypoints, mission.source, limits, loiters, notes)
+    lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
     points, unjoined = lay_out(placed_stops)
-    _note_circles(placed.itinerary, placed_stops, loiters, notes)
+    _note_circles(placed_mission.itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
     if return_stop is not None and direct_landing is None:
-        return_fields, landing = _append_return(placed, return_stop.stop, points, returns, limits, notes)
+        return_fields, landing = _append_return(placed_mission, return_stop.stop, points, return_rules, limits, notes)
         if landing is not None:
             points += lay_out([_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in landing.stops])[0]
     _check_point_count(mission.source, len(points))
@@ -460,17 +462,17 @@ def route_through_stops(
         acceptance=acceptance,
         fly_over=(arcs == 0.0) & (fly_over | misses_arc),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
-        started=_start_text(placed.itinerary, stops[0], placed.origin, waypoints),
-        notes=_route_notes(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
+        started=_start_text(placed_mission.itinerary, stops[0], placed_mission.origin, waypoints),
+        notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),
         arcs=arcs,
         stops=np.cumsum([False, *(a is not b for a, b in pairwise(stops))]),
         straight_to=-1 if landing is None else [stop.item for stop in stops].index(landing.stops[0].stop.item),
-        endless=placed.itinerary.endless,
-        takeoff_ground=placed.takeoff_ground,
-        landing_ground=placed.landing_ground if landing is None else landing.ground,
-        **_columns_with_nan(stops, placed.home_up),
-        unjoined=unjoined if loiters.steers_to_center else (),  # An autopilot that flies on tangents omits these.
-        open_items=_open_items(placed.itinerary, landing, reads_as_px4),
+        endless=placed_mission.itinerary.endless,
+        takeoff_ground=placed_mission.takeoff_ground,
+        landing_ground=placed_mission.landing_ground if landing is None else landing.ground,
+        **_columns_with_nan(stops, placed_mission.home_up),
+        unjoined=unjoined if loiter_rules.steers_to_center else (),  # An autopilot that flies on tangents omits these.
+        open_items=_open_items(placed_mission.itinerary, landing, reads_as_px4),
         **return_fields,
     )
 
@@ -521,7 +523,7 @@ def _lay_out_waypoints(
 
 
 def _find_direct_landing(
-    placed: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
+    placed_mission: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
     """Return the landing sequence to which an RTL flies directly, or None.
 
@@ -530,31 +532,33 @@ def _find_direct_landing(
     if rules.lands != "straight" or not stops:
         return None
     east, north, up = stops[-1].position.tolist()
-    landing = _find_landing(placed, (east, north, up), notes)
+    landing = _find_landing(placed_mission, (east, north, up), notes)
     if landing is None:
         return None
-    distance, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
+    distance, seq = math.dist((east, north), landing.start.place[:2]), placed_mission.itinerary.stops[-1].item
     text = f"at once to the landing sequence at item {landing.start.item}, {distance / 1000.0:.1f} km away"
-    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed)}", seq)
+    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed_mission)}", seq)
     return landing
 
 
-def _find_landing(placed: PlacedMission, position: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
+def _find_landing(
+    placed_mission: PlacedMission, position: tuple[float, float, float], notes: Notes
+) -> PlacedLanding | None:
     """Return the landing sequence that an RTL chooses at a position (m).
 
     Return None and add a note if the simulated RTL does not continue to that sequence.
     """
-    start = nearest_landing_sequence(position, placed.landing_starts)
-    landing = next((landing for landing in placed.landings if landing.start == start), None)
+    start = nearest_landing_sequence(position, placed_mission.landing_starts)
+    landing = next((landing for landing in placed_mission.landings if landing.start == start), None)
     if start is not None and landing is None:
         reason = "begins with the landing itself" if start.lands else "does not lead to a landing"
         text = f"the landing sequence at item {start.item} {reason}: {RETURN_NOT_FLOWN_ON}"
-        notes.add(text, placed.itinerary.stops[-1].item)
+        notes.add(text, placed_mission.itinerary.stops[-1].item)
     return landing
 
 
-def _landing_choice_text(placed: PlacedMission) -> str:
-    count = len(placed.landing_starts)
+def _landing_choice_text(placed_mission: PlacedMission) -> str:
+    count = len(placed_mission.landing_starts)
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
 
@@ -575,7 +579,7 @@ def _note_circles(itinerary: Itinerary, placed_stops: list[PlacedStop], loiters:
 
 
 def _append_return(
-    placed: PlacedMission,
+    placed_mission: PlacedMission,
     stop: ItineraryStop,
     points: list[RoutePoint],
     rules: ReturnRules,
@@ -587,8 +591,8 @@ def _append_return(
     The landing sequence is None if the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside
     the allowed range.
     """
-    source, start = placed.mission.source, points[-1].position
-    home, *rally = placed.return_points
+    source, start = placed_mission.mission.source, points[-1].position
+    home, *rally = placed_mission.return_points
     target = choose_target(rules, start, home, rally)
     target_altitude = target.position[2]
     if not LOWEST <= target_altitude <= HIGHEST:
@@ -606,12 +610,14 @@ def _append_return(
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
-    landing = _find_landing(placed, target.position, notes) if rules.lands == "circle" else None
+    landing = _find_landing(placed_mission, target.position, notes) if rules.lands == "circle" else None
     next_text = (
-        "" if landing is None else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed)}"
+        ""
+        if landing is None
+        else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed_mission)}"
     )
     notes.add(rtl_note(target, rules, start[2], next_text), stop.item)
-    if rules.may_use_landing and any(item.command in LANDINGS for item in placed.mission.items):
+    if rules.may_use_landing and any(item.command in LANDINGS for item in placed_mission.mission.items):
         notes.add(
             "the mission's landing is also a place to return to, which is not simulated: the "
             f"return is to {target.name}",
@@ -626,14 +632,14 @@ def _append_return(
     return {"return_from": start_index, "return_to": circle}, landing
 
 
-def _insert_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
+def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[PlacedStop]:
     """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed.
 
     Each gate is placed where its plane cuts the leg, because an aircraft on the leg passes the gate there. The plane is
     perpendicular to the line from the gate to the next stop.
     """
-    placed_stops = list(placed.stops[:1])
-    for next_stop in placed.stops[1:]:
+    placed_stops = list(placed_mission.stops[:1])
+    for next_stop in placed_mission.stops[1:]:
         stop, previous, last_fraction = next_stop.stop, placed_stops[-1], 0.0
         for index, gate in enumerate(stop.gates):
             next_airspeed = stop.gates[index + 1].airspeed if index + 1 < len(stop.gates) else stop.px4_airspeed
@@ -646,7 +652,7 @@ def _insert_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
                 notes.add(text, gate.item)
                 continue
             fraction = _gate_fraction(
-                previous.position, next_stop.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg)
+                previous.position, next_stop.position, to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg)
             )
             gate_position = previous.position + fraction * (next_stop.position - previous.position)
             is_apart = (

@@ -318,7 +318,7 @@ class _Runs:
         return self._spacings[run, other_run]
 
     def next_lines(self, run: int) -> list[int]:
-        """Return the runs that can be the next line after a run, or the first part of that line, in flying order."""
+        """Return the runs after a run with which the next line may start, in flying order."""
         if run not in self._next_lines:
             self._next_lines[run] = self._find_next_lines(run)
         return self._next_lines[run]
@@ -376,13 +376,13 @@ def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of a chain that starts at a run; the first line may start before that run."""
+    """Return the lines of a chain from a run on; the first line may start before that run."""
     chain = [(start, start)]
     while True:
         first_run, last_run = chain[-1]
         for next_run in runs.next_lines(last_run):
             bend_count = 0
-            while (len(chain) == 1 or last_run - bend_count > first_run) and _stay_parallel(
+            while (len(chain) == 1 or last_run - bend_count > first_run) and _are_parallel(
                 runs, last_run, next_run, bend_count + 1
             ):
                 bend_count += 1
@@ -396,7 +396,7 @@ def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
             return chain
 
 
-def _stay_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
+def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
     """Return True if two lines are still parallel ``bend_count`` runs before and after their turn-around."""
     run_before, run_after = run - bend_count, next_run + bend_count
     if (

@@ -327,7 +327,7 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Return the limits of a path: the limits of the scenario, or those of the aircraft if it states none.
+    """Return the limits of a path: the scenario's limits, or the aircraft's limits if the scenario states none.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.

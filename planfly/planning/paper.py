@@ -181,7 +181,7 @@ def plan_section(
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use, or the number of all cores if that is unknown.
+    """Return the number of cores available to this process, or of all cores if that is unknown.
 
     >>> usable_cores() >= 1
     True

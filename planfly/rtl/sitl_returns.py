@@ -71,7 +71,7 @@ class ProgramReturn:
 
     @property
     def agrees(self) -> bool:
-        """True if both returns go to the same place and have the same kind of outcome."""
+        """True if both returns have the same target and the same kind of outcome."""
         return self.flown is not None and (self.flown.kind, self.flown.target.name) == (
             self.simulated.kind,
             self.simulated.target.name,
@@ -289,7 +289,7 @@ def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target at which a path ends, or for which it heads.
+    """Identify the target where a path ends, or the target that it heads for.
 
     All possible targets of a return are tried.  If none fits, return the target of the simulated ArduPlane.
 

@@ -332,7 +332,7 @@ class _Trials:
         )
 
     def find_airspeed(self) -> SurveyRemedy | None:
-        """Find the highest reduced airspeed that passes; None for a mission that sets its own airspeed."""
+        """Find the highest reduced airspeed that passes; None if the mission sets its own airspeed."""
         for speed, airframe in self._slower_airspeeds():
             flight = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")
             if self._passes(flight):

@@ -235,7 +235,7 @@ def _upper_word(value: Any) -> str:
 
 
 def _period_texts(applicability: Any, source: str) -> list[str]:
-    """Return the periods in which a zone applies, as in a [[zones]] table; empty for a zone that always applies."""
+    """Return the periods of activity of a zone, as in a [[zones]] table; empty for a zone that is always active."""
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):

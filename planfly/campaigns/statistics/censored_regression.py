@@ -387,20 +387,20 @@ class _Posterior:
 
     def log_density(self, points: Floats) -> Floats:
         """Return the log-density (n,) at n points, up to a constant."""
-        beta, deviations, failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
+        beta, deviations, has_failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
         predictor = self._terms @ beta.T
         predictor_without_margin = (
             self._outcomes.terms @ beta[:, : self.size].T if self.margin_coefficient else predictor
         )
         # Practically impossible, and its logarithm is so large that the other terms would be lost to rounding.
-        is_possible = (predictor_without_margin[~failed] < _MAX_PREDICTOR).all(axis=0)
+        is_possible = (predictor_without_margin[~has_failed] < _MAX_PREDICTOR).all(axis=0)
         predictor, predictor_without_margin = (
             np.where(is_possible, predictor, 0.0),
             np.where(is_possible, predictor_without_margin, 0.0),
         )
         log_densities: Floats = -0.5 * (deviations * deviations) @ self._precision
-        log_densities += self._link.log_cdf(predictor[failed]).sum(axis=0)
-        log_densities += self._link.log_survival(predictor[~failed & ~self._marginal_passes]).sum(axis=0)
+        log_densities += self._link.log_cdf(predictor[has_failed]).sum(axis=0)
+        log_densities += self._link.log_survival(predictor[~has_failed & ~self._marginal_passes]).sum(axis=0)
         if self.margin_coefficient:
             is_possible &= beta[:, -1] > 0.0
             log_densities += self._link.log_density(predictor[self._marginal_passes]).sum(axis=0)
