@@ -302,11 +302,11 @@ def renumber_items(mission: Mission) -> Mission:
     return replace(mission, items=tuple(items))
 
 
-def shift_numbers(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
+def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
     """Return items with a number added to each seq, and to the targets of jumps.
 
     >>> jump = MissionItem(3, int(Command.DO_JUMP), 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-    >>> [(item.seq, item.params[0]) for item in shift_numbers([jump], 1)]
+    >>> [(item.seq, item.params[0]) for item in shifted([jump], 1)]
     [(4, 2.0)]
     """
     shifted_items = []
