@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from flight.mission.fences import fence_zones, numbered
+from flight.mission.fences import fence_zones, number_items
 from flight.mission.items import Mission, MissionItem
 from flight.mission_files.formats import read_fence
 from planfly.flight_options import FencePaths
@@ -30,7 +30,7 @@ class NamedFences:
         warnings = mission.warnings
         if mission.fences:
             warnings = (*warnings, f"its own fence of {len(mission.fences)} items applies in addition to the one named")
-        return replace(mission, fences=numbered([*mission.fences, *self.items]), warnings=warnings)
+        return replace(mission, fences=number_items([*mission.fences, *self.items]), warnings=warnings)
 
     def add_to_scenario(self, scenario: Scenario) -> Scenario:
         """Return a scenario with the zones added.  Raises the ScenarioError of `with_zones`."""

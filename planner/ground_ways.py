@@ -46,7 +46,7 @@ class Descent:
     """Approach: waypoints from the plan's last waypoint to the line-up, and the line-up to the landing point.
 
     waypoints: (n, 3) m, before the line-up.
-    line_up: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.
+    final_waypoints: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.
     point: (3,) m, the landing point on the ground.
     course: landing course, rad clockwise from north.
     slope: slope of the straight line from the end of the line-up to the landing point, m per m.
@@ -54,7 +54,7 @@ class Descent:
     """
 
     waypoints: Floats
-    line_up: Floats
+    final_waypoints: Floats
     point: Floats
     course: float
     slope: float
@@ -62,23 +62,23 @@ class Descent:
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
-        _lock_arrays(self, "waypoints", "line_up", "point")
+        _lock_arrays(self, "waypoints", "final_waypoints", "point")
 
 
 @dataclass(frozen=True, slots=True)
-class GroundWays:
+class DepartureAndApproach:
     """Departure and approach of a plan; each is None if the scenario does not require it or if it is blocked."""
 
     climb: ClimbOut | None = None
     descent: Descent | None = None
 
 
-def _lock_arrays(ground_way: ClimbOut | Descent, *names: str) -> None:
+def _lock_arrays(procedure: ClimbOut | Descent, *names: str) -> None:
     for name in names:
-        array = np.array(getattr(ground_way, name), dtype=np.float64)
-        array = array.reshape(-1, 3) if name in ("waypoints", "line_up") else array
+        array = np.array(getattr(procedure, name), dtype=np.float64)
+        array = array.reshape(-1, 3) if name in ("waypoints", "final_waypoints") else array
         array.setflags(write=False)
-        object.__setattr__(ground_way, name, array)
+        object.__setattr__(procedure, name, array)
 
 
 # ----------------------------------------------------------------------
@@ -106,13 +106,13 @@ class _DescentFile(_FileTable):
     go_around_m: _Length
 
 
-class GroundWaysFile(_FileTable):
+class DepartureAndApproachFile(_FileTable):
     """Departure and approach of a plan as JSON: keys with units, None if missing."""
 
     climb: _ClimbFile | None = None
     descent: _DescentFile | None = None
 
-    def ways(self) -> GroundWays:
+    def ways(self) -> DepartureAndApproach:
         """Return the departure and the approach."""
         climb_file, descent_file = self.climb, self.descent
         climb = descent = None
@@ -133,15 +133,15 @@ class GroundWaysFile(_FileTable):
                 descent_file.slope,
                 descent_file.go_around_m,
             )
-        return GroundWays(climb, descent)
+        return DepartureAndApproach(climb, descent)
 
 
-def ground_ways_json(ways: GroundWays) -> dict[str, Any]:
-    """Convert departure and approach to JSON data, which `GroundWaysFile` reads.
+def departure_and_approach_json(ways: DepartureAndApproach) -> dict[str, Any]:
+    """Convert departure and approach to JSON data, which `DepartureAndApproachFile` reads.
 
     >>> climb = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 90.0]]), 0.15)
-    >>> data = ground_ways_json(GroundWays(climb))
-    >>> list(data), GroundWaysFile.model_validate(data).ways().climb.waypoints.tolist()
+    >>> data = departure_and_approach_json(DepartureAndApproach(climb))
+    >>> list(data), DepartureAndApproachFile.model_validate(data).ways().climb.waypoints.tolist()
     (['climb'], [[0.0, 600.0, 90.0]])
     """
     data: dict[str, Any] = {}
@@ -156,7 +156,7 @@ def ground_ways_json(ways: GroundWays) -> dict[str, Any]:
     if (descent := ways.descent) is not None:
         data["descent"] = {
             "waypoints_east_north_amsl_m": descent.waypoints.tolist(),
-            "line_up_east_north_amsl_m": descent.line_up.tolist(),
+            "line_up_east_north_amsl_m": descent.final_waypoints.tolist(),
             "point_east_north_amsl_m": descent.point.tolist(),
             "course_rad": descent.course,
             "slope": descent.slope,

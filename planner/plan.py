@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from planner.ground_ways import GroundWays, GroundWaysFile, ground_ways_json
+from planner.ground_ways import DepartureAndApproach, DepartureAndApproachFile, departure_and_approach_json
 from world.arrays import Floats
 from world.errors import MissionError
 from world.files import read_small_file
@@ -127,7 +127,7 @@ class Plan:
     history: Floats
     ended: str = "completed"
     flown_legs: int = 0
-    ways: GroundWays | None = None
+    ways: DepartureAndApproach | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays, and name the scores, which may be given as any four numbers."""
@@ -189,7 +189,7 @@ class _PlanFile(_Model):
     evaluations: Annotated[int, Field(ge=0)]
     ended: Literal["completed", "budget", "interrupted"] = "completed"
     flown_legs: Annotated[int, Field(ge=0)] = 0
-    ground_ways: GroundWaysFile | None = None
+    ground_ways: DepartureAndApproachFile | None = None
     feasible: bool
     safe: bool
     waypoints_east_north_amsl_m: Annotated[
@@ -235,7 +235,7 @@ def plan_json(plan: Plan) -> str:
         "feasible": plan.feasible,
         "safe": plan.safe,
         "waypoints_east_north_amsl_m": plan.waypoints.tolist(),
-        **({} if plan.ways is None else {"ground_ways": ground_ways_json(plan.ways)}),
+        **({} if plan.ways is None else {"ground_ways": departure_and_approach_json(plan.ways)}),
         "violations": plan.violations._asdict(),
         "objectives": plan.objectives._asdict(),
         "certificate": {

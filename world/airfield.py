@@ -50,7 +50,7 @@ class Launch:
     method: "catapult", "hand" or "runway".
     course: rad clockwise from north; None for the course of the mission's first leg.
     speed: ground speed at the end of the launch, m/s; None for the method's default, see `release_speed`.
-    length: length of the rail, the throw or the runway, m; None for the method's default, see `run`.
+    length: length of the rail, the throw or the runway, m; None for the method's default, see `effective_length`.
     incline: angle of the launch above level, rad.
     """
 
@@ -61,10 +61,10 @@ class Launch:
     incline: float = 0.0
 
     @property
-    def run(self) -> float:
+    def effective_length(self) -> float:
         """Length of the rail, the throw or the runway, m.
 
-        >>> Launch("catapult").run, Launch("catapult", length=4.0).run
+        >>> Launch("catapult").effective_length, Launch("catapult", length=4.0).effective_length
         (6.0, 4.0)
         """
         return _LAUNCH_LENGTH_M[self.method] if self.length is None else self.length
@@ -91,7 +91,7 @@ class Launch:
         """
         if self.method == "runway":
             return 0.0
-        return self.release_speed(min_speed) ** 2 / (2.0 * self.run)
+        return self.release_speed(min_speed) ** 2 / (2.0 * self.effective_length)
 
 
 @dataclass(frozen=True, slots=True)

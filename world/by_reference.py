@@ -89,14 +89,14 @@ def _value_type(numba_type: Any) -> Any:
     if isinstance(numba_type, types.Array):
         # Writable and read-only arrays share a kernel; copies in another process may be writable.
         return numba_type.copy(readonly=True)
-    if _is_named(numba_type):
+    if _is_named_tuple(numba_type):
         return types.BaseTuple.from_types(
             [_value_type(member) for member in numba_type.types], numba_type.instance_class
         )
     return numba_type
 
 
-def _is_named(numba_type: Any) -> bool:
+def _is_named_tuple(numba_type: Any) -> bool:
     return isinstance(numba_type, types.BaseNamedTuple)
 
 
@@ -127,7 +127,7 @@ def _find_field(reference: Reference, name: str) -> tuple[int, Any]:
     """Return the index and type of a field; the type is a pointer if the field's class is marked."""
     index = reference.tuple_type.fields.index(name)
     member = reference.tuple_type.types[index]
-    if _is_named(member) and hasattr(member.instance_class, "_address"):
+    if _is_named_tuple(member) and hasattr(member.instance_class, "_address"):
         return index, Reference(member)
     return index, member
 

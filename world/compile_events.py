@@ -9,13 +9,13 @@ _callbacks: list[BeforeCompiling] = []
 
 
 @contextmanager
-def tell_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
+def notify_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
     """Call a function before each kernel that is compiled within the block, in any thread.
 
     Of nested callbacks only the innermost is called.
 
-    >>> with tell_before_compiling(lambda: print("compiling")):
-    ...     kernel_is_compiled()
+    >>> with notify_before_compiling(lambda: print("compiling")):
+    ...     announce_compilation()
     compiling
     """
     _callbacks.append(callback)
@@ -25,7 +25,7 @@ def tell_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
         _callbacks.remove(callback)
 
 
-def kernel_is_compiled() -> None:
+def announce_compilation() -> None:
     """Call the innermost callback, because a kernel that is not in the cache is about to be compiled."""
     if _callbacks:
         _callbacks[-1]()

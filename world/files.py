@@ -257,16 +257,16 @@ def remove_temporary_folders(process_id: int) -> bool:
 
 
 @contextlib.contextmanager
-def hold(path: Path) -> Iterator[None]:
+def lock_path(path: Path) -> Iterator[None]:
     """Lock an existing file or folder for this process, until the end of the block.
 
     The system releases the lock when the process ends, in any way.  Raises PlanflyError if another process holds the
     lock, and OSError if the file cannot be opened.
 
     >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder, hold(Path(folder)):
+    >>> with TemporaryDirectory() as folder, lock_path(Path(folder)):
     ...     try:
-    ...         with hold(Path(folder)):
+    ...         with lock_path(Path(folder)):
     ...             print("never")
     ...     except PlanflyError:
     ...         print("held")

@@ -72,8 +72,8 @@ def leg_slopes(waypoints: ArrayLike) -> Floats:
     >>> leg_slopes([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [0.0, 0.0997]
     """
-    rise = np.diff(np.asarray(waypoints, dtype=np.float64)[..., 2], axis=-1)
-    return np.asarray(np.arctan2(rise, leg_runs(waypoints)))
+    altitude_changes = np.diff(np.asarray(waypoints, dtype=np.float64)[..., 2], axis=-1)
+    return np.asarray(np.arctan2(altitude_changes, leg_runs(waypoints)))
 
 
 def path_length(waypoints: ArrayLike) -> Floats:

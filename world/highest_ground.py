@@ -19,10 +19,10 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, r
 
     west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
 
-    >>> from world.terrain import gridded
+    >>> from world.terrain import gridded_terrain
     >>> line = np.arange(-100.0, 101.0, 50.0)
     >>> heights = np.maximum(0.0, 50.0 - np.hypot(*np.meshgrid(line, line)))
-    >>> cone = gridded(heights, line, line, source="made", sha256="", datum="mean sea level")
+    >>> cone = gridded_terrain(heights, line, line, source="made", sha256="", datum="mean sea level")
     >>> highest_in_cells(cone, -30.0, -10.0, 20.0, 1, 3).round(6).tolist()
     [[40.0, 50.0, 40.0]]
     """

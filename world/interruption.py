@@ -116,8 +116,8 @@ def remove_unfinished() -> bool:
     >>> remove_unfinished()
     True
     """
-    are_removed = [_remove_path(path) for path in tuple(_state.unfinished)]
-    return all(are_removed)
+    removals = [_remove_path(path) for path in tuple(_state.unfinished)]
+    return all(removals)
 
 
 def _remove_path(path: Path) -> bool:

@@ -15,7 +15,7 @@ from numba.extending import models, register_model, typeof_impl
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
-from world.compile_events import kernel_is_compiled
+from world.compile_events import announce_compilation
 from world.kernel_cache import usable_folder, wanted_folder
 from world.kernel_files import check_files
 from world.kernel_saves import CacheWriteLock
@@ -41,7 +41,7 @@ class _CompileListener(event.Listener):
 
     def on_start(self, event: Any) -> None:
         """Report a kernel before it is compiled."""
-        kernel_is_compiled()
+        announce_compilation()
 
     def on_end(self, event: Any) -> None:
         """Ignore the end of a compilation."""

@@ -41,7 +41,7 @@ _CLEARANCE_M = 60.0
 _CLEARANCE_FRACTION = 0.5
 
 
-class Place(NamedTuple):
+class GeoPosition(NamedTuple):
     """Latitude and longitude, degrees."""
 
     lat: float
@@ -53,7 +53,7 @@ class Draft:
     """Contents of a scenario file to start from.
 
     terrain: path of the elevation file as the scenario states it; None for flat ground at mean sea level.
-    start, destination: places at `height` m above ground.
+    start, destination: positions at `height` m above ground.
     box: [[east0, east1], [north0, north1]] m about `origin`.  ceiling: m above mean sea level.
     aircraft, autopilot: see [flight].  version: release of the autopilot, None for the newest.
     airspeed: cruise speed of the aircraft, m/s.
@@ -61,8 +61,8 @@ class Draft:
 
     name: str
     terrain: str | None
-    start: Place
-    destination: Place
+    start: GeoPosition
+    destination: GeoPosition
     height: float
     origin: GeoOrigin
     box: Floats
@@ -80,8 +80,8 @@ class Draft:
 
 def make_draft(
     name: str,
-    start: Place,
-    destination: Place,
+    start: GeoPosition,
+    destination: GeoPosition,
     height: float,
     *,
     raster: RasterFile | None = None,
@@ -97,19 +97,19 @@ def make_draft(
     raster: elevation file; None for flat ground.  terrain: path of that file as the scenario file states it.
     The area extends about a third of the line's length beyond the line on all sides, clipped to the elevation file's
     data.
-    Raises ArgumentError for places that are outside the file, or too near to or too far from each other, and
+    Raises ArgumentError for positions that are outside the file, or too near to or too far from each other, and
     TerrainError if there is no data even near the line.
     """
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
     length = math.hypot(east, north)
     if not _MIN_LENGTH_M <= length <= _MAX_LENGTH_M:
         message = f"expected {_MIN_LENGTH_M:g} m to {_MAX_LENGTH_M / 1000.0:g} km from `start`"
-        raise ArgumentError.of_argument("destination", destination, message, shown=_place_text(destination, length))
+        raise ArgumentError.of_argument("destination", destination, message, shown=_position_text(destination, length))
     midpoint = to_geo(GeoOrigin(*start), east / 2.0, north / 2.0)
     origin = GeoOrigin(round(float(midpoint[0]), 5), round(float(midpoint[1]), 5))
     if abs(origin.lat_deg) > _MAX_LATITUDE_DEG:
         message = f"the scenario must lie within {_MAX_LATITUDE_DEG:g}° of latitude"
-        raise ArgumentError.of_argument("destination", destination, message, shown=_place_text(destination))
+        raise ArgumentError.of_argument("destination", destination, message, shown=_position_text(destination))
     endpoints = np.array([to_map(origin, *place) for place in (start, destination)])
     margin = min(max(_MARGIN_FRACTION * length, _MIN_MARGIN_M), _MAX_MARGIN_M)
     highest_ground, bounds = 0.0, _enclosing_box(endpoints, margin)
@@ -125,21 +125,21 @@ def make_draft(
 
 
 def _survey_ground(
-    raster: RasterFile, origin: GeoOrigin, places: Mapping[str, Place], endpoints: Floats, margin: float
+    raster: RasterFile, origin: GeoOrigin, positions: Mapping[str, GeoPosition], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
     """Return an area (2, 2) with elevation data around start and destination, and its highest ground, m.
 
-    places: start and destination by their keywords.  endpoints: (2, 2) the same on the map, m.
+    positions: start and destination, keyed by their keywords.  endpoints: (2, 2) the same on the map, m.
     margin: width of ground on all sides, m.
 
-    Raises ArgumentError for a place that the file does not cover, and TerrainError.
+    Raises ArgumentError for a position that the file does not cover, and TerrainError.
     """
     for fraction in _MARGIN_REDUCTIONS:
         bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
-        for (keyword, place), endpoint in zip(places.items(), endpoints, strict=True):
+        for (keyword, position), endpoint in zip(positions.items(), endpoints, strict=True):
             if not ((bounds[:, 0] + _EDGE_M <= endpoint) & (endpoint <= bounds[:, 1] - _EDGE_M)).all():
                 message = f"outside {raster.name} or within {_EDGE_M:g} m of its edge: it covers {cover_text(raster)}"
-                raise ArgumentError.of_argument(keyword, place, message, shown=_place_text(place))
+                raise ArgumentError.of_argument(keyword, position, message, shown=_position_text(position))
         try:
             return bounds, float(np.nanmax(read_terrain(raster, origin, bounds, 0.0).heights))
         except TerrainError:
@@ -153,7 +153,7 @@ def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
     return np.stack([endpoints.min(axis=0) - margin, endpoints.max(axis=0) + margin], axis=1)
 
 
-def _place_text(place: Place, length: float | None = None) -> str:
+def _position_text(place: GeoPosition, length: float | None = None) -> str:
     position = f"{place.lat:g},{place.lon:g}"
     return position if length is None else f"{position}, {length / 1000.0:,.3g} km away"
 
@@ -173,7 +173,7 @@ def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats
 def draft_text(draft: Draft) -> str:
     """Write the scenario file of a draft as TOML text.
 
-    >>> place, there = Place(46.5, 8.0), Place(46.55, 8.05)
+    >>> place, there = GeoPosition(46.5, 8.0), GeoPosition(46.55, 8.05)
     >>> print(draft_text(make_draft("site", place, there, 120.0)).split("[area]")[0])
     # From 46.5, 8 to 46.55, 8.05.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
     # All keys: docs/scenario-file.md of planfly.
@@ -252,7 +252,7 @@ kind = "dem"
 
 
 def _area_and_ends_text(draft: Draft) -> str:
-    (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in side) for side in draft.box)
+    (east0, east1), (north0, north1) = (tuple(f"{value:.0f}" for value in span) for span in draft.box)
     ends = []
     for key, place, course in (
         ("start", draft.start, "on which the aircraft begins"),
@@ -309,7 +309,8 @@ def _examples_text(draft: Draft) -> str:
     """Return the commented examples: a threat and a zone near the straight line, small enough to fly around."""
     radius = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
     threat, zone = (
-        Place(*(float(degrees) for degrees in to_geo(draft.origin, *point))) for point in _example_places(draft, radius)
+        GeoPosition(*(float(degrees) for degrees in to_geo(draft.origin, *point)))
+        for point in _example_positions(draft, radius)
     )
     return f"""\
 # A threat: a missile, a radar, or both; on the ground unless a height is given.
@@ -337,7 +338,7 @@ def _examples_text(draft: Draft) -> str:
 """
 
 
-def _example_places(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
+def _example_positions(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
     """Return a position on each side of the straight line, a third of its length from each end, m."""
     endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
     straight_line = endpoints[1] - endpoints[0]

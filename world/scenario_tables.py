@@ -19,40 +19,44 @@ from world.height_datum import MAX_SEA_LEVEL, NamedDatum, StatedDatum
 MAP_EXTENT = 500_000.0
 
 
-def no_line_break(text: str) -> str:
+def check_no_line_break(text: str) -> str:
     """Return the text; raise ValueError if it is not a single printable line."""
     if not text.isprintable():
         raise ValueError("control characters are not allowed")
     return text
 
 
-def within(low: float, high: float, *, above: bool = False, below: bool = False, also: str = "") -> AfterValidator:
-    """Make a validator that allows ``low``..``high`` and names this range in its error.
+def in_range(
+    min_value: float, max_value: float, *, exclude_min: bool = False, exclude_max: bool = False, also: str = ""
+) -> AfterValidator:
+    """Make a validator that allows ``min_value``..``max_value`` and names this range in its error.
 
-    above, below: exclude ``low``, exclude ``high``.
+    exclude_min, exclude_max: exclude ``min_value``, exclude ``max_value``.
     also: text for the message about other values that the field takes.
     """
 
     def check(value: float) -> float:
         # The comparisons are written so that NaN fails.
-        if (low < value if above else low <= value) and (value < high if below else value <= high):
+        if (min_value < value if exclude_min else min_value <= value) and (
+            value < max_value if exclude_max else value <= max_value
+        ):
             return value
-        low_prefix, high_prefix = ("above " if above else ""), ("below " if below else "")
-        low_text, high_text = (bound if isinstance(bound, int) else f"{bound:.12g}" for bound in (low, high))
+        low_prefix, high_prefix = ("above " if exclude_min else ""), ("below " if exclude_max else "")
+        low_text, high_text = (bound if isinstance(bound, int) else f"{bound:.12g}" for bound in (min_value, max_value))
         raise ValueError(f"allowed {low_prefix}{low_text}..{high_prefix}{high_text}{also}")
 
     return AfterValidator(check)
 
 
-Metres = Annotated[float, within(-MAP_EXTENT, MAP_EXTENT)]
-Amsl = Annotated[float, within(-500.0, 9000.0)]
-Height = Annotated[float, within(0.0, 9000.0)]
-Latitude = Annotated[float, within(-89.0, 89.0)]
-Longitude = Annotated[float, within(-180.0, 180.0)]
-Course = Annotated[float, within(-360.0, 360.0)]
-Radius = Annotated[float, within(0.0, 200_000.0, above=True)]
-Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(no_line_break)]
-FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(no_line_break)]
+Metres = Annotated[float, in_range(-MAP_EXTENT, MAP_EXTENT)]
+Amsl = Annotated[float, in_range(-500.0, 9000.0)]
+Height = Annotated[float, in_range(0.0, 9000.0)]
+Latitude = Annotated[float, in_range(-89.0, 89.0)]
+Longitude = Annotated[float, in_range(-180.0, 180.0)]
+Course = Annotated[float, in_range(-360.0, 360.0)]
+Radius = Annotated[float, in_range(0.0, 200_000.0, exclude_min=True)]
+Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(check_no_line_break)]
+FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(check_no_line_break)]
 Guidance = Literal["path", "l1", "vector-field"]
 Navigation = Literal["perfect", "rtk", "gnss"]
 # ArduPlane releases with different control laws.
@@ -61,9 +65,12 @@ NEWEST_ARDUPLANE: ArduPlaneVersion = "4.7"
 # PX4 releases with different control laws.
 Px4Version = Literal["1.16", "1.17"]
 NEWEST_PX4: Px4Version = "1.17"
-Seed = Annotated[int, within(0, 2**63 - 1)]
+Seed = Annotated[int, in_range(0, 2**63 - 1)]
 Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
-Angle = Annotated[float, within(0.0, 90.0, above=True, below=True, also=', or "aircraft"')] | Literal["aircraft"]
+Angle = (
+    Annotated[float, in_range(0.0, 90.0, exclude_min=True, exclude_max=True, also=', or "aircraft"')]
+    | Literal["aircraft"]
+)
 
 
 class ScenarioTable(BaseModel):
@@ -106,7 +113,7 @@ def _check_span(text: str) -> str:
 
 _ZoneTime = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_check_period)]
 _MetreCorner = Annotated[list[Metres], Field(min_length=2, max_length=2)]
-_Degrees = Annotated[float, within(-180.0, 180.0)]
+_Degrees = Annotated[float, in_range(-180.0, 180.0)]
 _DegreeCorner = Annotated[list[_Degrees], Field(min_length=2, max_length=2), AfterValidator(_check_latitude)]
 _MetreRing = Annotated[list[_MetreCorner], Field(max_length=MAX_CORNERS)]
 _DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MAX_CORNERS)]
@@ -160,9 +167,9 @@ class ZoneTable(ScenarioTable):
 
     @model_validator(mode="after")
     def _check_band(self) -> "ZoneTable":
-        for side in ("floor", "ceiling"):
-            if getattr(self, f"{side}_amsl_m") is not None and getattr(self, f"{side}_agl_m") is not None:
-                raise ValueError(f"{side}_agl_m: give {side}_amsl_m or {side}_agl_m, not both")
+        for limit_name in ("floor", "ceiling"):
+            if getattr(self, f"{limit_name}_amsl_m") is not None and getattr(self, f"{limit_name}_agl_m") is not None:
+                raise ValueError(f"{limit_name}_agl_m: give {limit_name}_amsl_m or {limit_name}_agl_m, not both")
         for datum in ("amsl", "agl"):
             floor, ceiling = getattr(self, f"floor_{datum}_m"), getattr(self, f"ceiling_{datum}_m")
             if floor is not None and ceiling is not None and ceiling <= floor:
@@ -182,8 +189,8 @@ class PeakTable(ScenarioTable):
 
     east_m: Metres
     north_m: Metres
-    height_m: Annotated[float, within(0.0, 9000.0, above=True)]
-    sigma_m: Annotated[float, within(10.0, 100_000.0)]
+    height_m: Annotated[float, in_range(0.0, 9000.0, exclude_min=True)]
+    sigma_m: Annotated[float, in_range(10.0, 100_000.0)]
 
 
 def _check_datum(datum: StatedDatum) -> StatedDatum:
@@ -220,7 +227,7 @@ class TerrainTable(ScenarioTable):
     path: Annotated[FilePath | list[FilePath] | None, BeforeValidator(_check_paths)] = None
     peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
     amsl_m: Amsl | None = None
-    vertical_error_m: Annotated[float, within(0.0, 1000.0)] | None = None
+    vertical_error_m: Annotated[float, in_range(0.0, 1000.0)] | None = None
     height_datum: Annotated[str | float, AfterValidator(_check_datum)] | None = None
     sha256: str | None = None
 
@@ -249,9 +256,11 @@ class AreaTable(ScenarioTable):
     @model_validator(mode="after")
     def _check_order(self) -> "AreaTable":
         for key in ("east_m", "north_m"):
-            low, high = getattr(self, key)
-            if not high - low >= 100.0:
-                raise ValueError(f"{key}: [{low:g}, {high:g}]: the second must exceed the first by at least 100")
+            min_value, max_value = getattr(self, key)
+            if not max_value - min_value >= 100.0:
+                raise ValueError(
+                    f"{key}: [{min_value:g}, {max_value:g}]: the second must exceed the first by at least 100"
+                )
         if (
             self.ceiling_amsl_m is not None
             and self.floor_amsl_m is not None
@@ -335,14 +344,14 @@ class LimitsTable(ScenarioTable):
     max_height_m: largest height above ground; None for no limit.
     """
 
-    max_turn_deg: Annotated[float, within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
-        "aircraft"
-    )
+    max_turn_deg: (
+        Annotated[float, in_range(0.0, 180.0, exclude_min=True, also=', or "aircraft"')] | Literal["aircraft"]
+    ) = "aircraft"
     max_climb_deg: Angle = "aircraft"
     max_dive_deg: Angle = "aircraft"
-    min_clearance_m: Annotated[float, within(0.0, 5000.0)] = 30.0
-    max_height_m: Annotated[float, within(0.0, 9000.0, above=True)] | None = None
-    corridor_m: Annotated[float, within(1.0, 5000.0)] | None = None
+    min_clearance_m: Annotated[float, in_range(0.0, 5000.0)] = 30.0
+    max_height_m: Annotated[float, in_range(0.0, 9000.0, exclude_min=True)] | None = None
+    corridor_m: Annotated[float, in_range(1.0, 5000.0)] | None = None
     surveys: Literal["lines", "path"] | None = None
 
     @model_validator(mode="after")
@@ -357,8 +366,8 @@ class LimitsTable(ScenarioTable):
 class GoalsTable(ScenarioTable):
     """[planner.goals]: goals of the second preference level."""
 
-    length_ratio: Annotated[float, within(1.0, 100.0)] | None = None
-    kill_exposure: Annotated[float, within(0.0, 1e9)] | None = None
+    length_ratio: Annotated[float, in_range(1.0, 100.0)] | None = None
+    kill_exposure: Annotated[float, in_range(0.0, 1e9)] | None = None
 
 
 class PlannerTable(ScenarioTable):
@@ -371,13 +380,13 @@ class PlannerTable(ScenarioTable):
 
     algorithm: Name | None = None
     objective: Literal["length", "time", "energy"] | None = None
-    waypoints: Annotated[int, within(3, 500)] = 12
-    population: Annotated[int, within(4, 100_000)] = 200
-    generations: Annotated[int, within(0, 100_000)] = 100
-    across_m: Annotated[float, within(0.0, MAP_EXTENT, above=True)] | None = None
-    zone_margin_m: Annotated[float, within(0.0, 5000.0)] | None = None
+    waypoints: Annotated[int, in_range(3, 500)] = 12
+    population: Annotated[int, in_range(4, 100_000)] = 200
+    generations: Annotated[int, in_range(0, 100_000)] = 100
+    across_m: Annotated[float, in_range(0.0, MAP_EXTENT, exclude_min=True)] | None = None
+    zone_margin_m: Annotated[float, in_range(0.0, 5000.0)] | None = None
     goals: GoalsTable = GoalsTable()
-    budget: Annotated[int, within(4, 10**10)] | None = None
+    budget: Annotated[int, in_range(4, 10**10)] | None = None
     seed: Seed | None = None
 
 
@@ -428,8 +437,8 @@ class FlightTable(ScenarioTable):
 
     aircraft: FilePath = "aerosonde"  # an embedded name, or a folder if it has a slash
     aircraft_by_default: Literal[True] | None = None  # set if no aircraft was named for a mission
-    airspeed_mps: Annotated[float, within(15.0, 60.0)] | None = None
-    max_bank_deg: Annotated[float, within(5.0, 60.0)] = 30.0
+    airspeed_mps: Annotated[float, in_range(15.0, 60.0)] | None = None
+    max_bank_deg: Annotated[float, in_range(5.0, 60.0)] = 30.0
     autopilot: Name | None = None
     autopilot_from: FilePath | None = None  # set if the autopilot was inferred from a file
     params: FilePath | None = None
@@ -440,7 +449,7 @@ class FlightTable(ScenarioTable):
     nav: Navigation | None = None
     fly_over: bool = False
     motor_braking: bool = False
-    battery_wh: Annotated[float, within(0.0, 100_000.0, above=True)] | None = None
+    battery_wh: Annotated[float, in_range(0.0, 100_000.0, exclude_min=True)] | None = None
 
     @model_validator(mode="after")
     def _check_autopilot(self) -> "FlightTable":
@@ -488,9 +497,9 @@ class FlightTable(ScenarioTable):
 class WindTable(ScenarioTable):
     """[wind]: gradient in m/s per metre of height above the start."""
 
-    speed_mps: Annotated[float, within(0.0, 40.0)] = 0.0
+    speed_mps: Annotated[float, in_range(0.0, 40.0)] = 0.0
     from_deg: Course = 0.0
-    gradient: Annotated[float, within(-0.05, 0.05)] = 0.0
+    gradient: Annotated[float, in_range(-0.05, 0.05)] = 0.0
     turbulence: Literal["none", "light", "moderate"] = "none"
     seed: Seed | None = None
 
@@ -536,9 +545,9 @@ class LaunchTable(ScenarioTable):
 
     method: LaunchMethod
     course_deg: Course | None = None
-    speed_mps: Annotated[float, within(1.0, 60.0)] | None = None
-    length_m: Annotated[float, within(0.1, 3000.0)] | None = None
-    incline_deg: Annotated[float, within(0.0, 45.0)] | None = None
+    speed_mps: Annotated[float, in_range(1.0, 60.0)] | None = None
+    length_m: Annotated[float, in_range(0.1, 3000.0)] | None = None
+    incline_deg: Annotated[float, in_range(0.0, 45.0)] | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -580,13 +589,13 @@ class LandingTable(PositionTable):
     """
 
     course_deg: Annotated[
-        Annotated[float, within(-360.0, 360.0, also=_OR_WIND)] | Literal["wind"], BeforeValidator(_check_course)
+        Annotated[float, in_range(-360.0, 360.0, also=_OR_WIND)] | Literal["wind"], BeforeValidator(_check_course)
     ] = "wind"
-    length_m: Annotated[float, within(20.0, 5000.0)] = 200.0
-    width_m: Annotated[float, within(5.0, 500.0)] = 40.0
-    approach_m: Annotated[float, within(200.0, 5000.0)] | None = None
-    slope_deg: Annotated[float, within(1.0, 20.0)] | None = None
-    height_sd_m: Annotated[float, within(0.0, 20.0)] | None = None
+    length_m: Annotated[float, in_range(20.0, 5000.0)] = 200.0
+    width_m: Annotated[float, in_range(5.0, 500.0)] = 40.0
+    approach_m: Annotated[float, in_range(200.0, 5000.0)] | None = None
+    slope_deg: Annotated[float, in_range(1.0, 20.0)] | None = None
+    height_sd_m: Annotated[float, in_range(0.0, 20.0)] | None = None
 
     @model_validator(mode="after")
     def _check_position(self) -> "LandingTable":
@@ -628,7 +637,7 @@ class ReturnsTable(ScenarioTable):
     """
 
     require: list[ReturnDemand] | None = None
-    rtl_altitude_m: Annotated[float, within(1.0, 9000.0)] | None = None
+    rtl_altitude_m: Annotated[float, in_range(1.0, 9000.0)] | None = None
     rtl_autoland: Annotated[Literal[1, 2, 3], BeforeValidator(_check_autoland)] | None = None
     rally: Annotated[list[RallyTable], Field(min_length=1, max_length=100)] | None = None
 
@@ -653,7 +662,7 @@ class ScenarioFile(ScenarioTable):
     """
 
     name: Name
-    description: Annotated[str, Field(max_length=500), AfterValidator(no_line_break)] = ""
+    description: Annotated[str, Field(max_length=500), AfterValidator(check_no_line_break)] = ""
     origin: OriginTable | None = None
     terrain: TerrainTable
     area: AreaTable | None = None

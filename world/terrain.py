@@ -55,7 +55,7 @@ class Terrain:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle with a function that locks the raster again, as compiled code distinguishes writable arrays."""
-        return _make_locked, tuple(getattr(self, field.name) for field in fields(self))
+        return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Return the ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
@@ -73,7 +73,7 @@ class Terrain:
         return float(clearance), float(fraction)
 
 
-def _make_locked(heights: Heights, *others: Any) -> Terrain:
+def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
     heights.setflags(write=False)
     return Terrain(heights, *others)
 
@@ -231,7 +231,9 @@ def _piece_clearance(
     return min_clearance, min_fraction
 
 
-def gridded(function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str) -> Terrain:
+def gridded_terrain(
+    function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str
+) -> Terrain:
     """Make terrain on a regular map grid: heights (n, e) at north (n,) and east (e,), both increasing and even."""
     step_e, step_n = east[1] - east[0], north[1] - north[0]
     to_pixel = fit_polymap(
@@ -246,7 +248,9 @@ def flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
     """Make level ground over bounds [[e0, e1], [n0, n1]] and a buffer around them, m."""
     east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
     north = np.linspace(bounds[1, 0] - buffer, bounds[1, 1] + buffer, 3)
-    return gridded(np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level")
+    return gridded_terrain(
+        np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level"
+    )
 
 
 class Peak(NamedTuple):
@@ -278,4 +282,4 @@ def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terra
             np.exp(-((east - peak.east) ** 2) / (2 * peak.sigma**2)),
         )
     source = f"{len(peaks)} Gaussian peak{'s' * (len(peaks) != 1)}"
-    return gridded(heights, east, north, source=source, sha256="", datum="mean sea level")
+    return gridded_terrain(heights, east, north, source=source, sha256="", datum="mean sea level")

@@ -13,7 +13,7 @@ from aircraft.model_writer import AeroCoefficients, ModelNumbers, model_xml
 from aircraft.propulsion import ActuatorDisc, ShaftPower
 from flight.dynamics.fdm import Fdm
 from flight.guidance.model_gains import gains_of_model, gains_text
-from planfly.workflow.data_sheets import arduplane_parameters, performance_of, servo_text
+from planfly.workflow.data_sheets import arduplane_parameters, measure_performance, servo_text
 
 # Beard and McLain, first edition, appendix E.1.  The table's drag due to elevator is linear (0.30 a radian) and would
 # propel an aircraft that trims with its elevons up; it is left out, as is the table's drag due to angle of attack,
@@ -175,7 +175,7 @@ def write(name: str) -> None:
     (folder / f"{name}.xml").write_text(model_xml(name, PUBLISHED[name]), encoding="utf-8")
     aircraft = load_aircraft(name)
     fdm = Fdm(aircraft)
-    flown = performance_of(fdm, aircraft)
+    flown = measure_performance(fdm, aircraft)
     climb, sink = math.degrees(flown.climb.climb), math.degrees(flown.idle.climb)
     slow, fast = flown.slowest.airspeed, flown.fastest.airspeed
     print(f"{name}: level {flown.level}\n  climb {climb:.1f}, idle {sink:.1f} degrees; {slow:.2f} to {fast:.2f} m/s")

@@ -23,7 +23,7 @@ from benchmarks.flight import Errors, errors_of, flown_with, straight_rms
 from benchmarks.tuning.tuning_missions import Case, cases
 from flight.dynamics.fdm import JSBSIM_VERSION
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.model_gains import TYPICAL_GAINS, airframe_gains, at_airspeed
+from flight.guidance.model_gains import TYPICAL_GAINS, airframe_gains, gains_at_airspeed
 from flight.simulation import simulate as simulation
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
 from tests.setups import MakeSetup, setup_maker, standard
@@ -232,7 +232,7 @@ def main() -> None:
     make = setup_maker(aircraft)
     own = {name: float(f"{value:.4g}") for name, value in airframe_gains(aircraft).items()}
     print("off the model: " + ", ".join(f"{name} {value:.4g}" for name, value in own.items()))
-    gains = replace(load_gains(aircraft), **own, **at_airspeed(aircraft.airspeed))
+    gains = replace(load_gains(aircraft), **own, **gains_at_airspeed(aircraft.airspeed))
     trained = cases(aircraft, make, args.seed, TRAINED[aircraft.name])
     fresh = cases(aircraft, make, args.seed, REPORTED)
     with Trial(aircraft, trained) as trial:

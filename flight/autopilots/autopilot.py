@@ -23,7 +23,7 @@ from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
 from aircraft.tracking import TrackingError
 from flight.dynamics.instructions import Code
-from flight.mission.ground_ways import GroundWays
+from flight.mission.ground_ways import GroundPhases
 from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
 from flight.mission.return_path import USUAL_RULES, ReturnRules
 from flight.mission.route import RouteRules
@@ -386,7 +386,9 @@ class Autopilot(ABC):
         """
         return
 
-    def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "GroundAutopilot":
+    def from_ground(
+        self, ground_phases: GroundPhases, aircraft: Aircraft, contacts: Sequence[Contact]
+    ) -> "GroundAutopilot":
         """Return the autopilot that also flies a take-off and a landing; only for an autopilot that `flies_ground`.
 
         contacts: contact points of the aircraft.

@@ -23,13 +23,13 @@ GUIDANCE_MEMORY = record_dtype(
     "cross_track",  # m right of the path
     "height_error",  # m above the path
     "speed_command",  # m/s, commanded airspeed
-    ("done", np.bool_),  # past the end of the path
-    ("returning", np.bool_),  # on an RTL that the autopilot flies by itself and that cannot miss the path's end
-    "circled",  # s since the aircraft arrived at the loiter of that RTL, at the loiter's altitude
-    "turned",  # rad flown around the loiter since then, positive to the right
+    ("is_finished", np.bool_),  # past the end of the path
+    ("is_in_rtl", np.bool_),  # on an RTL that the autopilot flies by itself and that cannot miss the path's end
+    "loiter_time",  # s since the aircraft arrived at the loiter of that RTL, at the loiter's altitude
+    "loiter_angle",  # rad flown around the loiter since then, positive to the right
     "bearing",  # rad, bearing from the loiter's center, a tick ago
     # Lateral: the cross-track law.
-    "cross_track_sum",  # m s
+    "cross_track_integrator",  # m s
     "last_velocity_east",  # m/s over the ground, a tick ago
     "last_velocity_north",
     "last_velocity_up",

@@ -149,5 +149,5 @@ def field_course(
         return course - approach * 2.0 / math.pi * math.atan(path_gain * cross_track)
     # Outside a right turn is left of it: cross_track is then negative, and -cross_track * curvature is distance over
     # radius.
-    side = math.copysign(1.0, curvature)
-    return course + side * math.atan(-orbit_gain * cross_track * curvature)
+    turn_sign = math.copysign(1.0, curvature)
+    return course + turn_sign * math.atan(-orbit_gain * cross_track * curvature)

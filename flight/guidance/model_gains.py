@@ -74,7 +74,7 @@ _FIXED_GAINS = {
 }
 
 
-def at_airspeed(airspeed: float) -> dict[str, float]:
+def gains_at_airspeed(airspeed: float) -> dict[str, float]:
     """Return `TYPICAL_GAINS` scaled to an airspeed, m/s.
 
     The gains of control surfaces stay unchanged, because they are scaled with airspeed elsewhere.
@@ -149,7 +149,7 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     a, b = linearise(fdm, level)
     airframe = _gains_of_matrices(aircraft, a, b)
     gains = (
-        at_airspeed(aircraft.airspeed)
+        gains_at_airspeed(aircraft.airspeed)
         | airframe
         | _FIXED_GAINS
         | {"throttle_idle": idle_throttle(aircraft, fdm, level)}

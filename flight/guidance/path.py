@@ -67,14 +67,14 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
     # From the center, which lies right of the start by 1 / curvature.
     center_to_east = offset_east - math.cos(course) / curvature
     center_to_north = offset_north + math.sin(course) / curvature
-    side = math.copysign(1.0, curvature)
-    path_course = math.atan2(side * center_to_north, -side * center_to_east)
-    angle = wrap(path_course - course) * side
+    turn_sign = math.copysign(1.0, curvature)
+    path_course = math.atan2(turn_sign * center_to_north, -turn_sign * center_to_east)
+    angle = wrap(path_course - course) * turn_sign
     if angle < -0.5 * math.pi:
         angle += 2.0 * math.pi
     return (
         angle / abs(curvature),
-        side * (1.0 / abs(curvature) - math.hypot(center_to_east, center_to_north)),
+        turn_sign * (1.0 / abs(curvature) - math.hypot(center_to_east, center_to_north)),
         path_course,
     )
 
@@ -97,7 +97,7 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
     memory.distance = piece.start + distance
     memory.leg = piece.leg + (1 if memory.distance > piece.leg_change else 0)
     memory.cross_track = cross_track
-    memory.done = index + 1 == pieces.shape[0] and distance >= piece.length
+    memory.is_finished = index + 1 == pieces.shape[0] and distance >= piece.length
     return course
 
 
@@ -227,16 +227,16 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
-    courses, runs, turns = leg_courses(points), leg_runs(points), _turn_angles(route, swing)
-    tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, runs, turns)
+    courses, leg_lengths, turns = leg_courses(points), leg_runs(points), _turn_angles(route, swing)
+    tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, leg_lengths, turns)
     return_lengths *= swing != "none"
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
     # A loiter at the start of the flight may end where it starts.
-    slopes = np.divide(np.diff(points[:, 2]), runs, out=np.zeros_like(runs), where=runs > 0.0)
+    slopes = np.divide(np.diff(points[:, 2]), leg_lengths, out=np.zeros_like(leg_lengths), where=leg_lengths > 0.0)
     distance, piece_start = 0.0, points[0, :2].copy()
     for leg in range(route.legs):
-        straight_length = runs[leg] - tangents[leg] - return_lengths[leg] - tangents[leg + 1]
+        straight_length = leg_lengths[leg] - tangents[leg] - return_lengths[leg] - tangents[leg + 1]
         course = float(courses[leg])
         if terrain is not None and math.isfinite(route.above_ground[leg + 1]):
             nodes += _ground_following_corners(route, terrain, leg, piece_start, course, distance, straight_length)
@@ -338,7 +338,7 @@ def _ground_following_corners(
 
 
 def _arcs_at_waypoints(
-    route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats
+    route: Route, limits: Limits, courses: Floats, leg_lengths: Floats, turns: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Return tangent lengths, radii and return lengths of the arcs at each waypoint, (w,) m each.
 
@@ -360,21 +360,21 @@ def _arcs_at_waypoints(
         elif math.isfinite(radius):
             radii[i], return_lengths[i] = radius, radius * (math.sin(turn) + 2.0 * math.sin(_overshoot_angle(turn)))
     is_sharp = np.concatenate([[False], np.abs(turns) > SHARPEST_FLY_BY_RAD, [False]])
-    is_short = tangents[:-1] + tangents[1:] > runs
+    is_short = tangents[:-1] + tangents[1:] > leg_lengths
     tangents[is_sharp & (np.append(is_short, False) | np.append(False, is_short))] = 0.0
     # In this wind a turn may have no radius; use the longest arc that fits.
-    tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(runs[:-1], runs[1:]))
+    tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(leg_lengths[:-1], leg_lengths[1:]))
     full_tangents = tangents.copy()
-    for leg in range(len(runs)):
+    for leg in range(len(leg_lengths)):
         required = full_tangents[leg] + full_tangents[leg + 1]
-        if required > runs[leg]:
-            fraction = runs[leg] / required
+        if required > leg_lengths[leg]:
+            fraction = leg_lengths[leg] / required
             tangents[leg] = min(tangents[leg], full_tangents[leg] * fraction)
             tangents[leg + 1] = min(tangents[leg + 1], full_tangents[leg + 1] * fraction)
     arc_indices = np.flatnonzero(tangents)
     radii[arc_indices] = tangents[arc_indices] / np.tan(np.abs(turns[arc_indices - 1]) / 2)
     # A leg that is too short for its return arcs has a sharp corner.
-    return_lengths[:-1][return_lengths[:-1] + tangents[1:] > runs] = 0.0
+    return_lengths[:-1][return_lengths[:-1] + tangents[1:] > leg_lengths] = 0.0
     return tangents, radii, return_lengths
 
 
@@ -396,14 +396,14 @@ def _fly_over_arcs(
 
     turn: rad, positive to the right.
     """
-    side, overshoot = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
+    turn_sign, overshoot = math.copysign(1.0, turn), _overshoot_angle(abs(turn))
     half_angle = 0.5 * (abs(turn) + overshoot)
     arcs, arc_start, heading = [], corner, course
-    for angle, arc_side in ((half_angle, side), (half_angle, side), (overshoot, -side)):
-        arcs.append((arc_start, heading, arc_side / radius, radius * angle))
-        end_course = heading + arc_side * angle
+    for angle, arc_sign in ((half_angle, turn_sign), (half_angle, turn_sign), (overshoot, -turn_sign)):
+        arcs.append((arc_start, heading, arc_sign / radius, radius * angle))
+        end_course = heading + arc_sign * angle
         step = math.cos(heading) - math.cos(end_course), math.sin(end_course) - math.sin(heading)
-        arc_start, heading = arc_start + arc_side * radius * np.array(step), end_course
+        arc_start, heading = arc_start + arc_sign * radius * np.array(step), end_course
     return arcs
 
 
@@ -556,13 +556,13 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     clipped_distances = np.clip(np.array(unsorted_distances), 0.0, path.length)
     distances = np.unique(np.round(clipped_distances, 6))
     points = _points_at(path, distances)
-    middles = 0.5 * (distances[1:] + distances[:-1])
-    pieces = path.pieces[_piece_index(path, middles)]
-    return points, (pieces["leg"] + (middles > pieces["leg_change"])).astype(np.int64)
+    midpoints = 0.5 * (distances[1:] + distances[:-1])
+    pieces = path.pieces[_piece_index(path, midpoints)]
+    return points, (pieces["leg"] + (midpoints > pieces["leg_change"])).astype(np.int64)
 
 
-def arc_point(piece: Record, along: float) -> tuple[float, float]:
-    """Return east and north (m) on a piece, ``along`` m from its start.
+def arc_point(piece: Record, distance_along: float) -> tuple[float, float]:
+    """Return east and north (m) on a piece, ``distance_along`` m from its start.
 
     piece: a record of `flight.guidance.path.PIECE`.
 
@@ -573,8 +573,8 @@ def arc_point(piece: Record, along: float) -> tuple[float, float]:
     """
     course, curvature = piece.course, piece.curvature
     if curvature == 0.0:
-        return piece.east + along * math.sin(course), piece.north + along * math.cos(course)
-    course_at = course + curvature * along
+        return piece.east + distance_along * math.sin(course), piece.north + distance_along * math.cos(course)
+    course_at = course + curvature * distance_along
     return (
         piece.east + (math.cos(course) - math.cos(course_at)) / curvature,
         piece.north + (math.sin(course_at) - math.sin(course)) / curvature,

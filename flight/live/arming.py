@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.flight_process import MissionJudged, Place
+from flight.live.flight_process import LoiterCenter, MissionJudged
 from flight.live.telemetry import (
     ACTIVE,
     AUTO,
@@ -48,7 +48,7 @@ class ArmingState:
     last_verdict: last verdict on the mission; None without a mission.
     force: PFLY_FORCE.
     end_requested: True if the flight must end.
-    place: loiter center of a requested diversion in its new mode; None without a request.
+    loiter_center: loiter center of a requested diversion in its new mode; None without a request.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
@@ -59,16 +59,16 @@ class ArmingState:
     last_verdict: MissionJudged | None = None
     force: bool = False
     end_requested: bool = False
-    place: Place | None = None
+    loiter_center: LoiterCenter | None = None
     mission_state: int = NO_MISSION
 
     @property
-    def armable(self) -> bool:
+    def can_arm(self) -> bool:
         """True if arming would be accepted now."""
         return not self.is_judging and not self._arming_refusal(False)
 
     @property
-    def starts(self) -> bool:
+    def should_start(self) -> bool:
         """True if the flight must start: armed, in AUTO, and judged."""
         return (
             self.armed
@@ -113,7 +113,7 @@ class ArmingState:
             name = plane_mode.name.removeprefix("PLANE_MODE_") if plane_mode else f"mode {mode}"
             return CommandResult(DENIED, f"{name} denied: this vehicle has {', '.join(MODE_NAMES.values())}")
         if self.flying:
-            return self._divert(mode)
+            return self._change_flight_mode(mode)
         if mode in (RTL, GUIDED):
             return CommandResult(DENIED, f"{MODE_NAMES[mode]} denied: not in flight")
         if mode == AUTO and self.last_verdict is None and not self.is_judging:
@@ -130,33 +130,33 @@ class ArmingState:
     def pause(self, should_continue: bool) -> CommandResult:
         """Loiter at the aircraft's position, or continue the mission (MAV_CMD_DO_PAUSE_CONTINUE)."""
         if self.flying:
-            return self._divert(AUTO if should_continue else LOITER)
+            return self._change_flight_mode(AUTO if should_continue else LOITER)
         return CommandResult(ACCEPTED) if should_continue else CommandResult(DENIED, "pause denied: not in flight")
 
-    def go_to(self, place: Place) -> CommandResult:
+    def go_to(self, center: LoiterCenter) -> CommandResult:
         """Fly to a position and loiter there, in GUIDED."""
         if not self.flying:
             return CommandResult(DENIED, "go-to denied: not in flight")
-        self.mode, self.place = GUIDED, place
+        self.mode, self.loiter_center = GUIDED, center
         self.mission_state = PAUSED
         return CommandResult(ACCEPTED)
 
     def restart_mission(self) -> None:
         """Continue the mission from the item that was set in flight."""
-        self.place = Place()
+        self.loiter_center = LoiterCenter()
 
     def set_flight_mode(self, mode: int) -> None:
         """Set the mode and the mission state of a diverted flight."""
         self.mode = mode
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
-    def _divert(self, mode: int) -> CommandResult:
+    def _change_flight_mode(self, mode: int) -> CommandResult:
         """Continue the flight in another mode; the current mode changes nothing."""
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
             self.set_flight_mode(mode)
-            self.place = Place()
+            self.loiter_center = LoiterCenter()
         return CommandResult(ACCEPTED)
 
     def on_mission_uploaded(self) -> None:
@@ -188,7 +188,7 @@ class ArmingState:
         """Disarm the vehicle after its flight, ready to fly again."""
         self.flying = self.armed = self.end_requested = False
         self.mission_state = COMPLETE if is_completed and self.mode == AUTO else NOT_STARTED
-        self.mode, self.place = MANUAL, None
+        self.mode, self.loiter_center = MANUAL, None
 
     def _arming_refusal(self, is_forced: bool) -> str:
         if self.last_verdict is None:

@@ -82,7 +82,7 @@ class StartFlight:
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class LoiterCenter:
     """Center of a loiter.
 
     lat_deg, lon_deg: NaN for the aircraft's position.
@@ -102,13 +102,13 @@ class Place:
 class DivertFlight:
     """Request: leave the current route for another one, from the aircraft's position.
 
-    mode: ArduPlane's number: AUTO flies the mission's items, RTL returns, LOITER and GUIDED loiter at ``place``.
+    mode: ArduPlane's number: AUTO flies the mission's items, RTL returns, LOITER and GUIDED loiter at ``center``.
     mission: home, rally points and fence; in AUTO with the remaining items.
     """
 
     mode: int
     mission: Mission
-    place: Place = Place()
+    center: LoiterCenter = LoiterCenter()
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,10 +163,10 @@ class FlightDiverted:
 class FlightEnded:
     """Event: the flight is over.
 
-    ended: "completed", or the reason for the end.
+    end_reason: "completed", or the reason for the end.
     """
 
-    ended: str
+    end_reason: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +190,7 @@ class LogSink(Protocol):
     def write(self, block: Track) -> None:
         """Append rows and hand them to the operating system."""
 
-    def finish(self, ended: str, should_abort: Callable[[], bool]) -> FlightJudged:
+    def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> FlightJudged:
         """Judge the flight and close the log.
 
         should_abort: function that returns True if the process must end; called during long work.
@@ -220,7 +220,7 @@ class FlightFactory(Protocol):
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission; the prepared flight is None if the mission cannot be flown."""
 
-    def divert(self, request: DivertFlight, here: Floats) -> PreparedFlight:
+    def divert(self, request: DivertFlight, position: Floats) -> PreparedFlight:
         """Return the requested route from a position (3,) on the map.
 
         Raises PlanflyError if there is no such route.
@@ -269,7 +269,7 @@ def send_event(connection: Connection, event: Event) -> None:
     >>> link_end, flying_end = Pipe()
     >>> send_event(flying_end, FlightEnded("completed"))
     >>> read_event(link_end.recv_bytes())
-    FlightEnded(ended='completed')
+    FlightEnded(end_reason='completed')
     """
     connection.send_bytes(_PICKLED_MARK + pickle.dumps(event))
 
@@ -399,13 +399,13 @@ class _LoggedFlight:
                 snapshot_count = max(snapshot_count, int((clock() - start_time) * SNAPSHOT_RATE))
         return end_reason, should_continue
 
-    def finish(self, ended: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
+    def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
         """Judge each route, and close its log.
 
         should_abort: see `LogSink.finish`.
         """
-        endings = (*self._ends, ended)
-        return [log.finish(end_reason, should_abort) for log, end_reason in zip(self._logs, endings, strict=True)]
+        end_reasons = (*self._ends, end_reason)
+        return [log.finish(reason, should_abort) for log, reason in zip(self._logs, end_reasons, strict=True)]
 
     def abandon(self) -> None:
         """Close the logs in their present state."""
@@ -423,8 +423,8 @@ class _LoggedFlight:
         self._mode, self._loiter, self._loiter_logs = request.mode, None, 1
         if request.mode in (LOITER, GUIDED):
             item = self._flight.setup.mission.items[-1]
-            place = Place(item.lat_deg, item.lon_deg, item.alt, item.frame, item.params[2])
-            self._loiter = replace(request, place=place)
+            center = LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame, item.params[2])
+            self._loiter = replace(request, center=center)
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
     def _begin_route(self, request: DivertFlight, end_reason: str) -> bool:

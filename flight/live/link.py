@@ -176,8 +176,8 @@ def read_key(path: Path) -> bytes:
     return hashlib.sha256(data).digest()
 
 
-class Refused(Enum):
-    """Reason to distrust a frame; `Dropped` counts the frames by reason."""
+class RefusalReason(Enum):
+    """Reason to distrust a frame; `DropCounts` counts the frames by reason."""
 
     UNSIGNED = auto()
     FORGED = auto()
@@ -203,7 +203,7 @@ class Signing:
     clock: int = 0
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
-    def find_refusal(self, frame: MavlinkFrame, wall: float) -> Refused | None:
+    def find_refusal(self, frame: MavlinkFrame, wall: float) -> RefusalReason | None:
         """Return the reason to distrust a frame, or None if the frame is signed with the key and newer than its stream.
 
         A stream is a system, its component and its link id.  A frame with a bad signature changes nothing.
@@ -211,10 +211,10 @@ class Signing:
         wall: time since 1970, s.
         """
         if not frame.signed:
-            return Refused.UNSIGNED
+            return RefusalReason.UNSIGNED
         body, signature = frame.raw[:-6], frame.raw[-6:]
         if not hmac.compare_digest(hashlib.sha256(self.key + body).digest()[:6], signature):
-            return Refused.FORGED
+            return RefusalReason.FORGED
         link = frame.raw[-SIGNATURE_BYTES]
         timestamp = int.from_bytes(frame.raw[-12:-6], "little")
         stream = (frame.system, frame.component, link)
@@ -223,16 +223,16 @@ class Signing:
         # limit into the future.
         self.clock = max(self.clock, _signing_timestamp(wall))
         if timestamp > self.clock + _MAX_LEAD_UNITS:
-            return Refused.FUTURE
+            return RefusalReason.FUTURE
         if last_timestamp is None:
             # Compared with this machine's clock, not with others' timestamps: a station whose clock is ahead locks no
             # other out.
             if timestamp + _MAX_LAG_UNITS < _signing_timestamp(wall):
-                return Refused.OLD
+                return RefusalReason.OLD
             if len(self._streams) >= _MAX_STREAMS:
-                return Refused.STREAMS
+                return RefusalReason.STREAMS
         elif timestamp <= last_timestamp:
-            return Refused.REPLAYED
+            return RefusalReason.REPLAYED
         self._streams[stream] = timestamp
         # The clock may have been set back before the start: running stations expect timestamps later than their last.
         self.newest = max(self.newest, timestamp)
@@ -299,7 +299,7 @@ class Peer:
 
 
 @dataclass(slots=True)
-class Dropped:
+class DropCounts:
     """Number of dropped frames by reason.
 
     address: datagrams from an address that is not allowed.
@@ -384,7 +384,7 @@ class Link:
         check_access(access)
         self.access = access
         self.peers: dict[Address, Peer] = {}
-        self.dropped = Dropped()
+        self.dropped = DropCounts()
         self.clock, self._wall = clock or RunningClock(), wall
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
@@ -443,7 +443,7 @@ class Link:
                 continue
             if self._signing is not None and (reason := self._signing.find_refusal(frame, self._wall())):
                 self._count_dropped(reason)
-                if reason is Refused.FUTURE:
+                if reason is RefusalReason.FUTURE:
                     self._notice_clock_ahead(source[0])
                 continue
             message = self._decoder.message(frame)
@@ -489,19 +489,19 @@ class Link:
             f"{host} signs with timestamps more than a day ahead of this machine's clock: such frames are dropped"
         )
 
-    def notices(self) -> list[str]:
+    def take_notices(self) -> list[str]:
         """Return the notices since the last call on senders without an answer."""
         notices, self._notices = self._notices, []
         return notices
 
-    def _count_dropped(self, reason: Refused) -> None:
+    def _count_dropped(self, reason: RefusalReason) -> None:
         dropped = self.dropped
-        dropped.unsigned += reason is Refused.UNSIGNED
-        dropped.forged += reason is Refused.FORGED
-        dropped.replayed += reason is Refused.REPLAYED
-        dropped.old += reason is Refused.OLD
-        dropped.future += reason is Refused.FUTURE
-        dropped.streams += reason is Refused.STREAMS
+        dropped.unsigned += reason is RefusalReason.UNSIGNED
+        dropped.forged += reason is RefusalReason.FORGED
+        dropped.replayed += reason is RefusalReason.REPLAYED
+        dropped.old += reason is RefusalReason.OLD
+        dropped.future += reason is RefusalReason.FUTURE
+        dropped.streams += reason is RefusalReason.STREAMS
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
         now = self.clock()
@@ -527,7 +527,7 @@ class Link:
         component = getattr(message, "target_component", 0)
         return system in (0, SYSTEM) and component in (0, COMPONENT)
 
-    def forget_silent(self) -> None:
+    def remove_silent_peers(self) -> None:
         """Remove the peers that have been silent for `SILENCE`."""
         now = self.clock()
         for key in [key for key, peer in self.peers.items() if now - peer.heard >= SILENCE]:
@@ -535,17 +535,17 @@ class Link:
 
     def send(self, message: Any, peer: Peer) -> None:
         """Send a message to a peer; the message is lost if the network does not accept it, as on any radio."""
-        self._transmit(message.pack(peer.mav), peer.mav, peer.address)
+        self._send_frame(message.pack(peer.mav), peer.mav, peer.address)
 
     def send_heartbeat(self, message: Any) -> None:
         """Send a HEARTBEAT to the expected addresses of stations, and to every peer."""
         for address, mav in self._expected_stations.items():
             if address not in self.peers:
-                self._transmit(message.pack(mav), mav, address)
+                self._send_frame(message.pack(mav), mav, address)
         for peer in self.peers.values():
             self.send(message, peer)
 
-    def _transmit(self, packed: bytes, mav: Any, address: Address) -> None:
+    def _send_frame(self, packed: bytes, mav: Any, address: Address) -> None:
         mav.seq = (mav.seq + 1) % 256
         if self._signing is not None:
             packed = self._signing.sign(packed, self._wall())

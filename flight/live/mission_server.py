@@ -26,7 +26,7 @@ from flight.mission.items import (
     is_located,
     item_problem,
     on_grid,
-    renumbered,
+    renumber_items,
 )
 from world.errors import MissionError
 
@@ -147,7 +147,7 @@ def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home
         rally=lists[MissionType.RALLY],
         source="upload",
     )
-    return renumbered(mission), shift
+    return renumber_items(mission), shift
 
 
 def _is_home(item: MissionItem) -> bool:
@@ -182,8 +182,8 @@ def mission_lists(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
     )
 
 
-def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> str:
-    """Return the reason why a mission cannot be flown from the item with seq ``first``, or "".
+def start_problem(mission: Mission, first_seq: int, *, in_flight: bool = False) -> str:
+    """Return the reason why a mission cannot be flown from the item with seq ``first_seq``, or "".
 
     in_flight: True if the leg from the aircraft to the item will be its first leg.
 
@@ -192,15 +192,19 @@ def start_problem(mission: Mission, first: int, *, in_flight: bool = False) -> s
     >>> start_problem(way, 2), start_problem(way, 3)
     ('', 'no leg is left to fly from there')
     """
-    if not mission.items or not 0 <= first <= mission.items[-1].seq:
+    if not mission.items or not 0 <= first_seq <= mission.items[-1].seq:
         return "the mission has no such item"
-    places = [item for item in mission.items if item.seq >= first and item.has_position]
+    positions = [item for item in mission.items if item.seq >= first_seq and item.has_position]
     min_place_count = 1 if in_flight else 2
-    return "" if first <= mission.items[0].seq or len(places) >= min_place_count else "no leg is left to fly from there"
+    return (
+        ""
+        if first_seq <= mission.items[0].seq or len(positions) >= min_place_count
+        else "no leg is left to fly from there"
+    )
 
 
-def mission_from_item(mission: Mission, first: int) -> Mission:
-    """Return the mission from the item with seq ``first``, after the last speed change before that item.
+def mission_from_item(mission: Mission, first_seq: int) -> Mission:
+    """Return the mission from the item with seq ``first_seq``, after the last speed change before that item.
 
     Items keep their numbers.
 
@@ -210,9 +214,9 @@ def mission_from_item(mission: Mission, first: int) -> Mission:
     >>> [item.seq for item in mission_from_item(way, 4).items], mission_from_item(way, 1) == way
     ([2, 4], True)
     """
-    earlier = [item for item in mission.items if item.seq < first]
-    speeds = [item for item in earlier if item.command == Command.DO_CHANGE_SPEED][-1:]
-    return replace(mission, items=(*speeds, *(item for item in mission.items if item.seq >= first)))
+    earlier_items = [item for item in mission.items if item.seq < first_seq]
+    speed_items = [item for item in earlier_items if item.command == Command.DO_CHANGE_SPEED][-1:]
+    return replace(mission, items=(*speed_items, *(item for item in mission.items if item.seq >= first_seq)))
 
 
 # Maximum number of items of an upload: bounds the memory that a station can use (some 2 MB a list).
@@ -299,7 +303,7 @@ class _Upload:
 
 
 @dataclass(slots=True)
-class _Finished:
+class _FinishedUpload:
     """An upload that was accepted.
 
     last_request_time: time of the last request for the upload's last item, s.
@@ -336,7 +340,7 @@ class MissionServer:
     go_to: Callable[[MissionItem], str] = _deny_go_to
     _uploads: dict[MissionType, _Upload] = field(default_factory=dict)
     # Station of the last finished upload of each list: its final ACK is repeated if its last item arrives again.
-    _finished: dict[MissionType, _Finished] = field(default_factory=dict)
+    _finished: dict[MissionType, _FinishedUpload] = field(default_factory=dict)
 
     def handle(self, message: Any, station: Station, now: float) -> list[MissionReply]:
         """Return the replies to a message of the protocol; other messages get no reply.
@@ -438,7 +442,9 @@ class MissionServer:
         del self._uploads[kind]
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
-        self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.was_repeated else 0)
+        self._finished[kind] = _FinishedUpload(
+            station, upload.count, now, now, CONFIRMATIONS if upload.was_repeated else 0
+        )
         is_float = message.get_type() == "MISSION_ITEM"
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if is_float else "")]
 

@@ -9,7 +9,7 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.arming import ACCEPTED, DENIED, IN_PROGRESS, UNSUPPORTED, ArmingState, CommandResult
-from flight.live.flight_process import Place
+from flight.live.flight_process import LoiterCenter
 from flight.live.link import Peer
 from flight.live.telemetry import (
     INFO,
@@ -52,7 +52,7 @@ class Parameter:
     flies: bool = False
 
 
-def _no_flown_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
+def _empty_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
     return {}
 
 
@@ -60,13 +60,13 @@ def _no_flown_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
 class Parameters:
     """Parameters by number and by name, with the autopilot's name if it has the same parameter.
 
-    flown: function that returns the simulated autopilot's parameters by name, for the values that stations have set.
-        It raises PlanflyError if a value is not allowed.
+    autopilot_values: function that returns the simulated autopilot's parameters by name, with the values that stations
+        have set. It raises PlanflyError if a value is not allowed.
     stated: values of the simulated autopilot's parameters that stations have set.
     """
 
     entries: list[Parameter]
-    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _no_flown_parameters
+    autopilot_values: Callable[[Mapping[str, float]], Mapping[str, float]] = _empty_parameters
     stated: dict[str, float] = field(default_factory=dict)
     _numbers: dict[str, int] = field(init=False)
 
@@ -136,7 +136,7 @@ class Parameters:
         # 0.7 is sent as 0.699999988: the typed number is the shortest one with the same float32.
         stated_values = self.stated | {entry.name: float(str(np.float32(value)))}
         try:
-            values = self.flown(stated_values)
+            values = self.autopilot_values(stated_values)
         except PlanflyError as error:
             return f"{error}; {entry.value:g} kept"
         if values[entry.name] != stated_values[entry.name]:
@@ -150,26 +150,27 @@ class Parameters:
 def vehicle_parameters(
     *,
     airspeed: float,
-    slowest: float,
-    fastest: float,
+    min_airspeed: float,
+    max_airspeed: float,
     max_bank_deg: float,
     system: int,
     speed: float,
-    flown: Callable[[Mapping[str, float]], Mapping[str, float]] = _no_flown_parameters,
+    autopilot_values: Callable[[Mapping[str, float]], Mapping[str, float]] = _empty_parameters,
     not_flown: Iterable[str] = (),
 ) -> Parameters:
     """Return the parameters of a vehicle and of its simulated autopilot, in alphabetical order.
 
-    airspeed, slowest, fastest: m/s.
+    airspeed, min_airspeed, max_airspeed: m/s.
     max_bank_deg: degrees.
     system: the vehicle's MAVLink system id.
     speed: speed of the flight relative to real time.
-    flown: function as in `Parameters`; its names replace the vehicle's own.
+    autopilot_values: function as in `Parameters`; its names replace the vehicle's own.
     not_flown: parameters that are read but not simulated; they cannot be set.
 
     >>> parameters = vehicle_parameters(
-    ...     airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=1.0,
-    ...     flown=lambda stated: {"WP_RADIUS": 90.0, "TRIM_PITCH_CD": 2.0} | stated, not_flown=["TRIM_PITCH_CD"],
+    ...     airspeed=25.0, min_airspeed=18.0, max_airspeed=31.0, max_bank_deg=30.0, system=1, speed=1.0,
+    ...     autopilot_values=lambda stated: {"WP_RADIUS": 90.0, "TRIM_PITCH_CD": 2.0} | stated,
+    ...     not_flown=["TRIM_PITCH_CD"],
     ... )
     >>> parameters["AIRSPEED_CRUISE"]
     25.0
@@ -182,8 +183,8 @@ def vehicle_parameters(
     """
     vehicle_entries = [
         Parameter("AIRSPEED_CRUISE", airspeed),
-        Parameter("AIRSPEED_MAX", fastest),
-        Parameter("AIRSPEED_MIN", slowest),
+        Parameter("AIRSPEED_MAX", max_airspeed),
+        Parameter("AIRSPEED_MIN", min_airspeed),
         Parameter("ARMING_CHECK", 1.0),
         Parameter("ARMING_REQUIRE", 1.0),
         Parameter("FENCE_TOTAL", 0.0),
@@ -196,9 +197,9 @@ def vehicle_parameters(
     ]
     entries = {entry.name: entry for entry in vehicle_entries}
     unflown_names = set(not_flown)
-    for name, value in flown({}).items():
+    for name, value in autopilot_values({}).items():
         entries[name] = Parameter(name, value, fixed="is read, but no flight shows it", flies=name not in unflown_names)
-    return Parameters([entries[name] for name in sorted(entries)], flown)
+    return Parameters([entries[name] for name in sorted(entries)], autopilot_values)
 
 
 def _decode_name(name: bytes | str) -> str:
@@ -406,7 +407,7 @@ class Requests:
         return replies
 
 
-def _parse_loiter_center(message: Any) -> Place | None:
+def _parse_loiter_center(message: Any) -> LoiterCenter | None:
     """Return the loiter center in MAV_CMD_DO_REPOSITION, or None if it is invalid."""
     if message.get_type() == "COMMAND_INT":
         lat, lon = (math.nan if value == _UNSET_COORDINATE else value / 1e7 for value in (message.x, message.y))
@@ -420,7 +421,7 @@ def _parse_loiter_center(message: Any) -> Place | None:
     item = MissionItem(0, int(Command.NAV_LOITER_TIME), frame, (0.0, 0.0, radius, 0.0), north, east, up)
     if not is_located(item.command, frame) or item_problem(item) is not None:
         return None
-    return Place(lat, lon, alt, frame, radius)
+    return LoiterCenter(lat, lon, alt, frame, radius)
 
 
 def _to_integer(value: float) -> int:

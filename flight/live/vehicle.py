@@ -20,8 +20,8 @@ from flight.live.flight_process import (
     FlightJudged,
     FlightRequest,
     JudgeMission,
+    LoiterCenter,
     MissionJudged,
-    Place,
     ProcessReady,
     StartFlight,
     read_event,
@@ -116,7 +116,7 @@ class Downlink:
                 if now - self._next_heartbeat > _MAX_DELAY_S
                 else self._next_heartbeat + _HEARTBEAT_PERIOD_S
             )
-            self._link.forget_silent()
+            self._link.remove_silent_peers()
             self._link.send_heartbeat(heartbeat(self._status))
         for peer in self._link.peers.values():
             self._send_telemetry(peer, now)
@@ -329,7 +329,7 @@ class Vehicle:
         if self.link in readable:
             for message, peer in self.link.receive():
                 self._handle_message(message, peer, now)
-            for notice in self.link.notices():
+            for notice in self.link.take_notices():
                 self._show(notice)
         for reply in self.server.tick(now):
             self._send_reply(reply.station, reply.message, reply.text)
@@ -376,15 +376,15 @@ class Vehicle:
         if self.arming.end_requested:
             self.arming.end_requested = False
             self._send_request(EndFlight())
-        if self.arming.place is not None:
-            self._divert(self.arming.place)
-            self.arming.place = None
-        if self.arming.starts:
+        if self.arming.loiter_center is not None:
+            self._divert(self.arming.loiter_center)
+            self.arming.loiter_center = None
+        if self.arming.should_start:
             self.arming.on_flight_started()
             self._progress.start_flight()
             self.downlink.send_text("mission started")
             self._send_request(StartFlight())
-        self._refresh()
+        self._refresh_status()
 
     def _judge_changes(self) -> None:
         """Request a verdict on a changed mission, which includes a changed fence and changed rally points."""
@@ -401,7 +401,7 @@ class Vehicle:
             self.arming.on_mission_cleared()
             self.status.snapshot, self.status.home = self._standby
             self._send_responses(self.requests.on_verdict())
-            self._refresh()
+            self._refresh_status()
             return
         if self.server.lists[MissionType.MISSION] is not self._start_item_upload:
             self._progress.first = 0
@@ -413,19 +413,19 @@ class Vehicle:
         self._awaits_verdict = True
         self._law_parameters = tuple(self._parameters.stated.items())
         self._send_request(JudgeMission(mission, self._mission_number, self._law_parameters))
-        self._refresh()
+        self._refresh_status()
 
-    def _divert(self, place: Place) -> None:
+    def _divert(self, center: LoiterCenter) -> None:
         """Divert the aircraft to the mission's current item, to home, or to a loiter."""
         mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
             mission = mission_from_item(mission, self.status.current - shift)
-        self._send_request(DivertFlight(self.arming.mode, mission, place))
+        self._send_request(DivertFlight(self.arming.mode, mission, center))
 
     def _go_to(self, item: MissionItem) -> str:
         """Fly to an item's position; return the reason for a refusal, or ""."""
-        return self.arming.go_to(Place(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
+        return self.arming.go_to(LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _handle_diversion(self, event: FlightDiverted) -> None:
         if event.problem:
@@ -435,7 +435,7 @@ class Vehicle:
         else:
             self._progress.start_route(event.items if event.mode == AUTO else ())
             self.downlink.send_text(f"flying in {MODE_NAMES[event.mode]}")
-        self._refresh()
+        self._refresh_status()
 
     def _set_start_item(self, seq: int) -> CommandResult:
         """Set the start item of the next flight, or continue the current flight at it.
@@ -497,7 +497,7 @@ class Vehicle:
         elif isinstance(event, FlightDiverted):
             self._handle_diversion(event)
         elif isinstance(event, FlightEnded):
-            self._handle_flight_end(event.ended)
+            self._handle_flight_end(event.end_reason)
         elif isinstance(event, ProcessReady):
             self._crash_count = 0
             self._ready = True
@@ -530,7 +530,7 @@ class Vehicle:
         if is_completed and self.arming.mode == AUTO:
             self._progress.report_completion()
         self.arming.on_flight_ended(is_completed)
-        self._refresh()
+        self._refresh_status()
         self.downlink.send_text(f"flight {end_reason}; disarmed", INFO if is_completed else CRITICAL)
         self._progress.send_current()
         if self._progress.first:
@@ -538,11 +538,11 @@ class Vehicle:
             self._progress.first = 0
             self.server.changed.add(MissionType.MISSION)
 
-    def _refresh(self) -> None:
+    def _refresh_status(self) -> None:
         arming, status = self.arming, self.status
         if (status.mode, status.armed, status.flying) != (arming.mode, arming.armed, arming.flying):
             # Send a change immediately.
             self.downlink.heartbeat_now()
         status.mode, status.armed, status.flying = arming.mode, arming.armed, arming.flying
-        status.ready, status.mission_state = arming.armable or arming.armed, arming.mission_state
+        status.ready, status.mission_state = arming.can_arm or arming.armed, arming.mission_state
         self._progress.refresh()

@@ -220,10 +220,10 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     if scenario.limits.max_height_m is not None:
         limit_text = f"{scenario.limits.max_height_m:g} m above ground"
         notes.append(f"a fence does not follow the ground: the maximum height of {limit_text} is not part of it")
-    all_fences = numbered([*fences, *mission.fences])
+    all_fences = number_items([*fences, *mission.fences])
     # A mission that starts or ends on the ground keeps its rally points: its last position is the landing point.
     keeps_rally = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
-    rally = mission.rally if keeps_rally else numbered(_ends_as_rally_points(mission))
+    rally = mission.rally if keeps_rally else number_items(_ends_as_rally_points(mission))
     return replace(mission, fences=all_fences, rally=rally), tuple(notes)
 
 
@@ -241,7 +241,7 @@ def _split_by_altitude(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTes
     """Return the zones that stay fences at every altitude, and the names of the others."""
     remaining, passed_names = [], []
     for zone in zones:
-        if zone.kind == "exclusion" and passes(numbered(zone_fences([zone], origin)[0])):
+        if zone.kind == "exclusion" and passes(number_items(zone_fences([zone], origin)[0])):
             passed_names.append(zone.name)
         else:
             remaining.append(zone)
@@ -272,11 +272,11 @@ def _home_offset(item: MissionItem, home: Home) -> float:
     return home.alt if item.frame in (Frame.GLOBAL, Frame.GLOBAL_INT) else 0.0
 
 
-def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+def number_items(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
     """Return fence items or rally points with numbers from 0, as in the lists of a vehicle.
 
     >>> item = MissionItem(7, Command.NAV_RALLY_POINT, Frame.GLOBAL, (0.0,) * 4, 36.5, -84.2, 0.0)
-    >>> [one.seq for one in numbered([item, item])]
+    >>> [one.seq for one in number_items([item, item])]
     [0, 1]
     """
     return tuple(replace(item, seq=k) for k, item in enumerate(items))

@@ -8,7 +8,7 @@ import numpy as np
 from aircraft.envelope import GRAVITY, ground_speed
 from aircraft.tracking import TrackingError, air_density_factor
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
-from planner.ground_ways import GroundWays
+from planner.ground_ways import DepartureAndApproach
 from planner.plan import Plan
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
@@ -60,7 +60,7 @@ def plan_mission(
     >>> [(item.command, item.params[1]) for item in mission.items]  # speed, then acceptance radii
     [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
-    procedures = plan.ways or GroundWays()
+    procedures = plan.ways or DepartureAndApproach()
     points = _mission_positions(plan, procedures)
     radii = acceptance_radii(plan.scenario, points, airspeed, max_bank, tracking)
     home = _home_position(plan)
@@ -81,8 +81,12 @@ def plan_mission(
         for index in (end_waypoint, end_waypoint + 1):
             builder.add(Command.NAV_WAYPOINT, (0.0, float(radii[index]), 0.0, 0.0), points[index])
         builder.add(Command.NAV_LAND, (procedures.descent.go_around, 0.0, 0.0, 0.0), procedures.descent.point)
-    returns = plan.scenario.returns
-    rally = () if returns is None else tuple(_rally_items(plan.scenario.origin, returns.rally, home))
+    return_requirements = plan.scenario.returns
+    rally = (
+        ()
+        if return_requirements is None
+        else tuple(_rally_items(plan.scenario.origin, return_requirements.rally, home))
+    )
     return Mission(
         home=home, items=tuple(builder.items), rally=rally, cruise_speed=_round_to_thousandths(airspeed), source=source
     )
@@ -107,7 +111,7 @@ class _ItemBuilder:
         self.items.append(MissionItem(len(self.items) + 1, int(command), int(frame), params, lat, lon, up))
 
 
-def _mission_positions(plan: Plan, procedures: GroundWays) -> Floats:
+def _mission_positions(plan: Plan, procedures: DepartureAndApproach) -> Floats:
     """Return the positions of all navigation items, from above home to the landing point, (w, 3) m.
 
     The landing point has the altitude of the end of the final approach.
@@ -116,8 +120,8 @@ def _mission_positions(plan: Plan, procedures: GroundWays) -> Floats:
     if (climb := procedures.climb) is not None:
         parts = [np.append(climb.home[:2], climb.up)[None], climb.waypoints, *parts]
     if (descent := procedures.descent) is not None:
-        above_landing = np.append(descent.point[:2], descent.line_up[-1, 2])
-        parts = [*parts, descent.waypoints, descent.line_up, above_landing[None]]
+        above_landing = np.append(descent.point[:2], descent.final_waypoints[-1, 2])
+        parts = [*parts, descent.waypoints, descent.final_waypoints, above_landing[None]]
     return np.concatenate(parts)
 
 

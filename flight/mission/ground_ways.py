@@ -12,7 +12,7 @@ import numpy as np
 
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.itinerary import LANDING_NOTE
-from flight.mission.placing import home_place
+from flight.mission.placing import home_point
 from flight.mission.route import Route, part_of_route
 from world.airfield import LandingStrip, Launch
 from world.arrays import Floats
@@ -34,8 +34,8 @@ class TakeOff:
     item: number of the mission item.
     home: (3,) m, on the ground.
     course: launch course, rad on the map.
-    top: altitude at the end of the take-off, m AMSL.
-    base: altitude of home, m AMSL, the reference of the autopilot's heights.
+    end_altitude: altitude at the end of the take-off, m AMSL.
+    home_altitude: altitude of home, m AMSL, the reference of the autopilot's heights.
     pitch: minimum climb pitch, rad.
     waypoint: index of the route's waypoint at which the mission continues.
     speed: ground speed at the end of the launch, m/s.
@@ -46,8 +46,8 @@ class TakeOff:
     item: int
     home: Floats
     course: float
-    top: float
-    base: float
+    end_altitude: float
+    home_altitude: float
     pitch: float
     waypoint: int
     speed: float
@@ -62,18 +62,18 @@ class TakeOff:
         if launch.method == "runway":
             return self.home.copy(), np.zeros(3)
         cos_incline, sin_incline = math.cos(launch.incline), math.sin(launch.incline)
-        rail_length = launch.run if launch.method == "catapult" else 0.0
+        rail_length = launch.effective_length if launch.method == "catapult" else 0.0
         height = _RAIL_HEIGHT_M + rail_length * sin_incline if launch.method == "catapult" else _HAND_RELEASE_HEIGHT_M
         position = np.array([*(self.home[:2] + rail_length * cos_incline * direction), self.home[2] + height])
         return position, self.speed * np.array([*(cos_incline * direction), sin_incline])
 
-    def described(self) -> str:
+    def description(self) -> str:
         """Return a description of the start of the flight."""
         method_text = {"catapult": "from a catapult", "hand": "by hand", "runway": "on a runway"}[self.launch.method]
         course = math.degrees(self.course) % 360.0
         return (
             f"NAV_TAKEOFF (item {self.item}): launched {method_text} at home, {self.home[2]:.1f} m AMSL, on course"
-            f" {course:.0f} degrees; the first leg begins above {self.top:.1f} m AMSL"
+            f" {course:.0f} degrees; the first leg begins above {self.end_altitude:.1f} m AMSL"
         )
 
 
@@ -86,10 +86,10 @@ class Approach:
     leg: index of the route's last leg, which leads to the landing point.
     point: landing point at the altitude that the mission states, (3,) m.
     course: landing course, rad.
-    run: length of the leg, m.
-    begin: altitude at the start of the leg, m AMSL.
+    length: length of the leg, m.
+    start_altitude: altitude at the start of the leg, m AMSL.
     tail_wind: tail wind at the landing point on the landing course, m/s.
-    base: altitude of home, m AMSL; the landing point's altitude if the mission has no home.
+    home_altitude: altitude of home, m AMSL; the landing point's altitude if the mission has no home.
     """
 
     strip: LandingStrip
@@ -97,10 +97,10 @@ class Approach:
     leg: int
     point: Floats
     course: float
-    run: float
-    begin: float
+    length: float
+    start_altitude: float
     tail_wind: float
-    base: float
+    home_altitude: float
 
     def place(self, position: Floats) -> tuple[Floats, Floats]:
         """Return the distances of positions (n, 3) past the landing point and right of its course, (n,) m each."""
@@ -126,7 +126,7 @@ def _along_and_right(position: Floats, start: Floats, course: float) -> tuple[Fl
 
 
 @dataclass(frozen=True, slots=True)
-class GroundWays:
+class GroundPhases:
     """Take-off and landing of a flight; None for one that is not simulated.
 
     notes: reasons why a launch or a strip of the scenario is not flown, in sentences.
@@ -141,27 +141,29 @@ class GroundWays:
         return self.take_off is not None or self.approach is not None
 
 
-def find_ground_ways(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> GroundWays:
+def find_ground_phases(scenario: Scenario, mission: Mission, route: Route, min_airspeed: float) -> GroundPhases:
     """Find the take-off and the landing of a mission that a flight in the scenario simulates.
 
     slowest: minimum level-flight speed, m/s, which sets the launch speed if the scenario states none.
 
     >>> from world.scenario import load_scenario
-    >>> bool(find_ground_ways(load_scenario("tight"), Mission(None, ()), None, 15.0))
+    >>> bool(find_ground_phases(load_scenario("tight"), Mission(None, ()), None, 15.0))
     False
     """
     take_off_problem = approach_problem = ""
     take_off = approach = None
     if scenario.launch is not None:
-        take_off, take_off_problem = _find_take_off(scenario, mission, route, slowest)
+        take_off, take_off_problem = _find_take_off(scenario, mission, route, min_airspeed)
     if scenario.landing is not None:
         approach, approach_problem = _find_approach(scenario, mission, route)
-    return GroundWays(take_off, approach, tuple(note for note in (take_off_problem, approach_problem) if note))
+    return GroundPhases(take_off, approach, tuple(note for note in (take_off_problem, approach_problem) if note))
 
 
-def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: float) -> tuple[TakeOff | None, str]:
+def _find_take_off(
+    scenario: Scenario, mission: Mission, route: Route, min_airspeed: float
+) -> tuple[TakeOff | None, str]:
     """Return the take-off, or the reason why it is not simulated."""
-    launch, base = scenario.launch, home_place(mission, scenario.origin, scenario.terrain)
+    launch, base = scenario.launch, home_point(mission, scenario.origin, scenario.terrain)
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_TAKEOFF}
     route_items = route.items.tolist()
     index = next((k for k, seq in enumerate(route_items) if seq >= 0), 0)
@@ -180,7 +182,7 @@ def _find_take_off(scenario: Scenario, mission: Mission, route: Route, slowest: 
     course = launch.course if launch.course is not None else math.atan2(first_leg[0], first_leg[1])
     home = np.array([*home_position, float(ground)])
     end_altitude, pitch = float(route.waypoints[index, 2]), climb_pitch(item)
-    speed, acceleration = launch.release_speed(slowest), launch.acceleration(slowest)
+    speed, acceleration = launch.release_speed(min_airspeed), launch.acceleration(min_airspeed)
     return TakeOff(launch, item.seq, home, course, end_altitude, base.up, pitch, index, speed, acceleration), ""
 
 
@@ -206,14 +208,14 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     final_leg = leg_end[:2] - leg_start[:2]
     course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
     point = np.array([leg_end[0], leg_end[1], ground])
-    wind, home = scenario.wind.along(course, ground)[0], home_place(mission, scenario.origin, scenario.terrain)
+    wind, home = scenario.wind.along(course, ground)[0], home_point(mission, scenario.origin, scenario.terrain)
     base = ground if home is None else home.up
     return Approach(
         strip, int(route.items[last_leg]), last_leg - 1, point, course, length, float(leg_start[2]), wind, base
     ), ""
 
 
-def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | None) -> Route:
+def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
     """Return the airborne part of a route, to which the usual rules apply.
 
     first_leg_start: point where the take-off ends and the first leg starts, (3,) m; None for the start of the route.
@@ -221,35 +223,35 @@ def airborne_route(route: Route, ways: GroundWays, first_leg_start: Floats | Non
     The leg to the landing point is omitted; the numbers of legs and waypoints do not change.
     """
     points = np.array(route.waypoints)
-    if ways.take_off is not None and first_leg_start is not None:
-        points[: ways.take_off.waypoint + 1] = first_leg_start
+    if ground_phases.take_off is not None and first_leg_start is not None:
+        points[: ground_phases.take_off.waypoint + 1] = first_leg_start
         # Earlier waypoints are not flown: place each slightly before the next, so that every leg has a length.
-        for index in range(ways.take_off.waypoint - 1, -1, -1):
+        for index in range(ground_phases.take_off.waypoint - 1, -1, -1):
             next_leg = points[index + 1, :2] - points[index + 2, :2]
             points[index, :2] += next_leg / max(1e-6, float(np.hypot(*next_leg)))
-    moved_route = replace(route, waypoints=points, notes=flown_notes(route, ways))
+    moved_route = replace(route, waypoints=points, notes=flown_notes(route, ground_phases))
     return (
         moved_route
-        if ways.approach is None or ways.approach.leg < 1
-        else part_of_route(moved_route, 0, ways.approach.leg)
+        if ground_phases.approach is None or ground_phases.approach.leg < 1
+        else part_of_route(moved_route, 0, ground_phases.approach.leg)
     )
 
 
-def shown_waypoints(route: Route, ways: GroundWays) -> Floats:
+def shown_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
     """Return a route's waypoints for pictures and tables, (w, 3) m, with flown ends on the ground.
 
     The route itself starts at the altitude at which a take-off ends, and its leg to a landing point is level.
     """
     points = np.array(route.waypoints)
-    if ways.take_off is not None:
-        points[ways.take_off.waypoint, 2] = ways.take_off.home[2]
-    if ways.approach is not None:
-        points[ways.approach.leg + 1, 2] = ways.approach.point[2]
+    if ground_phases.take_off is not None:
+        points[ground_phases.take_off.waypoint, 2] = ground_phases.take_off.home[2]
+    if ground_phases.approach is not None:
+        points[ground_phases.approach.leg + 1, 2] = ground_phases.approach.point[2]
     return points
 
 
-def flown_notes(route: Route, ways: GroundWays) -> tuple[str, ...]:
+def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
     """Return a route's notes, without the note on the landing if that is simulated."""
-    if ways.approach is None:
+    if ground_phases.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

@@ -64,23 +64,23 @@ def implied_scenario(
     origin = mission_origin(mission, itinerary.stops)
     area, flown_box = _area_and_flown_box(mission, itinerary, origin)
     terrain, table, area = _load_terrain(terrain_path, origin, area, flown_box)
-    placed = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
-    highest = max(float(place.position[2]) for place in placed.stops)
+    placed_mission = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
+    max_altitude = max(float(placed_stop.position[2]) for placed_stop in placed_mission.stops)
     if terrain is not None:
-        highest = max(highest, float(np.nanmax(terrain.heights)))
+        max_altitude = max(max_altitude, float(np.nanmax(terrain.heights)))
     spec = ScenarioFile(
         name=_scenario_name(mission.source),
         description="Made around a mission that came without a scenario",
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
         area=AreaTable(
-            east_m=area[0].tolist(), north_m=area[1].tolist(), ceiling_amsl_m=min(highest + AREA_BUFFER, HIGHEST)
+            east_m=area[0].tolist(), north_m=area[1].tolist(), ceiling_amsl_m=min(max_altitude + AREA_BUFFER, HIGHEST)
         ),
-        start=_raised_above_ground(placed.stops[0].position, terrain),
-        destination=_raised_above_ground(placed.stops[-1].position, terrain),
+        start=_raised_above_ground(placed_mission.stops[0].position, terrain),
+        destination=_raised_above_ground(placed_mission.stops[-1].position, terrain),
         flight=flight,
     )
-    return ImpliedScenario(from_spec(spec, mission.source, ground=terrain, external=True), placed)
+    return ImpliedScenario(from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
 
 
 def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOrigin:
@@ -118,9 +118,13 @@ def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigi
         rally_positions = on_map(mission.source, rally, origin)
         distances = np.hypot(*(rally_positions - points[max(0, len(points) - 2)]).T)
         if distances.min() <= _MAX_HOME_DISTANCE_M:
-            nearest = rally_positions[[int(np.argmin(distances))]].T
+            nearest_rally_point = rally_positions[[int(np.argmin(distances))]].T
             area = np.stack(
-                [np.minimum(flown_box[:, 0], nearest[:, 0]), np.maximum(flown_box[:, 1], nearest[:, 0])], axis=1
+                [
+                    np.minimum(flown_box[:, 0], nearest_rally_point[:, 0]),
+                    np.maximum(flown_box[:, 1], nearest_rally_point[:, 0]),
+                ],
+                axis=1,
             )
     return np.clip(area + np.array([-margin, margin]), -MAP_EXTENT, MAP_EXTENT), flown_box
 

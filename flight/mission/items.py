@@ -279,14 +279,14 @@ class Mission:
     autopilot: str = field(default="", compare=False)
 
 
-def renumbered(mission: Mission) -> Mission:
+def renumber_items(mission: Mission) -> Mission:
     """Return a mission with its items numbered from 1 without gaps, as ground stations number them.
 
     Number 0 is home in both forms. The targets of jumps are renumbered too; the target of a jump to a missing item
     stays missing.
 
     >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in (0, 1, 5))
-    >>> [item.seq for item in renumbered(Mission(None, way)).items]
+    >>> [item.seq for item in renumber_items(Mission(None, way)).items]
     [1, 2, 3]
     """
     numbers = {item.seq: number for number, item in enumerate(mission.items, 1)}
@@ -331,13 +331,13 @@ class ItemProblem(NamedTuple):
     def __str__(self) -> str:
         return f"{self.field} {self.value:.10g}: {self.allowed}"
 
-    def at(self, file: str, where: object) -> dict[str, Any]:
+    def at(self, file: str, location: object) -> dict[str, Any]:
         """Return the arguments for a `MissionError` on this problem.
 
         file: file that holds the item.
         where: beginning of the message.
         """
-        return {"message": f"{where}: {self}", "file": file, **self._asdict()}
+        return {"message": f"{location}: {self}", "file": file, **self._asdict()}
 
 
 def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:

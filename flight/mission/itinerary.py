@@ -78,15 +78,15 @@ class Loiter:
         return max(2.0 * math.pi * self.turns, self.seconds * airspeed / radius)
 
 
-def turns_flown(stated: float) -> float:
+def arduplane_turns(stated_turns: float) -> float:
     """Return the turns that ArduPlane flies for stated ones: whole turns beyond one, and at most 255.
 
     `AP_Mission::mavlink_int_to_mission_cmd` stores them in a byte.
 
-    >>> [turns_flown(turns) for turns in (0.5, 1.0, 2.5, 300.0)]
+    >>> [arduplane_turns(turns) for turns in (0.5, 1.0, 2.5, 300.0)]
     [0.5, 1.0, 2.0, 255.0]
     """
-    return stated if stated <= 1.0 else float(min(_MAX_BYTE_TURNS, math.floor(stated)))
+    return stated_turns if stated_turns <= 1.0 else float(min(_MAX_BYTE_TURNS, math.floor(stated_turns)))
 
 
 def loiter_of(item: MissionItem) -> Loiter | None:
@@ -95,7 +95,7 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     if item.command == Command.NAV_LOITER_UNLIM:
         return Loiter(param3, seconds=UNLIMITED, endless=True)
     if item.command == Command.NAV_LOITER_TURNS:
-        return Loiter(param3, turns=turns_flown(param1), on_tangent=param4 > 0.0)
+        return Loiter(param3, turns=arduplane_turns(param1), on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TIME:
         return Loiter(param3, seconds=param1, timed=True, on_course=param2 > 0.0, on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TO_ALT:
@@ -242,7 +242,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
                 file=mission.source,
                 field=f"item {seq}",
             )
-        if builder.ended:
+        if builder.has_ended:
             break
     if steps.endless >= 0:
         name = command_name(mission.items[steps.index[steps.endless]].command)
@@ -250,7 +250,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     for gate in builder.gates:
         builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)
     for item in mission.items:
-        if item.seq not in steps.reached and not (builder.ended and item.command in JUMPS):
+        if item.seq not in steps.reached and not (builder.has_ended and item.command in JUMPS):
             builder.notes.add(NEVER_REACHED, item.seq)
     if not builder.stops:
         raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)
@@ -329,13 +329,13 @@ class _Steps:
             )
             index = None if index is None else index + 1
 
-    def _late_commands(self, early: int) -> list[int]:
+    def _late_commands(self, early_index: int) -> list[int]:
         """Return the indices of the commands that ArduPlane runs on the leg to an item.
 
-        early: index of the command that ArduPlane has already run before that leg.
+        early_index: index of the command that ArduPlane has already run before that leg.
         """
         commands: list[int] = []
-        index = self._next_item(early + 1, counting=False)
+        index = self._next_item(early_index + 1, counting=False)
         while index is not None and index not in commands and not is_navigation(self.items[index].command):
             commands.append(index)
             index = self._next_item(index + 1, counting=False)
@@ -416,7 +416,7 @@ class _ItineraryBuilder:
         self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
         self.gates: list[Gate] = []
-        self.ended = False
+        self.has_ended = False
         self.landing: ItineraryStop | None = None
         self.has_home = mission.home is not None
         self.first_home = self.home = mission.home or _first_position(mission)
@@ -612,8 +612,8 @@ class _ItineraryBuilder:
             self.add_open_item(f"{name}: flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:
             self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
-            self.ended = True
-        elif item.command == Command.NAV_LOITER_TURNS and (turns := turns_flown(item.params[0])) != item.params[0]:
+            self.has_ended = True
+        elif item.command == Command.NAV_LOITER_TURNS and (turns := arduplane_turns(item.params[0])) != item.params[0]:
             self.notes.arduplane.add(
                 f"{name} with {item.params[0]:g} turns: flown as {turns:g}, as in ArduPlane", item.seq
             )
@@ -634,14 +634,14 @@ class _ItineraryBuilder:
             # apply to the RTL.
             home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
             self.stops.append(replace(self._make_stop(home), airspeed=math.nan, px4_airspeed=math.nan))
-            self.ended = True
+            self.has_ended = True
 
     def _add_landing(self, item: MissionItem) -> None:
         name = command_name(item.command)
         if not self.stops:
             self.add_open_item(f"{name} before the start: not flown", item.seq)
             return
-        self.ended = True
+        self.has_ended = True
         if item.has_position:
             self.notes.add(f"{name}: {LANDING_NOTE}", item.seq)
             self.landing = self._make_stop(item)

@@ -44,12 +44,12 @@ SpiralSlopes = Callable[[float, float], tuple[float, float]]
 OwnRadius = Callable[[float, float], float]
 
 
-def as_stated(loiter: Loiter) -> float:
+def item_radius(loiter: Loiter) -> float:
     """Return the radius that a loiter's item states, m; 0 for none."""
     return abs(loiter.radius)
 
 
-def as_at_sea(up: float) -> float:
+def unit_scale(up: float) -> float:
     """Return 1, as the ratio of a loiter's radius at an altitude (m AMSL) to its radius at sea level."""
     return 1.0
 
@@ -61,35 +61,35 @@ class LoiterRules:
     radius: default radius, m, negative to the left; 0 for a radius that depends on the aircraft.
     radius_name: name of the parameter of that radius; "" for none.
     radius_of: function that returns the radius that the autopilot reads from a loiter's item, m; 0 for none.
-    growth: function that returns the ratio of the flown radius at an altitude (m AMSL) to the stated radius.
-    at_middle: True if the autopilot steers to the loiter's center until it reaches the circle, and at the end of the
-        loiter leaves at once for the line from the center; otherwise it joins and leaves the circle on tangents.
-    lines_up: True if the autopilot, after steering to the center, counts turns from its turn away from the center, and
-        after the end of the loiter continues until it heads for the next waypoint within `LINED_UP`.
+    radius_scale: function that returns the ratio of the flown radius at an altitude (m AMSL) to the stated radius.
+    steers_to_center: True if the autopilot steers to the loiter's center until it reaches the circle, and at the end of
+        the loiter leaves at once for the line from the center; otherwise it joins and leaves the circle on tangents.
+    exits_on_heading: True if the autopilot, after steering to the center, counts turns from its turn away from the
+        center, and after the end of the loiter continues until it heads for the next waypoint within `LINED_UP`.
     holds_height: True if the autopilot holds its altitude on the leg to a loiter to an altitude.
     climb, sink: maximum climb and descent rate in a loiter, m/s.
-    short: altitude tolerance, m.
+    altitude_tolerance: altitude tolerance, m.
     ends_in_circle: True if the autopilot loiters without end about a mission's last waypoint.
-    unflown: note on parts of loiters that are not simulated; "" for none.
-    before_return: note on the exit from a loiter before an RTL, if that is not simulated.
+    unflown_note: note on parts of loiters that are not simulated; "" for none.
+    rtl_exit_note: note on the exit from a loiter before an RTL, if that is not simulated.
 
-    >>> LoiterRules().radius, LoiterRules().at_middle
+    >>> LoiterRules().radius, LoiterRules().steers_to_center
     (0.0, False)
     """
 
     radius: float = 0.0
     radius_name: str = ""
-    radius_of: Callable[[Loiter], float] = as_stated
-    growth: Callable[[float], float] = as_at_sea
-    at_middle: bool = False
-    lines_up: bool = False
+    radius_of: Callable[[Loiter], float] = item_radius
+    radius_scale: Callable[[float], float] = unit_scale
+    steers_to_center: bool = False
+    exits_on_heading: bool = False
     holds_height: bool = False
     climb: float = math.inf
     sink: float = math.inf
-    short: float = 0.0
+    altitude_tolerance: float = 0.0
     ends_in_circle: bool = False
-    unflown: str = ""
-    before_return: str = ""
+    unflown_note: str = ""
+    rtl_exit_note: str = ""
 
     def end_note(self) -> str:
         """Return a note on the loiter after the mission's end.
@@ -130,7 +130,7 @@ class RoutePoint:
     arc: float = 0.0
 
 
-class Unjoined(NamedTuple):
+class UnjoinedStop(NamedTuple):
     """A stop that is not at its stated position in the route, because no tangent joins it to a circle.
 
     item, circle: seq of the stop's item, and seq of the circle's item.
@@ -168,7 +168,7 @@ def lay_out_waypoints(
     own_radius: OwnRadius,
     slopes: SpiralSlopes,
     rules: LoiterRules = USUAL_LOITERS,
-) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
+) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
     """Lay out the waypoints of a route along straight legs and around loiter circles.
 
     Return the waypoints, and the stops that are not at their stated positions.
@@ -181,7 +181,7 @@ def lay_out_waypoints(
     Stops inside the previous or next circle are omitted, with a note, because no straight leg joins them. Raises
     MissionError if a loiter is too wide or too long to lay out.
     """
-    unjoined: list[Unjoined] = []
+    unjoined: list[UnjoinedStop] = []
     nodes = _make_nodes(source, stops, notes, own_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
@@ -196,7 +196,7 @@ def lay_out_waypoints(
         leg_length = (
             math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
         )
-        min_radius = own_radius(node.stop.airspeed, node.up) if rules.lines_up else 0.0
+        min_radius = own_radius(node.stop.airspeed, node.up) if rules.exits_on_heading else 0.0
         corners = _corners_around(source, node, entry_course, exit_course, up, leg_length, min_radius, slopes, rules)
         if not index:
             corners.insert(0, RoutePoint(node.stop, (*on_rim(node, entry_course), corners[0].position[2])))
@@ -215,7 +215,7 @@ def _make_nodes(
     notes: Notes,
     own_radius: OwnRadius,
     rules: LoiterRules,
-    unjoined: list[Unjoined],
+    unjoined: list[UnjoinedStop],
 ) -> list[Node]:
     """Return points and circles in flying order, each joined to the next by a tangent.
 
@@ -240,17 +240,17 @@ def _make_nodes(
                     inner_node.distance_to(node) < _SAME_PLACE_M and abs(inner_node.up - node.up) <= _SAME_ALTITUDE_M
                 )
                 if inner_node.stop.item >= 0 and inner_node.stop.command not in TAKEOFFS and not is_passed_anyway:
-                    unjoined.append(Unjoined(inner_node.stop.item, stop.item, is_circle=False))
+                    unjoined.append(UnjoinedStop(inner_node.stop.item, stop.item, is_circle=False))
         previous = nodes[-1] if nodes else None
         if previous is not None and previous.turn != 0.0 and not is_joined(previous, node):
             if node.turn == 0.0:
                 _note_omitted_stop(stop, previous.stop, notes)
-                unjoined.append(Unjoined(stop.item, previous.stop.item, is_circle=False))
+                unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=False))
                 continue
-            # Two loiters with the same stated radius and center may differ by the growth at their altitudes.
+            # Two loiters with the same stated radius and center may differ by the radius scale at their altitudes.
             previous_stated_radius, stated_radius = (
-                abs(previous.turn) / rules.growth(previous.up),
-                abs(node.turn) / rules.growth(node.up),
+                abs(previous.turn) / rules.radius_scale(previous.up),
+                abs(node.turn) / rules.radius_scale(node.up),
             )
             is_same_direction = math.copysign(1.0, previous.turn) == math.copysign(1.0, node.turn)
             if (
@@ -258,7 +258,7 @@ def _make_nodes(
                 or abs(previous_stated_radius - stated_radius) >= _SAME_PLACE_M
                 or not is_same_direction
             ):
-                unjoined.append(Unjoined(stop.item, previous.stop.item, is_circle=True))
+                unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=True))
             notes.add(
                 f"its circle has no tangent from that of item {previous.stop.item}: flown on that circle", stop.item
             )
@@ -281,22 +281,24 @@ def _signed_radius(
         allowed = f"allowed up to {WIDEST:,.0f}"
         message = f"{source}: item {stop.item}: loiter radius {radius:g} m: {allowed}"
         raise MissionError(message, file=source, field="loiter radius", value=radius, allowed=allowed)
-    growth = rules.growth(up)
+    radius_scale = rules.radius_scale(up)
     if radius == 0.0 and rules.radius != 0.0:
         is_left = rules.radius < 0.0 or loiter.radius < 0.0
         direction_text = " to the left" if is_left else ""
         reason = f"its radius of {stated_radius:g} m is not read" if stated_radius > 0.0 else "loiter without a radius"
         notes.add(f"{reason}: flown with {rules.radius_name}, {abs(rules.radius):g} m{direction_text}", stop.item)
-        return math.copysign(max(TIGHTEST, abs(rules.radius) * growth), -1.0 if is_left else 1.0)
+        return math.copysign(max(TIGHTEST, abs(rules.radius) * radius_scale), -1.0 if is_left else 1.0)
     if radius == 0.0:
         radius = own_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
     elif radius < TIGHTEST:
         notes.add(f"loiter radius below {TIGHTEST:.0f} m: flown with {TIGHTEST:.0f} m", stop.item)
         radius = TIGHTEST
-    elif round(radius * growth) != round(stated_radius):
-        notes.add(f"loiter radius {stated_radius:g} m: flown with {radius * growth:.0f} m at this height", stop.item)
-    return math.copysign(radius * growth, loiter.radius)
+    elif round(radius * radius_scale) != round(stated_radius):
+        notes.add(
+            f"loiter radius {stated_radius:g} m: flown with {radius * radius_scale:.0f} m at this height", stop.item
+        )
+    return math.copysign(radius * radius_scale, loiter.radius)
 
 
 def is_joined(a: Node, b: Node) -> bool:
@@ -337,9 +339,10 @@ def circle_corners(node: Node, entry_course: float, sweep: float) -> list[tuple[
     [(0, 41), (59, 100)]
     """
     count = max(1, math.ceil(sweep / CORNER - 1e-9))
-    step, side = sweep / count, math.copysign(1.0, node.turn)
+    step, turn_sign = sweep / count, math.copysign(1.0, node.turn)
     return [
-        on_rim(node, entry_course + side * (index + 0.5) * step, 1.0 / math.cos(0.5 * step)) for index in range(count)
+        on_rim(node, entry_course + turn_sign * (index + 0.5) * step, 1.0 / math.cos(0.5 * step))
+        for index in range(count)
     ]
 
 
@@ -363,7 +366,7 @@ def _corners_around(
 
     For an autopilot that leaves as soon as the loiter's time is over, the circle ends at the last tangent before that.
     """
-    radius, side = abs(node.turn), math.copysign(1.0, node.turn)
+    radius, turn_sign = abs(node.turn), math.copysign(1.0, node.turn)
     entry_altitude, required_sweep = node.up, 0.0
     loiter = node.stop.loiter
     if loiter is not None and loiter.to_height:
@@ -379,7 +382,7 @@ def _corners_around(
                 max(node.up, previous_altitude - dive_slope * leg_length), previous_altitude + climb_slope * leg_length
             )
         )
-        altitude_change = max(0.0, abs(node.up - entry_altitude) - rules.short)
+        altitude_change = max(0.0, abs(node.up - entry_altitude) - rules.altitude_tolerance)
         if altitude_change > 0.0:
             # Altitudes are interpolated between the corners, of which there is one more than intervals.
             required_sweep = (
@@ -387,14 +390,16 @@ def _corners_around(
             )
     elif loiter is not None:
         required_sweep = loiter.sweep(node.stop.airspeed, max(radius, min_radius))
-        if rules.lines_up:
+        if rules.exits_on_heading:
             required_sweep = max(0.0, required_sweep - _TURN_TO_TANGENT_RAD)
     sweep = required_sweep
     if exit_course is not None:
-        sweep_to_exit = (side * (exit_course - entry_course)) % (2.0 * math.pi)
-        exit_tolerance = LINED_UP if rules.lines_up else 1e-9
+        sweep_to_exit = (turn_sign * (exit_course - entry_course)) % (2.0 * math.pi)
+        exit_tolerance = LINED_UP if rules.exits_on_heading else 1e-9
         extra_turns = (required_sweep - sweep_to_exit - exit_tolerance) / (2.0 * math.pi)
-        leaves_at_once = rules.at_middle and not rules.lines_up and loiter is not None and not loiter.to_height
+        leaves_at_once = (
+            rules.steers_to_center and not rules.exits_on_heading and loiter is not None and not loiter.to_height
+        )
         extra_turns = math.floor(extra_turns) if leaves_at_once else math.ceil(extra_turns)
         sweep = sweep_to_exit + 2.0 * math.pi * max(0, extra_turns)
     if sweep > MAX_STOPS * CORNER:
@@ -409,5 +414,5 @@ def _corners_around(
             RoutePoint(node.stop, (east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius)
         )
     if exit_course is None and sweep > 0.0:
-        points.append(RoutePoint(node.stop, (*on_rim(node, entry_course + side * sweep), node.up)))
+        points.append(RoutePoint(node.stop, (*on_rim(node, entry_course + turn_sign * sweep), node.up)))
     return points

@@ -29,7 +29,7 @@ from flight.mission.itinerary import (
     pass_by_distance,
 )
 from flight.mission.loiter_circles import PlacedStop
-from flight.mission.return_path import LandingStart, ReturnPlace
+from flight.mission.return_path import LandingStart, ReturnPoint
 from world.arrays import Floats
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
@@ -74,7 +74,7 @@ class PlacedMission:
     notes: notes on the placing, after the itinerary's notes.
     takeoff_ground: altitude of the ground at home, m; NaN if unknown or without a take-off.
     landing_ground: altitude of the landing point, m; NaN if unknown or without a landing.
-    return_places: home, at the reference altitude of heights above home, and then the rally points; empty if the
+    return_points: home, at the reference altitude of heights above home, and then the rally points; empty if the
         mission does not end with an RTL.
     landings: landing sequences to which an RTL may continue, and that are simulated.
     landing_starts: starts of all landing sequences, including those to which no RTL continues.
@@ -88,7 +88,7 @@ class PlacedMission:
     notes: tuple[str, ...]
     takeoff_ground: float
     landing_ground: float
-    return_places: tuple[ReturnPlace, ...] = ()
+    return_points: tuple[ReturnPoint, ...] = ()
     landings: tuple[PlacedLanding, ...] = ()
     landing_starts: tuple[LandingStart, ...] = ()
     home_up: float = math.nan
@@ -134,7 +134,7 @@ def place_stops(
             replace(mission, home=home),
             _Heights(mission.source, home, origin, terrain, notes),
         )
-    places = _place_returns(return_mission, home, origin, return_heights) if itinerary.returns else ()
+    return_points = _place_return_points(return_mission, home, origin, return_heights) if itinerary.returns else ()
     numbered_starts = tuple(_landing_starts(return_mission, origin, return_heights)) if itinerary.returns else ()
     landings = _place_landings(return_mission, origin, return_heights, numbered_starts)
     return PlacedMission(
@@ -145,41 +145,41 @@ def place_stops(
         notes.lines(),
         takeoff_ground,
         landing_ground,
-        places,
+        return_points,
         landings,
         tuple(start for _, start in numbered_starts),
         heights.known_home(),
     )
 
 
-def return_places(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPlace, ...]:
+def return_points(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPoint, ...]:
     """Return home and the rally points of a mission on the map, home first; empty without a home.
 
     Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = (MissionItem(1, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0),)
-    >>> return_places(Mission(Home(36.5, 8.0, 300.0), items), GeoOrigin(36.5, 8.0), None)[0].up
+    >>> return_points(Mission(Home(36.5, 8.0, 300.0), items), GeoOrigin(36.5, 8.0), None)[0].up
     300.0
     """
     if mission.home is None:
         return ()
     heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
-    return _place_returns(mission, mission.home, origin, heights)
+    return _place_return_points(mission, mission.home, origin, heights)
 
 
-def home_place(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> ReturnPlace | None:
+def home_point(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> ReturnPoint | None:
     """Return a mission's home on the map, or None if the mission has no home; rally points are not checked.
 
-    >>> home_place(Mission(Home(36.5, 8.0, 300.0), ()), GeoOrigin(36.5, 8.0), None).up
+    >>> home_point(Mission(Home(36.5, 8.0, 300.0), ()), GeoOrigin(36.5, 8.0), None).up
     300.0
     """
-    places = return_places(replace(mission, rally=()), origin, terrain)
-    return places[0] if places else None
+    points = return_points(replace(mission, rally=()), origin, terrain)
+    return points[0] if points else None
 
 
 def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[LandingStart, ...]:
-    """Return the starts of a mission's landing sequences: the first place after each DO_LAND_START.
+    """Return the starts of a mission's landing sequences: the first position after each DO_LAND_START.
 
     A mission without a home has none, since it has nowhere to return to. Without a stated altitude a start has the
     altitude of home.
@@ -206,9 +206,9 @@ def _landing_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") ->
         if mark.command != Command.DO_LAND_START or first_item is None:
             continue
         start = _landing_stop(first_item, origin, heights)
-        next_places = _stops_to_landing(mission.items[index + 1 :], origin, heights)[1:]
+        next_stops = _stops_to_landing(mission.items[index + 1 :], origin, heights)[1:]
         mark_position = _item_position(mark, origin, heights) if mark.has_position else start.place
-        yield index, start._replace(mark=mark_position, onward=next_places)
+        yield index, start._replace(mark=mark_position, next_stops=next_stops)
 
 
 def _place_landings(
@@ -256,13 +256,13 @@ def landing_sequence(
 
 def _stops_to_landing(items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights") -> tuple[LandingStart, ...]:
     """Return the stops of items up to the first landing."""
-    places = []
+    stops = []
     for item in items:
         if item.command in LANDINGS:
             break
         if _is_navigation_target(item):
-            places.append(_landing_stop(item, origin, heights))
-    return tuple(places)
+            stops.append(_landing_stop(item, origin, heights))
+    return tuple(stops)
 
 
 def _is_navigation_target(item: MissionItem) -> bool:
@@ -276,31 +276,31 @@ def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_Heights") ->
 
 
 def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
-    place, loiter = _item_position(item, origin, heights), loiter_of(item)
+    position, loiter = _item_position(item, origin, heights), loiter_of(item)
     radius = (loiter or Loiter(0.0)).radius
     return LandingStart(
-        *(item.seq, place, place, loiter is not None, radius),
+        *(item.seq, position, position, loiter is not None, radius),
         lands=item.command in LANDINGS,
         pass_by=pass_by_distance(item),
         home_up=heights.known_home(),
     )
 
 
-def landing_places(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:
+def landing_positions(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, float, float], ...]:
     """Return the item number, east and north (m) of each landing item with a position.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> land = MissionItem(2, Command.NAV_LAND, Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, 36.5, 8.0, 10.0)
-    >>> landing_places(Mission(None, (land,)), GeoOrigin(36.5, 8.0))
+    >>> landing_positions(Mission(None, (land,)), GeoOrigin(36.5, 8.0))
     ((2, 0.0, 0.0),)
     """
-    places = []
+    positions = []
     for item in mission.items:
         if item.command in LANDINGS and item.has_position:
             stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
             east, north = on_map(mission.source, (stop,), origin)[0].tolist()
-            places.append((item.seq, float(east), float(north)))
-    return tuple(places)
+            positions.append((item.seq, float(east), float(north)))
+    return tuple(positions)
 
 
 def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
@@ -318,23 +318,25 @@ def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
     )
 
 
-def _place_returns(mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights") -> tuple[ReturnPlace, ...]:
+def _place_return_points(
+    mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights"
+) -> tuple[ReturnPoint, ...]:
     """Return home and the rally points on the map.
 
     Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
     """
     east, north = to_map(origin, home.lat_deg, home.lon_deg)
-    launch = ReturnPlace(float(east), float(north), heights.home_amsl())
-    places = [launch]
+    launch = ReturnPoint(float(east), float(north), heights.home_amsl())
+    return_points = [launch]
     stops = rally_stops(mission)
     numbers = [number for number, item in enumerate(mission.rally, 1) if item.has_position]
-    points = on_map(mission.source, stops, origin).tolist()
-    for number, stop, (point_east, point_north) in zip(numbers, stops, points, strict=True):
+    rally_positions = on_map(mission.source, stops, origin).tolist()
+    for number, stop, (point_east, point_north) in zip(numbers, stops, rally_positions, strict=True):
         # Ground stations always write a rally point's height; a point without height gets home's altitude.
         up = heights.amsl(stop, point_east, point_north, launch.up)
         base = launch.up if stop.frame in OVER_HOME else 0.0
-        places.append(ReturnPlace(point_east, point_north, up, base, number))
-    return tuple(places)
+        return_points.append(ReturnPoint(point_east, point_north, up, base, number))
+    return tuple(return_points)
 
 
 def _place_stops(
@@ -504,13 +506,14 @@ def _offset_vertical_leg(stops: list[PlacedStop], point: Floats) -> Floats:
 
 def _merge_stops(source: str, previous: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
     """Merge a stop with the previous stop at the same position, and return the merged stop."""
-    before, new_stop = previous.stop, new.stop
+    previous_stop, new_stop = previous.stop, new.stop
     climb = float(new.position[2] - previous.position[2])
     if abs(climb) >= SAME_PLACE:
         direction = "above" if climb > 0.0 else "below"
         if new_stop.command not in TAKEOFFS:
             raise MissionError(
-                f"{source}: {_stop_name(new_stop)}: {abs(climb):.1f} m straight {direction} {_stop_name(before)}:"
+                f"{source}: {_stop_name(new_stop)}: {abs(climb):.1f} m straight {direction}"
+                f" {_stop_name(previous_stop)}:"
                 " no fixed wing flies that; two places must be identical, or at least 1 m apart over the ground",
                 file=source,
                 field=_stop_name(new_stop),
@@ -519,8 +522,8 @@ def _merge_stops(source: str, previous: PlacedStop, new: PlacedStop, notes: Note
             f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", new_stop.item
         )
     else:
-        notes.add(f"at the place of {_stop_name(before)}: merged with it", new_stop.item)
-    return before if before.item >= 0 else new_stop
+        notes.add(f"at the place of {_stop_name(previous_stop)}: merged with it", new_stop.item)
+    return previous_stop if previous_stop.item >= 0 else new_stop
 
 
 def _stop_name(stop: ItineraryStop) -> str:

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from flight.mission.items import Command, Mission
-from flight.mission.placing import return_places
-from flight.mission.return_path import ReturnPlace, ReturnRules
+from flight.mission.placing import return_points
+from flight.mission.return_path import ReturnPoint, ReturnRules
 from flight.mission.route import Route
 from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip, strip_slopes
 from world.arrays import Floats
@@ -33,7 +33,7 @@ _RING_COUNT = 13
 _DIRECTION_COUNT = 72
 
 
-def field_notes(
+def preflight_notes(
     mission: Mission, route: Route, scenario: Scenario, rules: ReturnRules, parameters: Mapping[str, float]
 ) -> tuple[str, ...]:
     """Return notes on a mission's launch, landing, home, rally points and RTL.
@@ -43,7 +43,7 @@ def field_notes(
     """
     rally_problems: tuple[str, ...] = ()
     try:
-        return_targets = return_places(mission, scenario.origin, scenario.terrain)
+        return_targets = return_points(mission, scenario.origin, scenario.terrain)
     except MissionError as error:
         # Rally points of another field: only an RTL would fly to them, and such an RTL is refused itself.
         return_targets, rally_problems = (), (str(error),)
@@ -89,7 +89,7 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
 
 
 def _note_rally_points(
-    points: tuple[ReturnPlace, ...], route: Route, scenario: Scenario, rules: ReturnRules
+    points: tuple[ReturnPoint, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
     """Note rally points below ground, and rally points beyond the distance limit of any RTL from the route."""
     for point in points:
@@ -117,7 +117,7 @@ def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
     return float(np.hypot(*(leg_starts + fractions[:, None] * leg_vectors - np.array(point)).T).min())
 
 
-def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
+def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
     """Note an RTL to home whose altitude is below the ground under its loiter."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
@@ -127,10 +127,10 @@ def _note_low_return(home: tuple[ReturnPlace, ...], scenario: Scenario, rules: R
     ground = scenario.terrain.height(
         home[0].east + distances * np.sin(angles), home[0].north + distances * np.cos(angles)
     )
-    highest = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
-    if highest >= rules.height:
+    ground_height = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
+    if ground_height >= rules.height:
         yield (
-            f"a return circles home {rules.height:.0f} m over it, and the ground there is {highest:.0f} m over it"
+            f"a return circles home {rules.height:.0f} m over it, and the ground there is {ground_height:.0f} m over it"
             f" within {radius:.0f} m"
         )
 
@@ -148,8 +148,8 @@ _LEVEL_TEXT = "is level"
 
 def _slope_text(slope: float) -> str:
     """Return a description of a slope of the ground (m per m)."""
-    shown = f"{abs(slope):.1%}"
-    return _LEVEL_TEXT if shown == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {shown}"
+    percent_text = f"{abs(slope):.1%}"
+    return _LEVEL_TEXT if percent_text == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {percent_text}"
 
 
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:

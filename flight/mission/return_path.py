@@ -19,10 +19,10 @@ from flight.mission.loiter_circles import CORNER, Node, RoutePoint, circle_corne
 from world.geometry import wrap
 
 # East, north, up, m.
-Place = tuple[float, float, float]
+Position = tuple[float, float, float]
 
 
-class ReturnPlace(NamedTuple):
+class ReturnPoint(NamedTuple):
     """Home or a rally point on the map.
 
     east, north, up: m, up AMSL; home's altitude is the ground altitude there.
@@ -63,30 +63,30 @@ class LandingStart(NamedTuple):
     circles: True if the item is a loiter.
     radius: loiter radius, m, negative to the left; 0 if not stated.
     lands: True if the item is the landing itself.
-    onward: the next items up to the landing; their own ``onward`` is empty.
+    next_stops: the next items up to the landing; their own ``next_stops`` is empty.
     pass_by: distance that ArduPlane flies past the item, m.
     home_up: altitude of home, m AMSL, NaN if unknown.
     """
 
     item: int
-    place: Place
-    mark: Place
+    place: Position
+    mark: Position
     circles: bool = False
     radius: float = 0.0
     lands: bool = False
-    onward: tuple["LandingStart", ...] = ()
+    next_stops: tuple["LandingStart", ...] = ()
     pass_by: float = 0.0
     home_up: float = math.nan
 
 
-def nearest_landing(position: Place, landings: Sequence[LandingStart]) -> LandingStart | None:
+def nearest_landing_sequence(position: Position, landings: Sequence[LandingStart]) -> LandingStart | None:
     """Return the landing sequence that ArduPlane chooses at a position (east, north, up): the nearest in 3D.
 
     Follows `AP_Mission::get_landing_sequence_start` (libraries/AP_Mission/AP_Mission.cpp). The result is None without
     sequences.
 
     >>> far, near = (LandingStart(k, (x, 0.0, 50.0), (x, 0.0, 50.0)) for k, x in ((8, 900.0), (12, -500.0)))
-    >>> nearest_landing((0.0, 0.0, 50.0), [far, near]).item, nearest_landing((0.0, 0.0, 50.0), [])
+    >>> nearest_landing_sequence((0.0, 0.0, 50.0), [far, near]).item, nearest_landing_sequence((0.0, 0.0, 50.0), [])
     (12, None)
     """
     return min(landings, key=lambda landing: math.dist(position, landing.mark), default=None)
@@ -112,15 +112,15 @@ class ReturnRules:
         altitude difference, 0 for none.
     first_bank: bank limit during that climb, rad.
     sink: maximum descent rate, m/s.
-    least_slope: altitude difference below which a descent is a step instead of a slope, m.
+    min_slope_height: altitude difference below which a descent is a step instead of a slope, m.
     rally_limit: maximum distance to the nearest rally point, m, beyond which the RTL goes home; 0 for no limit.
     includes_home: True if home is chosen when it is nearer than any rally point.
     slope_to_stated_height: True if the slope down to a rally point treats its height above home as an altitude AMSL,
         and is never higher than its start. ArduPlane 4.6-dev does that: it holds its altitude first, and
         descends later than on a straight slope to the point.
     rally_height: height above a rally point's own altitude at the end of the RTL, m.
-    landing_counts: True if the RTL may go to a mission's landing, which is noted and not simulated.
-    instead: note on rules of the autopilot that are simulated differently; "" for none.
+    may_use_landing: True if the RTL may go to a mission's landing, which is noted and not simulated.
+    deviation_note: note on rules of the autopilot that are simulated differently; "" for none.
     lands: "circle" if the RTL continues to a landing sequence from a loiter at home or a rally point, "straight" if it
         flies there directly, "" if it stays in its loiter.
     holds_height: True if the RTL holds its altitude until it is over its target and descends in circles there, and
@@ -135,14 +135,14 @@ class ReturnRules:
     climb_first: float = 0.0
     first_bank: float = math.radians(5.0)
     sink: float = math.inf
-    least_slope: float = 15.0
+    min_slope_height: float = 15.0
     rally_limit: float = 5000.0
     includes_home: bool = False
     slope_to_stated_height: bool = False
     holds_height: bool = False
     rally_height: float = 0.0
-    landing_counts: bool = False
-    instead: str = ""
+    may_use_landing: bool = False
+    deviation_note: str = ""
     lands: Literal["", "circle", "straight"] = ""
 
 
@@ -164,7 +164,7 @@ class ReturnTarget(NamedTuple):
     straight: True if the RTL flies there directly, and ``position`` is the start of the sequence.
     """
 
-    position: Place
+    position: Position
     name: str
     reason: str
     distance: float
@@ -191,14 +191,14 @@ class ReturnAbility(NamedTuple):
     airspeed: float
 
 
-def choose_target(rules: ReturnRules, start: Place, home: ReturnPlace, rally: Sequence[ReturnPlace]) -> ReturnTarget:
+def choose_target(rules: ReturnRules, start: Position, home: ReturnPoint, rally: Sequence[ReturnPoint]) -> ReturnTarget:
     """Choose the destination of an RTL: the nearest rally point, or home.
 
     If the nearest rally point is beyond the distance limit, the RTL goes home, at any distance.
 
     start: east, north, up at the start of the RTL, m AMSL.
 
-    >>> home, near, far = (ReturnPlace(*at) for at in ((300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)))
+    >>> home, near, far = (ReturnPoint(*at) for at in ((300.0, 0.0, 400.0), (1000.0, 0.0, 500.0), (0.0, 5000.0, 500.0)))
     >>> choose_target(ReturnRules(), (0.0, 0.0, 700.0), home, [far, near])[:3]
     ((1000.0, 0.0, 500.0), 'rally point 2', 'the nearest of 2 rally points')
     >>> choose_target(ReturnRules(rally_limit=900.0), (0.0, 0.0, 700.0), home, [near])[:2]
@@ -241,13 +241,13 @@ def choose_target(rules: ReturnRules, start: Place, home: ReturnPlace, rally: Se
     )
 
 
-def described_return(target: ReturnTarget, rules: ReturnRules, start_altitude: float, continuation: str = "") -> str:
+def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, continuation: str = "") -> str:
     """Return a note that describes an RTL.
 
     start_altitude: altitude of its start, m AMSL.
     continuation: name of the sequence after the loiter; "" if the RTL stays in the loiter.
 
-    >>> described_return(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
+    >>> rtl_note(ReturnTarget((0.0, 0.0, 435.0), "home", "", 3210.0), ReturnRules(), 1090.0)
     'NAV_RETURN_TO_LAUNCH: to home, 3.2 km away, sinking 655 m on a straight slope to 435 m AMSL; circles for 60 s; ...'
     """
     altitude_gain = target.position[2] - start_altitude
@@ -257,7 +257,7 @@ def described_return(target: ReturnTarget, rules: ReturnRules, start_altitude: f
         if altitude_gain <= -1.0
         else f"climbing {altitude_gain:.0f} m at once to"
     )
-    if -altitude_gain >= 1.0 and abs(target.slope_base - altitude_gain) < rules.least_slope:
+    if -altitude_gain >= 1.0 and abs(target.slope_base - altitude_gain) < rules.min_slope_height:
         altitude_text = f"sinking {-altitude_gain:.0f} m at once to"
     if rules.holds_height:
         altitude_text = f"climbing {altitude_gain:.0f} m first, to"
@@ -285,13 +285,13 @@ def described_return(target: ReturnTarget, rules: ReturnRules, start_altitude: f
     )
 
 
-def lay_return(
+def rtl_waypoints(
     previous_points: Sequence[RoutePoint],
     stop: ItineraryStop,
     target: ReturnTarget,
     rules: ReturnRules,
     ability: ReturnAbility,
-    next_position: Place | None = None,
+    next_position: Position | None = None,
 ) -> list[RoutePoint]:
     """Return the waypoints of an RTL: its turn, its straight leg, and the loiter at its end.
 
@@ -312,7 +312,7 @@ def lay_return(
     radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
     circle = Node(stop, *target.position, radius)
     dive = min(ability.dive, rules.sink / ability.airspeed)
-    builder = _ReturnBuilder(circle, target.slope_base, rules.least_slope, ability, dive, start, next_position)
+    builder = _ReturnBuilder(circle, target.slope_base, rules.min_slope_height, ability, dive, start, next_position)
     if _distance(start, target.position) <= abs(radius) + _MIN_TANGENT_M:
         # The return starts inside the loiter: fly straight on to its circle.
         builder.add_loiter(*_rim_point_ahead(start, course, circle))
@@ -332,8 +332,8 @@ class _ReturnBuilder:
         min_slope_height: float,
         ability: ReturnAbility,
         dive_slope: float,
-        start: Place,
-        next_position: Place | None,
+        start: Position,
+        next_position: Position | None,
     ) -> None:
         self.points: list[RoutePoint] = []
         self._stop, self._circle, self._slope_base = circle.stop, circle, slope_base
@@ -445,7 +445,7 @@ class _ReturnBuilder:
         self._add_arc(self._circle, course, sweep, on_circle=True)
         self._add_waypoint(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
 
-    def _add_exit(self, course: float, spiral_angle: float, next_position: Place) -> None:
+    def _add_exit(self, course: float, spiral_angle: float, next_position: Position) -> None:
         """Add the loiter until its altitude is reached, and the turn towards the next position.
 
         The turn takes the shorter direction.
@@ -467,10 +467,10 @@ class _ReturnBuilder:
         Choose the shorter direction; return None if there is no such tangent.
         """
         course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
-        side = math.copysign(1.0, course_error)
+        turn_sign = math.copysign(1.0, course_error)
         arcs = [
             arc
-            for arc in (self._turn_on_side(course, side * radius), self._turn_on_side(course, -side * radius))
+            for arc in (self._turn_on_side(course, turn_sign * radius), self._turn_on_side(course, -turn_sign * radius))
             if arc
         ]
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
@@ -524,7 +524,7 @@ class _ReturnBuilder:
         )
 
 
-def _rim_point_ahead(position: Place, course: float, circle: Node) -> tuple[float, float, float]:
+def _rim_point_ahead(position: Position, course: float, circle: Node) -> tuple[float, float, float]:
     """Return the point where a straight path from inside a circle meets it, and the course along the circle there."""
     offset_east, offset_north = position[0] - circle.east, position[1] - circle.north
     distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)
@@ -542,11 +542,11 @@ def _rim_point_ahead(position: Place, course: float, circle: Node) -> tuple[floa
     return east, north, bearing + math.copysign(0.5 * math.pi, circle.turn)
 
 
-def _course(a: Place, b: Place) -> float:
+def _course(a: Position, b: Position) -> float:
     return math.atan2(b[0] - a[0], b[1] - a[1])
 
 
-def _distance(a: Place, b: Place | ReturnPlace) -> float:
+def _distance(a: Position, b: Position | ReturnPoint) -> float:
     return math.hypot(b[0] - a[0], b[1] - a[1])
 
 

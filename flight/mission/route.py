@@ -21,7 +21,7 @@ from flight.mission.loiter_circles import (
     PlacedStop,
     RoutePoint,
     SpiralSlopes,
-    Unjoined,
+    UnjoinedStop,
     lay_out_waypoints,
 )
 from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedLanding, PlacedMission, place_stops
@@ -32,9 +32,9 @@ from flight.mission.return_path import (
     ReturnCircle,
     ReturnRules,
     choose_target,
-    described_return,
-    lay_return,
-    nearest_landing,
+    nearest_landing_sequence,
+    rtl_note,
+    rtl_waypoints,
 )
 from world.arrays import Floats
 from world.errors import MissionError
@@ -94,7 +94,7 @@ class Route:
     return_to: ReturnCircle | None = None
     straight_to: int = -1
     stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    unjoined: tuple[Unjoined, ...] = ()
+    unjoined: tuple[UnjoinedStop, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
     above_ground: Floats = field(default_factory=lambda: np.zeros(0))
     min_ground_speed: Floats = field(default_factory=lambda: np.zeros(0))
@@ -224,7 +224,7 @@ def fly_over_waypoints(
     limits: Limits | None,
     turn_distance: Callable[[float, float], float] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return True for each waypoint that the fly-by arc at the bank limit misses, and that is flown over, (w,).
+    """Return True for each waypoint that is flown over, because the fly-by arc at the bank limit misses it, (w,).
 
     points: (w, 3) m.
     airspeed: (w - 1,) m/s.
@@ -346,8 +346,10 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     )
 
 
-def _lead_point(point: np.ndarray, course: float, leg_course: float, limits: Limits, side: float) -> np.ndarray | None:
-    """Return the outer end of the lead-in (side -1) or lead-out leg (side 1), or None if no turn is needed.
+def _lead_point(
+    point: np.ndarray, course: float, leg_course: float, limits: Limits, end_sign: float
+) -> np.ndarray | None:
+    """Return the outer end of the lead-in (end_sign -1) or lead-out leg (end_sign 1), or None if no turn is needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course there, rad.
@@ -356,10 +358,10 @@ def _lead_point(point: np.ndarray, course: float, leg_course: float, limits: Lim
     turn = abs(float(wrap(course - leg_course)))
     if turn < _MIN_COURSE_CHANGE_RAD:
         return None
-    radius = limits.turn_radius(*((course, leg_course) if side < 0.0 else (leg_course, course)), float(point[2]))
+    radius = limits.turn_radius(*((course, leg_course) if end_sign < 0.0 else (leg_course, course)), float(point[2]))
     # A reversal has no tangent; twice the radius shows it as a sharp corner.
     tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
-    step = side * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
+    step = end_sign * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
     return point + step * np.array([math.sin(course), math.cos(course), 0.0])
 
 
@@ -383,7 +385,7 @@ def make_route(
     limits: Limits | None = None,
     rules: RouteRules = USUAL_ROUTE_RULES,
 ) -> Route:
-    """Return the route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
+    """Return the route of a mission on the map about ``origin``: `place_stops`, then `route_through_stops`.
 
     terrain: None if unknown; heights above terrain are then an error.
     default_airspeed: airspeed until the mission sets one, m/s (the cruiseSpeed of a `.plan` file, a ground station's
@@ -408,11 +410,11 @@ def make_route(
     >>> route.started
     'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
-    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
+    return route_through_stops(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits, rules)
 
 
-def lay_route(
-    placed: PlacedMission,
+def route_through_stops(
+    placed_mission: PlacedMission,
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
@@ -425,26 +427,28 @@ def lay_route(
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
-    >>> lay_route(placed, 25.0, fly_over=False).airspeed.tolist()
+    >>> route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist()
     [25.0]
     """
-    mission, notes = placed.mission, Notes()
-    returns, loiters, reads_as_px4, turn_distance, acceptance_limit = rules
-    all_stops = _insert_gates(placed, notes) if reads_as_px4 else list(placed.stops)
+    mission, notes = placed_mission.mission, Notes()
+    return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
+    all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else list(placed_mission.stops)
     placed_stops = [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in all_stops]
-    return_stop = placed_stops.pop() if placed.itinerary.returns else None
-    direct_landing = None if return_stop is None else _find_direct_landing(placed, placed_stops, returns, notes)
+    return_stop = placed_stops.pop() if placed_mission.itinerary.returns else None
+    direct_landing = (
+        None if return_stop is None else _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
+    )
     if direct_landing is not None:
         placed_stops += [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in direct_landing.stops]
-    lay_out = partial(_lay_out_waypoints, mission.source, limits, loiters, notes)
+    lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
     points, unjoined = lay_out(placed_stops)
-    _note_circles(placed.itinerary, placed_stops, loiters, notes)
+    _note_circles(placed_mission.itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
     if return_stop is not None and direct_landing is None:
-        return_fields, landing = _append_return(placed, return_stop.stop, points, returns, limits, notes)
+        return_fields, landing = _append_return(placed_mission, return_stop.stop, points, return_rules, limits, notes)
         if landing is not None:
             points += lay_out([_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in landing.stops])[0]
-    _check_place_count(mission.source, len(points))
+    _check_point_count(mission.source, len(points))
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
@@ -458,17 +462,17 @@ def lay_route(
         acceptance=acceptance,
         fly_over=(arcs == 0.0) & (fly_over | misses_arc),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
-        started=_start_text(placed.itinerary, stops[0], placed.origin, waypoints),
-        notes=_route_notes(placed.itinerary, landing, reads_as_px4) + placed.notes + notes.lines(),
+        started=_start_text(placed_mission.itinerary, stops[0], placed_mission.origin, waypoints),
+        notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),
         arcs=arcs,
         stops=np.cumsum([False, *(a is not b for a, b in pairwise(stops))]),
         straight_to=-1 if landing is None else [stop.item for stop in stops].index(landing.stops[0].stop.item),
-        endless=placed.itinerary.endless,
-        takeoff_ground=placed.takeoff_ground,
-        landing_ground=placed.landing_ground if landing is None else landing.ground,
-        **_columns_with_nan(stops, placed.home_up),
-        unjoined=unjoined if loiters.at_middle else (),  # An autopilot that flies on tangents omits these.
-        open_items=_open_items(placed.itinerary, landing, reads_as_px4),
+        endless=placed_mission.itinerary.endless,
+        takeoff_ground=placed_mission.takeoff_ground,
+        landing_ground=placed_mission.landing_ground if landing is None else landing.ground,
+        **_columns_with_nan(stops, placed_mission.home_up),
+        unjoined=unjoined if loiter_rules.steers_to_center else (),  # An autopilot that flies on tangents omits these.
+        open_items=_open_items(placed_mission.itinerary, landing, reads_as_px4),
         **return_fields,
     )
 
@@ -490,7 +494,7 @@ def _height_above_ground(stop: ItineraryStop) -> float:
     return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else math.nan
 
 
-def _check_place_count(source: str, point_count: int) -> None:
+def _check_point_count(source: str, point_count: int) -> None:
     """Raise MissionError if a route has fewer than two points."""
     if point_count < 2:
         message = f"{source}: {point_count} place to fly to: expected at least two different ones"
@@ -514,12 +518,12 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
 
 def _lay_out_waypoints(
     source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[PlacedStop]
-) -> tuple[list[RoutePoint], tuple[Unjoined, ...]]:
+) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
     return lay_out_waypoints(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
 
 
 def _find_direct_landing(
-    placed: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
+    placed_mission: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
     """Return the landing sequence to which an RTL flies directly, or None.
 
@@ -528,31 +532,33 @@ def _find_direct_landing(
     if rules.lands != "straight" or not stops:
         return None
     east, north, up = stops[-1].position.tolist()
-    landing = _find_landing(placed, (east, north, up), notes)
+    landing = _find_landing(placed_mission, (east, north, up), notes)
     if landing is None:
         return None
-    distance, seq = math.dist((east, north), landing.start.place[:2]), placed.itinerary.stops[-1].item
+    distance, seq = math.dist((east, north), landing.start.place[:2]), placed_mission.itinerary.stops[-1].item
     text = f"at once to the landing sequence at item {landing.start.item}, {distance / 1000.0:.1f} km away"
-    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed)}", seq)
+    notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed_mission)}", seq)
     return landing
 
 
-def _find_landing(placed: PlacedMission, position: tuple[float, float, float], notes: Notes) -> PlacedLanding | None:
+def _find_landing(
+    placed_mission: PlacedMission, position: tuple[float, float, float], notes: Notes
+) -> PlacedLanding | None:
     """Return the landing sequence that an RTL chooses at a position (m).
 
     Return None and add a note if the simulated RTL does not continue to that sequence.
     """
-    start = nearest_landing(position, placed.landing_starts)
-    landing = next((landing for landing in placed.landings if landing.start == start), None)
+    start = nearest_landing_sequence(position, placed_mission.landing_starts)
+    landing = next((landing for landing in placed_mission.landings if landing.start == start), None)
     if start is not None and landing is None:
         reason = "begins with the landing itself" if start.lands else "does not lead to a landing"
         text = f"the landing sequence at item {start.item} {reason}: {RETURN_NOT_FLOWN_ON}"
-        notes.add(text, placed.itinerary.stops[-1].item)
+        notes.add(text, placed_mission.itinerary.stops[-1].item)
     return landing
 
 
-def _landing_choice_text(placed: PlacedMission) -> str:
-    count = len(placed.landing_starts)
+def _landing_choice_text(placed_mission: PlacedMission) -> str:
+    count = len(placed_mission.landing_starts)
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
 
@@ -562,18 +568,18 @@ def _note_circles(itinerary: Itinerary, placed_stops: list[PlacedStop], loiters:
     placed_stops: stops of the mission, without an RTL.
     """
     final_stop = placed_stops[-1].stop
-    if loiters.unflown and (
+    if loiters.unflown_note and (
         itinerary.returns or any(placed_stop.stop.loiter is not None for placed_stop in placed_stops)
     ):
-        notes.add(loiters.unflown)
+        notes.add(loiters.unflown_note)
     if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and final_stop.loiter is None:
         notes.add(loiters.end_note(), final_stop.item)
-    if loiters.before_return and itinerary.returns and final_stop.loiter is not None:
-        notes.add(loiters.before_return, final_stop.item)
+    if loiters.rtl_exit_note and itinerary.returns and final_stop.loiter is not None:
+        notes.add(loiters.rtl_exit_note, final_stop.item)
 
 
 def _append_return(
-    placed: PlacedMission,
+    placed_mission: PlacedMission,
     stop: ItineraryStop,
     points: list[RoutePoint],
     rules: ReturnRules,
@@ -585,8 +591,8 @@ def _append_return(
     The landing sequence is None if the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside
     the allowed range.
     """
-    source, start = placed.mission.source, points[-1].position
-    home, *rally = placed.return_places
+    source, start = placed_mission.mission.source, points[-1].position
+    home, *rally = placed_mission.return_points
     target = choose_target(rules, start, home, rally)
     target_altitude = target.position[2]
     if not LOWEST <= target_altitude <= HIGHEST:
@@ -604,34 +610,36 @@ def _append_return(
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
-    landing = _find_landing(placed, target.position, notes) if rules.lands == "circle" else None
+    landing = _find_landing(placed_mission, target.position, notes) if rules.lands == "circle" else None
     next_text = (
-        "" if landing is None else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed)}"
+        ""
+        if landing is None
+        else f"the landing sequence at item {landing.start.item}{_landing_choice_text(placed_mission)}"
     )
-    notes.add(described_return(target, rules, start[2], next_text), stop.item)
-    if rules.landing_counts and any(item.command in LANDINGS for item in placed.mission.items):
+    notes.add(rtl_note(target, rules, start[2], next_text), stop.item)
+    if rules.may_use_landing and any(item.command in LANDINGS for item in placed_mission.mission.items):
         notes.add(
             "the mission's landing is also a place to return to, which is not simulated: the "
             f"return is to {target.name}",
             stop.item,
         )
-    if rules.instead:
-        notes.add(rules.instead, stop.item)
+    if rules.deviation_note:
+        notes.add(rules.deviation_note, stop.item)
     start_index = len(points) - 1
-    next_place = None if landing is None else landing.start.place
-    points += lay_return(points, stop, target, rules, ability, next_place)
+    next_position = None if landing is None else landing.start.place
+    points += rtl_waypoints(points, stop, target, rules, ability, next_position)
     circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)
     return {"return_from": start_index, "return_to": circle}, landing
 
 
-def _insert_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
+def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[PlacedStop]:
     """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed.
 
     Each gate is placed where its plane cuts the leg, because an aircraft on the leg passes the gate there. The plane is
     perpendicular to the line from the gate to the next stop.
     """
-    placed_stops = list(placed.stops[:1])
-    for next_stop in placed.stops[1:]:
+    placed_stops = list(placed_mission.stops[:1])
+    for next_stop in placed_mission.stops[1:]:
         stop, previous, last_fraction = next_stop.stop, placed_stops[-1], 0.0
         for index, gate in enumerate(stop.gates):
             next_airspeed = stop.gates[index + 1].airspeed if index + 1 < len(stop.gates) else stop.px4_airspeed
@@ -644,7 +652,7 @@ def _insert_gates(placed: PlacedMission, notes: Notes) -> list[PlacedStop]:
                 notes.add(text, gate.item)
                 continue
             fraction = _gate_fraction(
-                previous.position, next_stop.position, to_map(placed.origin, gate.lat_deg, gate.lon_deg)
+                previous.position, next_stop.position, to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg)
             )
             gate_position = previous.position + fraction * (next_stop.position - previous.position)
             is_apart = (

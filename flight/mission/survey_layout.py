@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.mission.items import Command, Mission, MissionItem, command_name, is_navigation, on_grid, renumbered
+from flight.mission.items import Command, Mission, MissionItem, command_name, is_navigation, on_grid, renumber_items
 from flight.mission.route import Route
 from flight.mission.surveys import Survey
 from world.arrays import Floats
@@ -64,7 +64,7 @@ class _SurveyItems(NamedTuple):
     behind: int
 
 
-def turn_around_of(route: Route, survey: Survey) -> float:
+def min_turn_around(route: Route, survey: Survey) -> float:
     """Return the minimum straight extension of a survey's lines beyond their photos at a turn-around, m."""
     return min(_lead_lengths(route, survey))
 
@@ -76,7 +76,7 @@ def _lead_lengths(route: Route, survey: Survey) -> list[float]:
     return [math.dist(points[start], points[end]) for start, end in ends]
 
 
-def kept_layout(mission: Mission, route: Route, survey: Survey) -> str:
+def layout_obstacle(mission: Mission, route: Route, survey: Survey) -> str:
     """Return the reason why a survey's layout cannot be changed, or "" if it can be changed."""
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
         return "the mission jumps"
@@ -100,10 +100,10 @@ def with_layout(
 ) -> Mission | None:
     """Return the mission with a new layout of a survey, or None if that is impossible.
 
-    route: the mission's route, on the map about ``origin``. A survey for which `kept_layout` gives a reason cannot be
-        changed; a course change also needs straight lines and one altitude for all of them.
+    route: the mission's route, on the map about ``origin``. A survey with a `layout_obstacle` cannot be changed; a
+        course change also needs straight lines and one altitude for all of them.
     """
-    if kept_layout(mission, route, survey):
+    if layout_obstacle(mission, route, survey):
         return None
     items, lines = _survey_items(mission, route, survey), list[_Line]()
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
@@ -130,7 +130,7 @@ def with_layout(
     )
     # Renumber all items: two items with one number would be ambiguous.
     numbered = [replace(item, seq=seq) for seq, item in enumerate([*new_items, *mission.items[items.behind :]], 1)]
-    return renumbered(replace(mission, items=tuple(numbered)))
+    return renumber_items(replace(mission, items=tuple(numbered)))
 
 
 def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:

@@ -122,7 +122,7 @@ class Survey:
         """Return the first and last waypoint of each turn-around."""
         return [(line.last, following.first) for line, following in zip(self.lines[:-1], self.lines[1:], strict=True)]
 
-    def ways_onto_lines(self) -> list[tuple[int, int]]:
+    def transitions(self) -> list[tuple[int, int]]:
         """Return the turn-arounds, the entry to the first line and the exit of the last line.
 
         Each is a pair of waypoints between which the autopilot chooses the path.
@@ -287,7 +287,7 @@ class _Runs:
         self.points, self.runs = points, runs
         self._distances = np.concatenate([[0.0], np.cumsum(leg_runs(points))]).tolist()
         self._spacings = dict[tuple[int, int], float | None]()
-        self._following = dict[int, list[int]]()
+        self._next_lines = dict[int, list[int]]()
         self._midpoints = dict[_Line, Floats]()
 
     def ends(self, line: _Line) -> tuple[int, int]:
@@ -317,13 +317,13 @@ class _Runs:
             self._spacings[run, other_run] = _run_spacing(self.points, self.runs[run], self.runs[other_run])
         return self._spacings[run, other_run]
 
-    def following(self, run: int) -> list[int]:
-        """Return the runs that can be the next line after a run, or the first part of that line, in flying order."""
-        if run not in self._following:
-            self._following[run] = self._search_following(run)
-        return self._following[run]
+    def next_lines(self, run: int) -> list[int]:
+        """Return the runs after a run with which the next line may start, in flying order."""
+        if run not in self._next_lines:
+            self._next_lines[run] = self._find_next_lines(run)
+        return self._next_lines[run]
 
-    def _search_following(self, run: int) -> list[int]:
+    def _find_next_lines(self, run: int) -> list[int]:
         candidates, own_length = list[tuple[int, float, float]](), self.length((run, run))
         for next_run in range(run + 1, min(len(self.runs), run + 2 + _MAX_TURN_AROUND_RUNS)):
             link_length = self._distances[self.runs[next_run][0]] - self._distances[self.runs[run][1]]
@@ -376,13 +376,13 @@ def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of a chain that starts at a run; the first line may start before that run."""
+    """Return the lines of a chain from a run on; the first line may start before that run."""
     chain = [(start, start)]
     while True:
         first_run, last_run = chain[-1]
-        for next_run in runs.following(last_run):
+        for next_run in runs.next_lines(last_run):
             bend_count = 0
-            while (len(chain) == 1 or last_run - bend_count > first_run) and _stay_parallel(
+            while (len(chain) == 1 or last_run - bend_count > first_run) and _are_parallel(
                 runs, last_run, next_run, bend_count + 1
             ):
                 bend_count += 1
@@ -396,7 +396,7 @@ def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
             return chain
 
 
-def _stay_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
+def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
     """Return True if two lines are still parallel ``bend_count`` runs before and after their turn-around."""
     run_before, run_after = run - bend_count, next_run + bend_count
     if (
@@ -529,16 +529,16 @@ def _without_leads(
     return tuple(inner_lines)
 
 
-def _without_lead(points: Floats, line: PhotoLine, lead: float) -> PhotoLine:
-    """Shorten a line to the waypoints at a distance ``lead`` (m) from the ends of its run.
+def _without_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLine:
+    """Shorten a line to the waypoints at a distance ``lead_length`` (m) from the ends of its run.
 
     Keep an end that has no such waypoint.
     """
     inner = range(line.first + 1, line.last)
-    tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead)
+    tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead_length)
 
     def points_at_lead_distance(end: int) -> list[int]:
-        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead) <= tolerance]
+        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead_length) <= tolerance]
 
     start_points, end_points = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
     first = start_points[0] if start_points and line.first == line.begins else line.first

@@ -29,7 +29,7 @@ from flight.mission.items import (
     item_problem,
     on_grid,
     position_problem,
-    renumbered,
+    renumber_items,
 )
 from world.errors import MissionError
 from world.scenario_file import first_fault
@@ -75,8 +75,8 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
         else:
             read_kinds = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
             allowed = f"{read_kinds}; convert it to items in the ground station first"
-            shown = f"{json.dumps(kind)[:40]} {name!r}"
-            raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=shown)
+            kind_text = f"{json.dumps(kind)[:40]} {name!r}"
+            raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=kind_text)
         warnings.append(
             f"{source}: {place}: {name} replaced by the {len(replacements)} simple items that it represents"
         )
@@ -142,10 +142,10 @@ class _CameraCalc(BaseModel):
         if self.ImageWidth is not None and self.ImageHeight is not None:
             height_ratio = width_ratio * self.ImageHeight / self.ImageWidth
         across, along = (width_ratio, height_ratio) if self.Landscape else (height_ratio, width_ratio)
-        front, side = (
+        front_overlap, side_overlap = (
             None if percent is None else percent / 100.0 for percent in (self.FrontalOverlap, self.SideOverlap)
         )
-        return Camera(across, along, front, side, self.MinTriggerInterval or 0.0)
+        return Camera(across, along, front_overlap, side_overlap, self.MinTriggerInterval or 0.0)
 
 
 def _survey_plan(settings: dict[str, Any], items: list[Any], place: str, warnings: list[str]) -> SurveyPlan:
@@ -390,7 +390,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
         survey_plans=tuple(plans),
         autopilot=autopilot,
     )
-    return renumbered(mission)
+    return renumber_items(mission)
 
 
 def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
@@ -485,7 +485,7 @@ def plan_file_text(mission: Mission) -> str:
     both as numbers, and sends neither to an aircraft. firmwareType names the mission's autopilot, 0 for planfly's own
     guidance, which no ground station knows.
     """
-    mission = renumbered(mission)
+    mission = renumber_items(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
     modes = _altitude_modes(mission.items)
     data = {

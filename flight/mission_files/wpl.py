@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from itertools import pairwise
 
-from flight.mission.fences import fence_shapes, numbered
+from flight.mission.fences import fence_shapes, number_items
 from flight.mission.items import (
     FENCES,
     LANDINGS,
@@ -22,7 +22,7 @@ from flight.mission.items import (
     item_problem,
     on_grid,
     position_problem,
-    renumbered,
+    renumber_items,
 )
 from world.errors import MissionError
 from world.files import TextLine
@@ -117,27 +117,27 @@ def parse_waypoints(text: str, source: str) -> Mission:
         raise MissionError(f"{source}: no items after the header", file=source)
     warnings = _collect_warnings(rows, *_split_home(rows))
     home, body = _split_home(_renumbered_rows(rows))
-    fences = numbered([row.item for row in body if row.item.command in FENCES])
+    fences = number_items([row.item for row in body if row.item.command in FENCES])
     fence_shapes(fences, source)
     return Mission(
         home=home,
         items=tuple(row.item for row in body if row.item.command not in _COMMANDS_WITH_OWN_FILES),
         fences=fences,
-        rally=numbered([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
+        rally=number_items([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
         warnings=tuple(warnings),
         source=source,
     )
 
 
-def _parse_row(where: TextLine, line: str) -> _Row:
+def _parse_row(location: TextLine, line: str) -> _Row:
     fields = line.split()
     if len(fields) != len(_COLUMNS):
         raise MissionError(
-            f"{where}: {len(fields)} columns: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})", file=where.file
+            f"{location}: {len(fields)} columns: expected {len(_COLUMNS)} ({', '.join(_COLUMNS)})", file=location.file
         )
     values = dict(zip(_COLUMNS, fields, strict=True))
-    integers = {name: _parse_integer(where, name, values[name]) for name in _ALLOWED_RANGES}
-    p1, p2, p3, p4, lat, lon, alt = (_parse_number(where, name, values[name]) for name in _COLUMNS[4:11])
+    integers = {name: _parse_integer(location, name, values[name]) for name in _ALLOWED_RANGES}
+    p1, p2, p3, p4, lat, lon, alt = (_parse_number(location, name, values[name]) for name in _COLUMNS[4:11])
     # A home line of Mission Planner may carry command 0.
     command = integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0)
     if is_located(command, integers["frame"]) and position_problem(lat, lon) is None:
@@ -154,27 +154,27 @@ def _parse_row(where: TextLine, line: str) -> _Row:
     )
     problem = item_problem(item)
     if problem is not None:
-        raise MissionError(**problem.at(where.file, where))
-    return _Row(where, bool(integers["current"]), item)
+        raise MissionError(**problem.at(location.file, location))
+    return _Row(location, bool(integers["current"]), item)
 
 
-def _value_error(where: TextLine, field: str, value: str | int, shown: str, allowed: str) -> MissionError:
+def _value_error(location: TextLine, field: str, value: str | int, value_text: str, allowed: str) -> MissionError:
     return MissionError(
-        f"{where}: {field} {shown}: {allowed}", file=where.file, field=field, value=value, allowed=allowed
+        f"{location}: {field} {value_text}: {allowed}", file=location.file, field=field, value=value, allowed=allowed
     )
 
 
-def _parse_integer(where: TextLine, name: str, text: str) -> int:
+def _parse_integer(location: TextLine, name: str, text: str) -> int:
     min_value, max_value = _ALLOWED_RANGES[name]
     if not _WHOLE_NUMBER.fullmatch(text) or not min_value <= int(text) <= max_value:
-        raise _value_error(where, name, text, _short_repr(text), f"expected a whole number {min_value}..{max_value}")
+        raise _value_error(location, name, text, _short_repr(text), f"expected a whole number {min_value}..{max_value}")
     return int(text)
 
 
-def _parse_number(where: TextLine, name: str, text: str) -> float:
+def _parse_number(location: TextLine, name: str, text: str) -> float:
     if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = " (a decimal comma?)" if "," in text else ""
-        raise _value_error(where, name, text, _short_repr(text), f"expected a finite number{hint}")
+        raise _value_error(location, name, text, _short_repr(text), f"expected a finite number{hint}")
     # 0.0 for -0.0, which no other form of a mission keeps.
     return float(text) + 0.0
 
@@ -253,7 +253,7 @@ def waypoints_text(mission: Mission) -> str:
 
     A NaN is written as 0, which is this form's value for "unset". Fences and rally points have files of their own.
     """
-    return _file_text(mission.home, renumbered(mission).items)
+    return _file_text(mission.home, renumber_items(mission).items)
 
 
 def fence_text(mission: Mission) -> str:
@@ -351,7 +351,7 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
         )
     params = (float(len(ring) - 1), 0.0, 0.0, 0.0)
     command = int(Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION)
-    return numbered([MissionItem(0, command, int(Frame.GLOBAL), params, lat, lon, 0.0) for lat, lon in ring[:-1]])
+    return number_items([MissionItem(0, command, int(Frame.GLOBAL), params, lat, lon, 0.0) for lat, lon in ring[:-1]])
 
 
 def _content_lines(text: str) -> list[tuple[int, str]]:
@@ -360,15 +360,15 @@ def _content_lines(text: str) -> list[tuple[int, str]]:
     return [(number, line.strip()) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 
 
-def _parse_point(where: TextLine, line: str) -> tuple[float, float]:
+def _parse_point(location: TextLine, line: str) -> tuple[float, float]:
     try:
         lat, lon = (float(part) for part in line.split())
     except ValueError:
         lat = lon = math.nan
     if not (math.isfinite(lat) and math.isfinite(lon)):
         allowed = "expected a latitude and a longitude"
-        raise MissionError(f"{where}: {line[:40]!r}: {allowed}", file=where.file, value=line, allowed=allowed)
+        raise MissionError(f"{location}: {line[:40]!r}: {allowed}", file=location.file, value=line, allowed=allowed)
     problem = position_problem(lat, lon)
     if problem is not None:
-        raise MissionError(**problem.at(where.file, where))
+        raise MissionError(**problem.at(location.file, location))
     return on_grid(lat), on_grid(lon)

@@ -24,7 +24,7 @@ from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.start import Start, find_start, start_trimmed
 from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, longest_circling
-from flight.simulation.track import Rows, join_rows, quantised
+from flight.simulation.track import Rows, join_rows, quantise
 from flight.simulation.turbulence import start_gusts
 from world.arrays import Floats
 from world.geometry import leg_courses
@@ -99,14 +99,14 @@ class Airborne(ABC):
         self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         waypoints["min_ground_speed"] = setup.min_ground_speeds
-        self._workspace = Workspace(self._gains, self.path, waypoints, self._law(setup).own)
+        self._workspace = Workspace(self._gains, self.path, waypoints, self._flying_autopilot(setup).own)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
         self.memory = self._work.memory
         self._work.timing.dt = self.dt
-        self._work.settings.slowest = 0.94 * aircraft.stall_speed
-        self._work.settings.middle = self.map.middle
+        self._work.settings.min_airspeed = 0.94 * aircraft.stall_speed
+        self._work.settings.center_longitude = self.map.center_longitude
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
         time_limit = TIME_LIMIT_FACTOR * length / _min_ground_speed(setup, self._airspeeds) + TIME_LIMIT_BASE_S
@@ -123,7 +123,7 @@ class Airborne(ABC):
             time_limit += longest_circling(setup.autopilot.loiter_rules.radius)
         self.max_ticks = int(time_limit / self.dt)
 
-    def _law(self, setup: FlightSetup) -> Autopilot:
+    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
         """Return the autopilot that keeps its record in the workspace."""
         return setup.autopilot
 
@@ -134,7 +134,7 @@ class Airborne(ABC):
         return np.array([true.east, true.north, true.up])
 
     @abstractmethod
-    def _fly(self, count: int) -> int:
+    def _fly_ticks(self, count: int) -> int:
         """Fly up to a number of ticks into the workspace's rows; return the last tick's status, 0 to fly on."""
 
     def _start_disturbances(self, setup: FlightSetup) -> None:
@@ -182,8 +182,8 @@ class Airborne(ABC):
             workspace.navigation[:count] = self._navigation_random.standard_normal((count, 3))
         remaining_ticks = self.max_ticks - int(workspace.ticks_flown[0])
         workspace.rows_filled[0] = 0
-        status = self._fly(min(count, remaining_ticks))
-        rows = quantised(workspace.rows[: workspace.rows_filled[0]])
+        status = self._fly_ticks(min(count, remaining_ticks))
+        rows = quantise(workspace.rows[: workspace.rows_filled[0]])
         if status:
             return rows, ENDS[status]
         if remaining_ticks <= count:
@@ -208,7 +208,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 
     waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     """
-    if not setup.autopilot.loiter_rules.at_middle:
+    if not setup.autopilot.loiter_rules.steers_to_center:
         return 0.0
     extra_lengths = dict[int, float]()
     circles = waypoints[waypoints["loiter_radius"] != 0.0]

@@ -26,12 +26,12 @@ class LocalMap:
 
     position: (latitude, longitude) to (east, north).
     angle: (latitude, longitude) to the map course of true north (rad), and 0.
-    middle: longitude of the map's center, rad; longitudes are normalised to within pi of it.
+    center_longitude: longitude of the map's center, rad; longitudes are normalised to within pi of it.
     """
 
     position: PolyMap
     angle: PolyMap
-    middle: float
+    center_longitude: float
 
     @staticmethod
     def around(setup: FlightSetup) -> "LocalMap":
@@ -67,8 +67,8 @@ class LocalMap:
             east1, north1 = position(latitude + step, longitude)
             return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(latitude)
 
-        middle = float((bounds[1, 0] + bounds[1, 1]) / 2)
-        local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), middle)
+        center_longitude = float((bounds[1, 0] + bounds[1, 1]) / 2)
+        local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), center_longitude)
         if not (local.position.residual <= MAX_MAP_ERRORS[0] and local.angle.residual <= MAX_MAP_ERRORS[1]):
             raise FlightError(
                 f"{setup.mission.source}: the area is too large to fly in: its map has an error "
@@ -79,7 +79,7 @@ class LocalMap:
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
         """Return the map course of true north at a position, rad."""
-        lon = self.middle + math.remainder(math.radians(lon_deg) - self.middle, 2.0 * math.pi)
+        lon = self.center_longitude + math.remainder(math.radians(lon_deg) - self.center_longitude, 2.0 * math.pi)
         return float(self.angle(math.radians(lat_deg), lon)[0])
 
 

@@ -14,7 +14,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
-from flight.mission.ground_ways import GroundWays, find_ground_ways, flown_notes, shown_waypoints
+from flight.mission.ground_ways import GroundPhases, find_ground_phases, flown_notes, shown_waypoints
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -270,43 +270,47 @@ class FlightSetup:
         return self.limits.max_bank
 
     @property
-    def ground_ways(self) -> GroundWays:
+    def ground_phases(self) -> GroundPhases:
         """Take-off and landing of the flight; empty for an autopilot that flies neither."""
         has_ground_ends = self.scenario.launch is not None or self.scenario.landing is not None
         if self.source is not None or not has_ground_ends:
-            return GroundWays()
+            return GroundPhases()
         if not self.autopilot.flies_ground:
             title = self.autopilot.title
-            return GroundWays(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
-        ways = find_ground_ways(self.scenario, self.mission, self.route, self.slowest_launched)
-        if self.autopilot.flies_both_ends and ways and (ways.take_off is None or ways.approach is None):
-            missing_end = "take-off" if ways.take_off is None else "landing"
+            return GroundPhases(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
+        ground_phases = find_ground_phases(self.scenario, self.mission, self.route, self.default_launch_speed)
+        if (
+            self.autopilot.flies_both_ends
+            and ground_phases
+            and (ground_phases.take_off is None or ground_phases.approach is None)
+        ):
+            missing_end = "take-off" if ground_phases.take_off is None else "landing"
             text = f"without a {missing_end} that is flown from the ground, the program is put into the air on a rail"
-            return GroundWays(notes=(*ways.notes, text))
-        return ways
+            return GroundPhases(notes=(*ground_phases.notes, text))
+        return ground_phases
 
     @property
-    def slowest_launched(self) -> float:
+    def default_launch_speed(self) -> float:
         """Minimum level-flight speed at the start of the route, m/s: the default launch speed."""
         return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
 
     @property
     def shown_waypoints(self) -> Floats:
         """Waypoints of the route for pictures and tables, (w, 3) m, with the ends on the ground that are flown."""
-        return shown_waypoints(self.route, self.ground_ways)
+        return shown_waypoints(self.route, self.ground_phases)
 
     @property
     def started(self) -> str:
         """Description of the flight's start, with the reasons why the scenario's launch or landing is not flown."""
-        ways, started = self.ground_ways, self.route.started
-        if ways.take_off is not None:
-            started = ways.take_off.described()
-        return "; ".join([*([started] if started else []), *ways.notes])
+        ground_phases, started = self.ground_phases, self.route.started
+        if ground_phases.take_off is not None:
+            started = ground_phases.take_off.description()
+        return "; ".join([*([started] if started else []), *ground_phases.notes])
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Parts of the mission that are not flown as written, in sentences."""
-        return flown_notes(self.route, self.ground_ways)
+        return flown_notes(self.route, self.ground_phases)
 
     def in_scenario(self, scenario: Scenario) -> "FlightSetup":
         """Return a copy of the setup in another scenario, with the same route, limits and path."""
@@ -323,7 +327,7 @@ class FlightSetup:
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Return the limits of a path: the limits of the scenario, or those of the aircraft if it states none.
+    """Return the limits of a path: the scenario's limits, or the aircraft's limits if the scenario states none.
 
     airspeed: m/s.
     max_bank: rad; the limit of the envelope applies if it is smaller.

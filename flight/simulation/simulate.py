@@ -17,11 +17,11 @@ from flight.dynamics.model_program import UnsupportedModel
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
-from flight.mission.ground_ways import GroundWays
+from flight.mission.ground_ways import GroundPhases
 from flight.simulation.airborne import Airborne
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
-from flight.simulation.start import Start, find_release, gear_of, release
+from flight.simulation.start import Start, default_gear, find_release, release
 from flight.simulation.tick import READ_FIELDS, Workspace
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import FlightError, StartError
@@ -179,10 +179,10 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
     >>> [(len(block.rows), block.ended) for block in simulate(flight)]
     [(60, ''), (12, 'ground contact')]
     """
-    ended = ""
-    while not ended:
-        rows, ended = flight.block(round(BLOCK / flight.dt))
-        yield FlightBlock(rows, ended, min(float(flight.memory.distance), flight.path.length))
+    end_reason = ""
+    while not end_reason:
+        rows, end_reason = flight.block(round(BLOCK / flight.dt))
+        yield FlightBlock(rows, end_reason, min(float(flight.memory.distance), flight.path.length))
 
 
 def fly_to_end(flight: Airborne) -> SimulatedFlight:
@@ -207,18 +207,29 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
     ('completed', 12, True)
     """
     blocks = list(simulate(flight))
-    return SimulatedFlight(track_of(blocks), blocks[-1].ended, flight.path)
+    return SimulatedFlight(join_blocks(blocks), blocks[-1].ended, flight.path)
 
 
-def track_of(blocks: Sequence[FlightBlock]) -> Track:
+def join_blocks(blocks: Sequence[FlightBlock]) -> Track:
     """Join the rows of blocks to a track."""
     return as_track(join_rows([block.rows for block in blocks]))
 
 
 # Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.
 _PATH_MEMORY_FIELDS = (
-    *("piece", "leg", "distance", "cross_track", "height_error", "done", "returning", "circled", "turned", "bearing"),
-    *("cross_track_sum", "path_bank", "path_bank_rate", "roll_offset", "roll_offset_rate", "max_arc_speed"),
+    *(
+        "piece",
+        "leg",
+        "distance",
+        "cross_track",
+        "height_error",
+        "is_finished",
+        "is_in_rtl",
+        "loiter_time",
+        "loiter_angle",
+        "bearing",
+    ),
+    *("cross_track_integrator", "path_bank", "path_bank_rate", "roll_offset", "roll_offset_rate", "max_arc_speed"),
     *("l1_leg", "l1_integrator", "course_integrator", "altitude_integrator", "slope_acceleration"),
 )
 # Records that a flight keeps when it is diverted to another route.
@@ -248,19 +259,19 @@ class Flight(Airborne):
         """
         gains = load_gains(aircraft)
         self._chosen_engine = engine or setup.engine
-        self._ways, gear = setup.ground_ways, None
-        if self._ways:
-            gear = gear_of(self._ways)
+        self._ground_phases, gear = setup.ground_phases, None
+        if self._ground_phases:
+            gear = default_gear(self._ground_phases)
             contacts = contacts_of(aircraft, gear)
-            self._from_ground = setup.autopilot.from_ground(self._ways, aircraft, contacts)
+            self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts)
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
-        if self._ways:
+        if self._ground_phases:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
         # Guidance knows the model, but not the differences of the aircraft from it.
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._trim_at_start(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
-        autopilot = self._law(setup).law
+        autopilot = self._flying_autopilot(setup).law
         autopilot.initialise_records(self.memory, self._workspace.own)
         self._start_disturbances(setup)
         self._compiled, self.engine = self._choose_engine(autopilot)
@@ -277,7 +288,7 @@ class Flight(Airborne):
         """
         previous, previous_memory = self._work, self._workspace.own
         # The aircraft is in the air, even if the new mission starts with a take-off.
-        self._ways = GroundWays()
+        self._ground_phases = GroundPhases()
         self._lay_out(setup, self.fdm.aircraft, local_map)
         for name in _DIVERSION_RECORDS:
             setattr(self._work, name, getattr(previous, name))
@@ -312,16 +323,16 @@ class Flight(Airborne):
     def _start_motion(self, setup: FlightSetup, start: Start, elevator: float) -> None:
         """Start the aircraft trimmed in the air, or release it on the launcher with an elevator command."""
         self._start_trimmed(setup.mission.source, start)
-        if self._ways.take_off is not None:
-            release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ways.take_off)
+        if self._ground_phases.take_off is not None:
+            release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ground_phases.take_off)
             commands = (elevator, 0.0, 0.0, self._from_ground.released_throttle)
             self._work.commands = release(self.fdm, release_state, commands)
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
 
-    def _law(self, setup: FlightSetup) -> Autopilot:
-        return self._from_ground if self._ways else setup.autopilot
+    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
+        return self._from_ground if self._ground_phases else setup.autopilot
 
-    def _fly(self, count: int) -> int:
+    def _fly_ticks(self, count: int) -> int:
         return self._loop(count)
 
     def _choose_engine(self, autopilot: Autopilot) -> tuple[CompiledModel | None, str]:

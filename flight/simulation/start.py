@@ -7,7 +7,7 @@ from aircraft.catalog import Aircraft
 from aircraft.contacts import Gear, contacts_of
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import Trim
-from flight.mission.ground_ways import GroundWays, TakeOff
+from flight.mission.ground_ways import GroundPhases, TakeOff
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
 from world.errors import FlightError, StartError
@@ -119,9 +119,11 @@ class Release:
     ground: float
 
 
-def gear_of(ways: GroundWays) -> Gear:
+def default_gear(ground_phases: GroundPhases) -> Gear:
     """Return the gear for a model without contacts: wheels for a take-off from a runway, otherwise a belly."""
-    return "wheels" if ways.take_off is not None and ways.take_off.launch.method == "runway" else "belly"
+    return (
+        "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
+    )
 
 
 def find_release(

@@ -74,11 +74,11 @@ TIMING = record_dtype(
 )
 # Constants of the flight.
 SETTINGS = record_dtype(
-    "slowest",  # m/s, airspeed below which control is lost
+    "min_airspeed",  # m/s, airspeed below which control is lost
     "battery",  # Wh; the flight ends once it has used this energy
     "navigation_sigma",  # m
     "navigation_time",  # s
-    "middle",  # rad, longitude of the local map's center
+    "center_longitude",  # rad, longitude of the local map's center
     ("pieces", np.int64),  # number of path table rows that hold a piece
     ("nodes", np.int64),
     ("waypoints", np.int64),
@@ -267,7 +267,7 @@ def _read_sensors(work: Record, heights: Heights) -> bool:
     state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
     state.wind_down = air.gust_down
     # Relative to the local map's center, so that a flight may cross the 180th meridian.
-    state.longitude = settings.middle + wrap(state.longitude - settings.middle)
+    state.longitude = settings.center_longitude + wrap(state.longitude - settings.center_longitude)
     # Map course of true north.
     north_course, _ = polymap(work.north_map, state.latitude, state.longitude)
     cos, sin = math.cos(north_course), math.sin(north_course)
@@ -298,7 +298,9 @@ def end_tick(work: Record) -> int:
 def status_in_air(work: Record) -> int:
     """Return a key of `ENDS` if a flight in the air has ended, or 0 to fly on."""
     settings, air = work.settings, work.air
-    return _air_status(work.state, work.memory, work.place.clearance, settings.slowest, air.energy >= settings.battery)
+    return _air_status(
+        work.state, work.memory, work.place.clearance, settings.min_airspeed, air.energy >= settings.battery
+    )
 
 
 @inner
@@ -330,19 +332,21 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
     waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    memory.returning, memory.cross_track = True, math.nan
+    memory.is_in_rtl, memory.cross_track = True, math.nan
     offset_east, offset_north = motion.east - waypoint.centre_east, motion.north - waypoint.centre_north
     airspeed_factor = true_by_equivalent(motion.up)
     radius = abs(waypoint.loiter_radius) * airspeed_factor * airspeed_factor
     is_near = math.hypot(offset_east, offset_north) < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
     bearing = math.atan2(offset_east, offset_north)
-    if memory.circled > 0.0:
-        memory.turned += wrap(bearing - memory.bearing)
+    if memory.loiter_time > 0.0:
+        memory.loiter_angle += wrap(bearing - memory.bearing)
     memory.bearing = bearing
-    if memory.circled > 0.0 or (is_near and abs(motion.up - waypoint.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
-        memory.circled += dt
-    is_full_circle = abs(memory.turned) >= 2.0 * math.pi
-    memory.done = (is_full_circle and memory.circled > UNLIMITED) or memory.circled > longest_circling(radius)
+    if memory.loiter_time > 0.0 or (is_near and abs(motion.up - waypoint.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
+        memory.loiter_time += dt
+    is_full_circle = abs(memory.loiter_angle) >= 2.0 * math.pi
+    memory.is_finished = (is_full_circle and memory.loiter_time > UNLIMITED) or memory.loiter_time > longest_circling(
+        radius
+    )
 
 
 @inner
@@ -356,13 +360,13 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     # The mission's end is not missed, however wide the aircraft flies the loiter.
-    memory.returning = True
+    memory.is_in_rtl = True
     course = math.atan2(motion.velocity_east, motion.velocity_north)
-    if memory.circled > 0.0:
-        memory.turned += wrap(course - memory.bearing)
-    memory.circled += dt
+    if memory.loiter_time > 0.0:
+        memory.loiter_angle += wrap(course - memory.bearing)
+    memory.loiter_time += dt
     memory.bearing = course
-    memory.done = abs(memory.turned) >= AROUND_END
+    memory.is_finished = abs(memory.loiter_angle) >= AROUND_END
 
 
 @compiled
@@ -395,8 +399,8 @@ def _air_status(
         return END_OVERBANK
     if state.airspeed < min_airspeed:
         return STALLED
-    if memory.done:
-        is_near = memory.returning or (
+    if memory.is_finished:
+        is_near = memory.is_in_rtl or (
             abs(memory.cross_track) <= MISSED_ROUTE_DISTANCE_M and abs(memory.height_error) <= MISSED_ROUTE_DISTANCE_M
         )
         return COMPLETED if is_near else END_MISSED_ROUTE

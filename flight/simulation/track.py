@@ -194,7 +194,7 @@ _STEPS_PER_UNIT = np.exp2(
 )
 
 
-def quantised(rows: Rows) -> Rows:
+def quantise(rows: Rows) -> Rows:
     """Return a copy of flown rows (t,) rounded to the resolution of `DIGITS`, without negative zeros.
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
@@ -362,8 +362,8 @@ def track_html(track: Track) -> str:
     rows = []
     for name, values in track_columns(track).items():
         finite = values[np.isfinite(values)]
-        smallest, largest = (finite.min(), finite.max()) if finite.size else (np.nan, np.nan)
-        rows.append((name, *(f"{value:.6g}" for value in (values[0], values[-1], smallest, largest))))
+        min_value, max_value = (finite.min(), finite.max()) if finite.size else (np.nan, np.nan)
+        rows.append((name, *(f"{value:.6g}" for value in (values[0], values[-1], min_value, max_value))))
     return html_table(track_title(track), rows, ("column", "first", "last", "smallest", "largest"))
 
 

@@ -16,7 +16,7 @@ from aircraft.envelope import Envelope
 from flight.autopilots.autopilot import AutopilotProgram, Origin, ParameterValue, StoredParameters
 from flight.mission.items import Camera, Home, Mission, MissionItem, SurveyPlan
 from flight.mission.itinerary import OpenItem
-from flight.mission.loiter_circles import Unjoined
+from flight.mission.loiter_circles import UnjoinedStop
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import ROUTE_COLUMNS_WITH_NAN, Route
 from world.errors import LogError
@@ -140,7 +140,7 @@ class RouteTable(SetupModel):
         Field(alias="return_to_east_north_amsl_radius_slope_base_m"),
     ] = None
     straight_to: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
-    unjoined: Annotated[tuple[Unjoined, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
+    unjoined: Annotated[tuple[UnjoinedStop, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
     above_ground: Annotated[list[_Height], Field(alias="above_ground_m"), _LISTED] = []
     home_up: Annotated[list[_Height], Field(alias="home_amsl_m"), _LISTED] = []
     min_ground_speed: Annotated[list[_Height], Field(alias="min_ground_speed_mps"), _LISTED] = []

@@ -15,7 +15,7 @@ from world.errors import ArgumentError, PlanflyError
 from world.files import whole_path, write_whole
 from world.raster import open_raster
 from world.scenario import from_spec
-from world.scenario_draft import Place, draft_text, make_draft
+from world.scenario_draft import GeoPosition, draft_text, make_draft
 from world.scenario_file import parse_scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, names_folder
 
@@ -51,7 +51,7 @@ def new_scenario(
     ('ridge.toml', True)
     """
     check_arguments(height=height, autopilot=autopilot)
-    endpoints = _parse_place("start", start), _parse_place("destination", destination)
+    endpoints = _parse_position("start", start), _parse_position("destination", destination)
     target = Path(folder)
     name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
     file = _scenario_file(target, name, overwrite=overwrite)
@@ -98,7 +98,7 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
     return file
 
 
-def _parse_place(keyword: str, coordinates: Sequence[float]) -> Place:
+def _parse_position(keyword: str, coordinates: Sequence[float]) -> GeoPosition:
     """Parse latitude and longitude of a position.  Raises ArgumentError for invalid coordinates."""
     try:
         lat, lon = (float(value) for value in coordinates)
@@ -106,7 +106,7 @@ def _parse_place(keyword: str, coordinates: Sequence[float]) -> Place:
         lat = lon = math.nan
     if not is_place(lat, lon):
         raise ArgumentError.of_argument(keyword, coordinates, "expected latitude -89..89 and longitude -180..180")
-    return Place(lat, lon)
+    return GeoPosition(lat, lon)
 
 
 def _absolute_path(path: str | Path, *, is_name: bool) -> str:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parameter_files import parameters_text
-from flight.mission.fences import numbered, zone_fences
+from flight.mission.fences import number_items, zone_fences
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from flight.simulation.setup import FlightSetup
@@ -228,7 +228,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
 def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
     """Add the zones of the scenario to the fences of the mission."""
     fence_items, notes = zone_fences(scenario.zones, scenario.origin)
-    mission = replace(source.mission, fences=numbered([*source.mission.fences, *fence_items]))
+    mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
     return replace(source, mission=mission, notes=tuple(notes))
 
 

@@ -150,8 +150,8 @@ class Optimiser:
         return self.best
 
     def __repr__(self) -> str:
-        name, best = type(self._search).__name__, f", best {self.best.value:.6g}" if self._levels else ""
-        return f"<Optimiser {name}: {self._points.shape[1]} variables, {self.evaluations:,} evaluations{best}>"
+        name, best_text = type(self._search).__name__, f", best {self.best.value:.6g}" if self._levels else ""
+        return f"<Optimiser {name}: {self._points.shape[1]} variables, {self.evaluations:,} evaluations{best_text}>"
 
 
 def optimise(

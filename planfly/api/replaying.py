@@ -198,7 +198,7 @@ def play_to_foxglove(
         port=port,
         allowed=allowed_origins,
         wait=wait,
-        stopped=stop,
+        should_stop=stop,
         on_message=on_message,
     )
 
@@ -245,6 +245,6 @@ def play_to_stations(
         access,
         speed=speed or 1.0,
         wait=_STATION_TIMEOUT_S if wait is None else wait,
-        stopped=stop,
+        should_stop=stop,
         on_message=on_message,
     )

@@ -36,7 +36,7 @@ from planfly.workflow.pipeline import autopilot_log, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
 from planner.plan import Plan, plan_json
-from world.files import hold, write_whole
+from world.files import lock_path, write_whole
 from world.scenario import Scenario
 
 
@@ -217,7 +217,7 @@ def _fly_rounds(
             plan = make_plan(planning_scenario, planning_airframe, task.seed, advance=advance)
         if not flown_rounds:
             folder.mkdir(parents=True, exist_ok=True)
-            locks.enter_context(hold(folder))
+            locks.enter_context(lock_path(folder))
             if task.program is not None:
                 report_replaced(folder / "flight.mcap", autopilot_log(folder / "flight.mcap", task.program))
             prepare_folder(folder)

@@ -94,7 +94,7 @@ class SpreadError(PlanflyError):
 
 
 @dataclass(frozen=True)
-class Varying:
+class VaryingQuantity:
     """Quantity with its distribution.
 
     distribution: name in `scipy.stats`.
@@ -108,7 +108,7 @@ class Varying:
     source: str
 
     @cached_property
-    def _distribution(self) -> Any:
+    def _scipy_distribution(self) -> Any:
         from scipy import stats
 
         return getattr(stats, self.distribution)(**dict(self.parameters))
@@ -117,7 +117,7 @@ class Varying:
     def _range_limits(self) -> tuple[float, float]:
         """Return the values of the distribution function just below and at the upper end of the quantity's range."""
         min_value = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
-        return float(self._distribution.cdf(min_value)), float(self._distribution.cdf(self.quantity.high))
+        return float(self._scipy_distribution.cdf(min_value)), float(self._scipy_distribution.cdf(self.quantity.high))
 
     @property
     def fraction_inside(self) -> float:
@@ -128,7 +128,7 @@ class Varying:
     def value(self, fraction: float) -> float:
         """Return the value below which a fraction, 0 to 1, of the distribution within the range lies.
 
-        >>> mass = Varying(QUANTITY_BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
+        >>> mass = VaryingQuantity(QUANTITY_BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
         >>> round(mass.value(0.25), 6)
         0.95
         """
@@ -137,7 +137,7 @@ class Varying:
     def values(self, fractions: Floats) -> Floats:
         """Return the value for each of several fractions, like `value`.  fractions: (n,)."""
         lower_probability, upper_probability = self._range_limits
-        values = self._distribution.ppf(lower_probability + fractions * (upper_probability - lower_probability))
+        values = self._scipy_distribution.ppf(lower_probability + fractions * (upper_probability - lower_probability))
         return np.clip(values, self.quantity.low, self.quantity.high)
 
 
@@ -149,7 +149,7 @@ class Dispersions:
     draws: draws of the whole aircraft, one for each flight; None if drag and control power vary separately.
     """
 
-    varying: tuple[Varying, ...]
+    varying: tuple[VaryingQuantity, ...]
     name: str
     draws: Draws | None = None
 
@@ -255,7 +255,7 @@ def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
     return read_draws(Path(name).parent / Path(file_name).expanduser(), SpreadError)
 
 
-def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varying:
+def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> VaryingQuantity:
     if not isinstance(quantity_table, dict):
         allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, quantity_table, allowed, shown="")
@@ -266,7 +266,7 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
         allowed = "missing; state the source of the numbers"
         raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
     _check_parameters(str(distribution), parameters, name, quantity.name)
-    varying = Varying(
+    varying = VaryingQuantity(
         quantity, str(distribution), tuple((key, float(value)) for key, value in parameters.items()), source
     )
     fraction = _compute_fraction_inside(varying, name)
@@ -315,7 +315,7 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
         raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, reason_missing, shown="")
 
 
-def _compute_fraction_inside(varying: Varying, name: str) -> float:
+def _compute_fraction_inside(varying: VaryingQuantity, name: str) -> float:
     fraction = varying.fraction_inside
     if math.isnan(fraction):
         allowed = f"parameters that {varying.distribution} cannot have"
@@ -323,7 +323,7 @@ def _compute_fraction_inside(varying: Varying, name: str) -> float:
     return fraction
 
 
-def _call_text(varying: Varying) -> str:
+def _call_text(varying: VaryingQuantity) -> str:
     return f"{varying.distribution}({', '.join(f'{key}={value:g}' for key, value in varying.parameters)})"
 
 

@@ -118,9 +118,10 @@ class WindsFound:
         return 360.0 * direction / self.goal.directions
 
     def __repr__(self) -> str:
-        lowest = min(boundary.estimate for boundary in self.boundaries)
+        min_speed = min(boundary.estimate for boundary in self.boundaries)
         return (
-            f"<WindsFound {len(self.boundaries)} directions, {lowest:.1f} m/s the lowest; {len(self.flights)} flights>"
+            f"<WindsFound {len(self.boundaries)} directions, {min_speed:.1f} m/s the lowest;"
+            f" {len(self.flights)} flights>"
         )
 
 
@@ -153,7 +154,7 @@ def find_winds(
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     """
     search, stored_flights = _Search(goal, base), _StoredFlights(store)
-    progress = _Pace(search, len(stored_flights.flown), advance)
+    progress = _ProgressReport(search, len(stored_flights.flown), advance)
     with ExitStack() as stack:
         pool: WorkerPool | None = None
         while requests := search.next_round():
@@ -209,9 +210,9 @@ class _Search:
 
     def add_result(self, request: RequestedFlight, flight: FlownFlight) -> None:
         """Add the result of a flight; flights must be added in the order in which they were requested."""
-        flyable = flight.outcome == "flyable"
+        is_flyable = flight.outcome == "flyable"
         failure_keys: set[Hashable] = {_failure_key(rule, place) for rule, place in flight.failed} or {flight.outcome}
-        failed_keys = frozenset() if flyable else frozenset(failure_keys)
+        failed_keys = frozenset() if is_flyable else frozenset(failure_keys)
         margins: dict[Hashable, float] | None = {
             _failure_key(rule, place): fraction for rule, place, fraction in flight.narrow
         }
@@ -219,7 +220,7 @@ class _Search:
             # The rules that the flight would have passed if it had continued are unknown.
             margins = None
         self.directions[request.direction].add(request.speed, request.draw, failed_keys, margins)
-        self.flown.append((request.direction, request.speed, flyable))
+        self.flown.append((request.direction, request.speed, is_flyable))
         self._failed.append(flight.failed)
         if flight.outcome == "lost":
             self.lost.append(request.number)
@@ -290,7 +291,7 @@ def _fly_round(
     search: _Search,
     missing_requests: list[RequestedFlight],
     stored_flights: _StoredFlights,
-    progress: "_Pace",
+    progress: "_ProgressReport",
 ) -> None:
     remaining_requests = iter(missing_requests)
     requests: dict[FlightRequest, RequestedFlight] = {}
@@ -308,7 +309,7 @@ def _fly_round(
         progress.report(len(stored_flights.flown))
 
 
-class _Pace:
+class _ProgressReport:
     """Periodic progress report.  stored_count: number of flights in the table at the start."""
 
     def __init__(self, search: _Search, stored_count: int, advance: Advance | None) -> None:

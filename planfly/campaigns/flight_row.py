@@ -160,8 +160,8 @@ class Column:
     entry: tuple[int, ...] = ()
 
 
-def _failed_findings_text(failed: Iterable[tuple[str, Place]]) -> str:
-    return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed])
+def _failed_findings_text(failed_findings: Iterable[tuple[str, Place]]) -> str:
+    return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed_findings])
 
 
 def parse_failed_findings(text: str) -> tuple[tuple[str, Place], ...]:

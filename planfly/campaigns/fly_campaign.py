@@ -98,14 +98,14 @@ def fly_campaign(
         if index < goal.flights:
             flight_tally.add(index, outcome)
     if not flight_tally.is_decided and flight_tally.tally.flown < goal.flights:
-        progress = _Pace(goal, estimator, flight_tally.tally, advance)
+        progress = _ProgressReport(goal, estimator, flight_tally.tally, advance)
         with worker_pool(workers, base, fly) as pool:
             _fly_remaining(pool, flight_tally, store, progress)
     store.delete_flights_from(flight_tally.tally.flown)
     return estimator.estimate(store.tally())
 
 
-def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, progress: "_Pace") -> None:
+def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, progress: "_ProgressReport") -> None:
     progress.start_timing(flight_tally.tally)
     for _, row in pool.fly(flight_tally.next_request):
         _store_flight(row, flight_tally, store)
@@ -120,21 +120,21 @@ def _store_flight(row: FlightRow, flight_tally: _FlightTally, store: Store) -> N
     flight_tally.add(row.draw.index, row.outcome)
 
 
-class _Pace:
-    """Periodic progress report.  stored: tally of the flights in the table at the start."""
+class _ProgressReport:
+    """Periodic progress report.  stored_tally: tally of the flights in the table at the start."""
 
-    def __init__(self, goal: Goal, estimator: Estimator, stored: Tally, advance: Advance | None) -> None:
+    def __init__(self, goal: Goal, estimator: Estimator, stored_tally: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance
-        self.start_timing(stored)
+        self.start_timing(stored_tally)
         if advance is not None:
             # Report before the workers start, because the start takes seconds.
-            total = self._total(stored)
-            remark = f"{stored.flown} of {total} flights" + (" at least" if goal.stops else "")
-            advance(float(stored.flown), float(total), remark)
+            total = self._total(stored_tally)
+            remark = f"{stored_tally.flown} of {total} flights" + (" at least" if goal.stops else "")
+            advance(float(stored_tally.flown), float(total), remark)
 
-    def start_timing(self, stored: Tally) -> None:
+    def start_timing(self, stored_tally: Tally) -> None:
         """Start to measure the rate of flights, because the workers are ready."""
-        self._rate = FlightRate(stored.flown)
+        self._rate = FlightRate(stored_tally.flown)
 
     def _total(self, tally: Tally) -> int:
         """Return the minimum possible total number of flights."""

@@ -154,20 +154,20 @@ class LockedTable:
         self._connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
         try:
             with converted_errors(path):
-                self._prepare(settings)
+                self._prepare_file(settings)
             self._file = path.stat()
         except BaseException:
             self._connection.close()
             raise
 
-    def _prepare(self, settings: dict[str, Any]) -> None:
-        self._lock()
+    def _prepare_file(self, settings: dict[str, Any]) -> None:
+        self._lock_file()
         execute = self._connection.execute
         tables = {name for (name,) in execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
         if tables:
             stored_settings = _read_settings(self._connection) if "campaign" in tables else {}
             self._check_same_campaign(stored_settings, settings)
-            self._repair(stored_settings)
+            self._repair_file(stored_settings)
         execute = self._connection.execute
         for statement in self._create_statements():
             execute(statement)
@@ -184,7 +184,7 @@ class LockedTable:
         )
         execute("COMMIT")
 
-    def _lock(self) -> None:
+    def _lock_file(self) -> None:
         """Lock the file for this process, and start a transaction."""
         execute = self._connection.execute
         execute("PRAGMA locking_mode = EXCLUSIVE")
@@ -223,7 +223,7 @@ class LockedTable:
                     file=self.path,
                 )
 
-    def _repair(self, stored_settings: dict[str, str]) -> None:
+    def _repair_file(self, stored_settings: dict[str, str]) -> None:
         """Rewrite the file with the undamaged flights, and report the damaged flights."""
         # A search may have been resumed with fewer flights than the table contains; all of them are kept.
         requested_count = json.loads(stored_settings["settings"]).get("flights", _MAX_FLIGHTS)
@@ -241,7 +241,7 @@ class LockedTable:
         for ending in ("-wal", "-shm"):
             Path(f"{self.path}{ending}").unlink(missing_ok=True)
         self._connection = sqlite3.connect(self.path, timeout=1.0, isolation_level=None)
-        self._lock()
+        self._lock_file()
         report_line(f"{self.path}: {examination.text()}")
 
     def _last_number(self) -> int:

@@ -25,7 +25,7 @@ from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FRONT, PARTS, SAMPLE_COUNT, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first
-from world.compile_events import tell_before_compiling
+from world.compile_events import notify_before_compiling
 from world.scenario import Scenario, from_spec
 
 # ----------------------------------------------------------------------
@@ -142,7 +142,7 @@ def run_unit(unit: str, report: Callable[[str], None]) -> None:
             pending.remove(name)
             report(f"ready {name}")
 
-    with tell_before_compiling(report_ready):
+    with notify_before_compiling(report_ready):
         UNITS[unit]()
     report_ready()
 

@@ -18,8 +18,8 @@ from flight.live.flight_process import (
     DivertFlight,
     FlightJudged,
     JudgeMission,
+    LoiterCenter,
     MissionJudged,
-    Place,
     PreparedFlight,
     ProcessReady,
     send_event,
@@ -154,8 +154,10 @@ class ServedFlights:
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
         no_params, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
         items = tuple(
-            MissionItem(k, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, on_grid(lat), on_grid(lon), amsl)
-            for k, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
+            MissionItem(
+                number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, on_grid(lat), on_grid(lon), amsl
+            )
+            for number, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
         with contextlib.suppress(PlanflyError):
             setup = make_setup(scenario, self._airframe, Mission(None, items), self._served.seed)
@@ -204,7 +206,7 @@ class ServedFlights:
         elif request.mode == RTL:
             items = (MissionItem(0, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), no_params, 0.0, 0.0, 0.0),)
         else:
-            items = (_loiter_item(start_item, request.place),)
+            items = (_loiter_item(start_item, request.center),)
         mission = replace(request.mission, items=(start_item, *items), source=MODE_NAMES[request.mode])
         # The aircraft is in the air, so there is no take-off, and it does not land.
         setup = make_setup(
@@ -226,19 +228,19 @@ class ServedFlights:
         return ServedLog(path, setup, self.aircraft, mode)
 
 
-def _loiter_item(current_item: MissionItem, place: Place) -> MissionItem:
-    """Return a loiter around a place; values that the place does not state are taken from `current_item`."""
-    has_position = math.isfinite(place.lat_deg) and math.isfinite(place.lon_deg)
+def _loiter_item(current_item: MissionItem, center: LoiterCenter) -> MissionItem:
+    """Return a loiter around a center; values that the center does not state are taken from `current_item`."""
+    has_position = math.isfinite(center.lat_deg) and math.isfinite(center.lon_deg)
     item_at_altitude = (
-        replace(current_item, frame=place.frame, alt=place.alt) if math.isfinite(place.alt) else current_item
+        replace(current_item, frame=center.frame, alt=center.alt) if math.isfinite(center.alt) else current_item
     )
     return replace(
         item_at_altitude,
         seq=0,
         command=int(Command.NAV_LOITER_TIME),
-        params=(LOITER_DURATION_S, 0.0, place.radius, 0.0),
-        lat_deg=on_grid(place.lat_deg) if has_position else current_item.lat_deg,
-        lon_deg=on_grid(place.lon_deg) if has_position else current_item.lon_deg,
+        params=(LOITER_DURATION_S, 0.0, center.radius, 0.0),
+        lat_deg=on_grid(center.lat_deg) if has_position else current_item.lat_deg,
+        lon_deg=on_grid(center.lon_deg) if has_position else current_item.lon_deg,
     )
 
 

@@ -35,7 +35,7 @@ def serve_vehicle(
         link = Link(access)
         exit_stack.callback(link.close)
         pool = _FlightPool(options)
-        exit_stack.callback(pool.end)
+        exit_stack.callback(pool.end_processes)
         vehicle = _make_vehicle(link, pool, served_scenario, options.speed, on_message)
         host, port = link.address
         targets = ", ".join(f"{station}:{station_port}" for station, station_port in access.to)
@@ -58,11 +58,11 @@ def _make_vehicle(
     airframe = served_scenario.airframe
     autopilot_settings = airframe.autopilot.parameters
     parameters = vehicle_parameters(
-        flown=partial(autopilot_parameters, served_scenario.scenario),
+        autopilot_values=partial(autopilot_parameters, served_scenario.scenario),
         not_flown=() if autopilot_settings is None else autopilot_settings.not_flown,
         airspeed=airframe.airspeed,
-        slowest=airframe.aircraft.airspeed_min,
-        fastest=airframe.aircraft.airspeed_max,
+        min_airspeed=airframe.aircraft.airspeed_min,
+        max_airspeed=airframe.aircraft.airspeed_max,
         max_bank_deg=math.degrees(airframe.max_bank),
         system=SYSTEM,
         speed=speed,
@@ -99,7 +99,7 @@ class _FlightPool:
         self._children.append(child)
         return link_end
 
-    def end(self) -> None:
+    def end_processes(self) -> None:
         """End the processes that are still alive."""
         end_children([child for child in self._children if child.is_alive()], _CHILD_END_TIMEOUT_S)
 

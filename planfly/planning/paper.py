@@ -23,7 +23,7 @@ from planfly.workflow.output_paths import check_output_folder, prepare_folder
 from planner.plan import Objectives, Violations
 from planner.search.algorithms import find_algorithm
 from world.arrays import Floats
-from world.files import hold, write_whole
+from world.files import lock_path, write_whole
 from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
 from world.scenario import Scenario, load_scenario, with_planner
 
@@ -181,7 +181,7 @@ def plan_section(
 
 
 def usable_cores() -> int:
-    """Return the number of cores that this process may use, or the number of all cores if that is unknown.
+    """Return the number of cores available to this process, or of all cores if that is unknown.
 
     >>> usable_cores() >= 1
     True
@@ -429,7 +429,7 @@ def paper_tables(
     rows = make_table(plans)
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        with hold(folder):
+        with lock_path(folder):
             prepare_folder(folder, tuple(file_names(PROBLEMS)))
             write_tables(folder, rows, plans)
             with stage("drawing", "drawing the paper's figures"):

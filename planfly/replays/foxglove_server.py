@@ -19,7 +19,7 @@ from planfly.replays.origin_gate import HOST, VIEWERS, OriginGate
 from world.errors import FlightError
 from world.running_clock import RunningClock
 
-Stopped = Callable[[], bool]
+ShouldStop = Callable[[], bool]
 OnMessage = Callable[[str], None]
 
 # Subprotocol of the server of foxglove-sdk.
@@ -39,7 +39,7 @@ def play_to_foxglove(
     port: int,
     allowed: Collection[str],
     wait: float | None,
-    stopped: Stopped,
+    should_stop: ShouldStop,
     on_message: OnMessage,
 ) -> None:
     """Play a log's messages from ``start`` to ``end`` (s) to the clients of a Foxglove server.
@@ -60,8 +60,8 @@ def play_to_foxglove(
         exit_stack.callback(server.stop)
         on_message(f"foxglove  ws://{HOST}:{gate.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})")
         messages = broadcast.record_scenes_until(log_messages(file), round(start * 1e9) + EPOCH_NS)
-        _wait_for_listener(broadcast, wait, stopped)
-        _play_messages(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, stopped)
+        _wait_for_listener(broadcast, wait, should_stop)
+        _play_messages(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, speed, should_stop)
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
@@ -80,11 +80,11 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
         )
     except RuntimeError as error:
         raise OSError(0, str(error), HOST) from error
-    gate.open(server.port, certificate)
+    gate.start_forwarding(server.port, certificate)
     return server
 
 
-def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, should_stop: Stopped) -> None:
+def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, should_stop: ShouldStop) -> None:
     clock = RunningClock()
     while not broadcast.listeners and not should_stop():
         if timeout is not None and clock() > timeout:
@@ -98,7 +98,7 @@ def _play_messages(
     messages: Iterator[LogMessage],
     end_ns: int,
     speed: float,
-    should_stop: Stopped,
+    should_stop: ShouldStop,
 ) -> None:
     playback_clock, first_time, latest_time = RunningClock(), None, 0
     for message in messages:

@@ -83,8 +83,8 @@ class OriginGate:
         self._thread = threading.Thread(target=self._run_loop, name="origin gate", daemon=True)
         self._closed = asyncio.Event()
 
-    def open(self, port: int, certificate: Certificate) -> None:
-        """Begin to forward to a server that speaks TLS with this certificate, which no browser trusts."""
+    def start_forwarding(self, port: int, certificate: Certificate) -> None:
+        """Begin to forward to a TLS server with this certificate, which no browser trusts."""
         self._server_port = port
         self._tls = ssl.create_default_context(cadata=certificate.certificate)
         self._loop = asyncio.new_event_loop()
@@ -99,10 +99,10 @@ class OriginGate:
 
     def _run_loop(self) -> None:
         with contextlib.closing(self._loop):
-            self._loop.run_until_complete(self._serve())
+            self._loop.run_until_complete(self._serve_until_closed())
 
-    async def _serve(self) -> None:
-        server = await asyncio.start_server(self._accept, sock=self._socket, limit=_MAX_HEAD_BYTES)
+    async def _serve_until_closed(self) -> None:
+        server = await asyncio.start_server(self._accept_connection, sock=self._socket, limit=_MAX_HEAD_BYTES)
         await self._closed.wait()
         server.close()
         if self._connections:
@@ -111,7 +111,7 @@ class OriginGate:
                 connection.cancel()
             await asyncio.gather(*open_connections, return_exceptions=True)
 
-    def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def _accept_connection(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         if len(self._connections) >= _MAX_CONNECTIONS:
             writer.close()
             return
@@ -128,22 +128,22 @@ class OriginGate:
                 return
             reason = refusal_reason(head, self.port, self._allowed)
             if reason:
-                self._report(reason)
+                self._report_refusal(reason)
                 writer.write(b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n")
                 await writer.drain()
                 return
             server = asyncio.open_connection(HOST, self._server_port, ssl=self._tls, server_hostname="localhost")
             server_reader, server_writer = await server
             server_writer.write(head)
-            await asyncio.gather(_forward(reader, server_writer), _forward(server_reader, writer))
+            await asyncio.gather(_forward_data(reader, server_writer), _forward_data(server_reader, writer))
 
-    def _report(self, reason: str) -> None:
+    def _report_refusal(self, reason: str) -> None:
         if reason not in self._reported and len(self._reported) < _MAX_REPORTED:
             self._reported.add(reason)
             self._on_refused(reason)
 
 
-async def _forward(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+async def _forward_data(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
     """Forward all data to the other end, and close it at the end of the data."""
     with contextlib.closing(writer), contextlib.suppress(OSError):
         while piece := await reader.read(_PIECE_BYTES):

@@ -25,12 +25,12 @@ from logs.recording.reader import FlightLog
 from planfly.flight_logs import CUT_SHORT
 from world.errors import FlightError
 
-Stopped = Callable[[], bool]
+ShouldStop = Callable[[], bool]
 OnMessage = Callable[[str], None]
 
 
 def play_to_stations(
-    log: FlightLog, access: Access, *, speed: float, wait: float, stopped: Stopped, on_message: OnMessage
+    log: FlightLog, access: Access, *, speed: float, wait: float, should_stop: ShouldStop, on_message: OnMessage
 ) -> None:
     """Play a log to ground stations as a live flight.  Raises FlightError if none answers in ``wait`` s."""
     link = Link(access)
@@ -44,13 +44,13 @@ def play_to_stations(
     status.total = int(max(items.max(), 0))
     player = _Player(link, status, on_message)
     try:
-        player.wait(wait, stopped)
+        player.wait(wait, should_stop)
         if not link.peers:
             addresses = ",".join(f"{host}:{port}" for host, port in access.to)
             raise FlightError.of_argument("to", addresses, f"no ground station has answered within {wait:g} s")
         start_time, k = link.clock(), 0
         player.announce(f"replay of {log.source} at {speed:g}x")
-        while k < len(rows) - 1 and not stopped():
+        while k < len(rows) - 1 and not should_stop():
             log_time = (link.clock() - start_time) * speed
             k = min(len(rows) - 1, int(np.searchsorted(track.time, log_time, side="right")))
             snapshot = snapshots.snapshot(rows[k])
@@ -62,7 +62,7 @@ def play_to_stations(
             status.mission_state = COMPLETE
         status.armed = status.flying = False
         player.announce(f"replay ended: {log.ended or CUT_SHORT}")
-        player.continue_sending(1.5, stopped)
+        player.continue_sending(1.5, should_stop)
     finally:
         link.close()
 
@@ -84,16 +84,16 @@ class _Player:
             for piece in status_texts(text, INFO, self._text_count):
                 self._link.send(piece, peer)
 
-    def wait(self, timeout: float, stopped: Stopped) -> None:
+    def wait(self, timeout: float, should_stop: ShouldStop) -> None:
         """Call stations until one answers, or for ``timeout`` seconds."""
         end = self._link.clock() + timeout
-        while not self._link.peers and self._link.clock() < end and not stopped():
+        while not self._link.peers and self._link.clock() < end and not should_stop():
             self.step(0.05)
 
-    def continue_sending(self, seconds: float, stopped: Stopped) -> None:
+    def continue_sending(self, seconds: float, should_stop: ShouldStop) -> None:
         """Continue sending the last snapshot."""
         end = self._link.clock() + seconds
-        while self._link.clock() < end and not stopped():
+        while self._link.clock() < end and not should_stop():
             self.step(0.02)
 
     def step(self, pause: float) -> None:
@@ -101,7 +101,7 @@ class _Player:
         now = self._link.clock()
         self._status.boot, self._status.wall = now - self._start_time, time.time()
         self._link.receive()
-        for notice in self._link.notices():
+        for notice in self._link.take_notices():
             self._on_message(notice)
         if now >= self._next_heartbeat:
             self._next_heartbeat = now + 1.0

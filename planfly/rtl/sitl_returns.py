@@ -58,29 +58,29 @@ _ROWS_PER_SECOND = 60
 class ProgramReturn:
     """One return as flown by the simulated ArduPlane and by the program.
 
-    law: the return by the simulated ArduPlane, as judged.
+    simulated: the return by the simulated ArduPlane, as judged.
     flown: the return by the program, or None if the program could not fly it.
     reason: reason why the program could not fly the return, or "".
     log: the log of the flight, or None if it was not kept.
     """
 
-    law: SimulatedReturn
+    simulated: SimulatedReturn
     flown: SimulatedReturn | None = None
     reason: str = ""
     log: Path | None = None
 
     @property
     def agrees(self) -> bool:
-        """True if both returns go to the same place and have the same kind of outcome."""
+        """True if both returns have the same target and the same kind of outcome."""
         return self.flown is not None and (self.flown.kind, self.flown.target.name) == (
-            self.law.kind,
-            self.law.target.name,
+            self.simulated.kind,
+            self.simulated.target.name,
         )
 
     @property
     def worse(self) -> bool:
         """True if the program's outcome is worse than the simulated outcome."""
-        return self.flown is not None and KINDS.index(self.flown.kind) < KINDS.index(self.law.kind)
+        return self.flown is not None and KINDS.index(self.flown.kind) < KINDS.index(self.simulated.kind)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,9 +121,9 @@ class ProgramReturns:
         """Return a line on each return, with its start, both outcomes, and their agreement."""
         texts = []
         for pair in self.pairs:
-            east, north, _ = pair.law.start
-            start_text = f"{pair.law.time:.0f} s, from {east:.0f} m east, {north:.0f} m north"
-            simulated_text = measured_text(pair.law, returns.limit, scenario)
+            east, north, _ = pair.simulated.start
+            start_text = f"{pair.simulated.time:.0f} s, from {east:.0f} m east, {north:.0f} m north"
+            simulated_text = measured_text(pair.simulated, returns.limit, scenario)
             if pair.flown is None:
                 texts.append(f"{start_text}: simulated {simulated_text}; not flown by the program: {pair.reason}")
                 continue
@@ -140,7 +140,7 @@ class ProgramReturns:
 
     def with_worse_results(self, returns: Returns) -> Returns:
         """Replace each simulated result by the program's result if the program's result is worse."""
-        worse_results = {id(pair.law): pair.flown for pair in self.pairs if pair.worse}
+        worse_results = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
         return replace(
             returns,
             each=tuple(
@@ -278,7 +278,7 @@ def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
     """Return the position where the judgement of a return ends: loiter center, or last waypoint before the landing."""
     if target.landing is None:
         return target.position
-    return (target.landing, *target.landing.onward)[-1].place
+    return (target.landing, *target.landing.next_stops)[-1].place
 
 
 def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
@@ -289,7 +289,7 @@ def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target at which a path ends, or for which it heads.
+    """Identify the target where a path ends, or the target that it heads for.
 
     All possible targets of a return are tried.  If none fits, return the target of the simulated ArduPlane.
 

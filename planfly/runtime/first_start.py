@@ -15,7 +15,7 @@ from typing import ParamSpec, TypeVar
 
 from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime.stages import has_receiver, report_line, stage
-from world.compile_events import tell_before_compiling
+from world.compile_events import notify_before_compiling
 from world.kernel_cache import VARIABLE, can_write
 
 # ----------------------------------------------------------------------
@@ -127,7 +127,7 @@ def warm_up(*units: str) -> Iterator[None]:
             _report_and_compile([unit for unit in units if unit not in _compiled_units])
             _compiled_units.update(units)
 
-    with tell_before_compiling(compile_all):
+    with notify_before_compiling(compile_all):
         yield
 
 

@@ -374,7 +374,7 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
         return None
     climb, descent, points = opened_plan.ways.climb, opened_plan.ways.descent, context.item_positions(mission)
     departure_count = 0 if climb is None else 1 + len(climb.waypoints)
-    approach_count = 0 if descent is None else len(descent.waypoints) + len(descent.line_up) + 1
+    approach_count = 0 if descent is None else len(descent.waypoints) + len(descent.final_waypoints) + 1
     waypoints = points[departure_count : len(points) - approach_count]
     is_unchanged = len(waypoints) > 1 and all(
         procedure is None or np.allclose(waypoints[ends], opened_plan.waypoints[ends], atol=_ALTITUDE_TOLERANCE_M)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
-from flight.mission.route import Route, lay_route, with_end_courses
+from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup
 from planfly.named_fences import NamedFences
 from planfly.studio.settings import SetParameters
@@ -91,7 +91,7 @@ class EditContext(MissionContext):
         """Return the route of a mission, without the notes for the user."""
         frame, fly_over = self.airframe, self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
-        route = lay_route(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
+        route = route_through_stops(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(route, self.scenario, frame.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:

@@ -227,7 +227,7 @@ class Session:
         """Return the edited mission and a description of the edit."""
         match message:
             case Move():
-                item = edits.checked_place(self.mission, message.k)
+                item = edits.movable_item(self.mission, message.k)
                 mission = self._move_item(message.k, message.east, message.north, message.up)
                 return mission, f"move item {item.seq}"
             case Insert():
@@ -236,7 +236,7 @@ class Session:
                 return self._delete_items(message.ks)
             case Raise():
                 indices = self._indices_to_raise(message.ks)
-                mission = edits.raised(self.mission, indices, message.by)
+                mission = edits.raise_items(self.mission, indices, message.by)
                 items_text = (
                     "all items" if message.ks is None else f"{len(indices)} item{'s' if len(indices) != 1 else ''}"
                 )
@@ -246,20 +246,22 @@ class Session:
 
     def _indices_to_raise(self, indices: list[int] | None) -> tuple[int, ...]:
         """Return the given indices, or all for None, without landings unless there are only landings."""
-        requested = edits.places(self.mission) if indices is None else tuple(indices)
+        requested = edits.movable_indices(self.mission) if indices is None else tuple(indices)
         airborne = tuple(
-            index for index in requested if edits.checked_place(self.mission, index).command not in LANDINGS
+            index for index in requested if edits.movable_item(self.mission, index).command not in LANDINGS
         )
         return airborne or requested
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
         mission = self.mission
-        edits.checked_place(mission, index)
+        edits.movable_item(mission, index)
         if east is not None and north is not None:
-            mission = edits.moved(mission, index, *self.context.to_geographic(east, north))
+            mission = edits.move_item(mission, index, *self.context.to_geographic(east, north))
         if altitude is not None:
-            current_altitude = float(self.context.item_positions(mission)[edits.places(mission).index(index), 2])
-            mission = edits.at_height(
+            current_altitude = float(
+                self.context.item_positions(mission)[edits.movable_indices(mission).index(index), 2]
+            )
+            mission = edits.set_altitude(
                 mission, index, altitude, current_altitude if np.isfinite(current_altitude) else altitude
             )
         return mission if mission is self.mission else self.context.with_updated_radii(mission, index)
@@ -269,26 +271,26 @@ class Session:
 
         The waypoint's altitude is the mean of the previous and next item's altitudes if both have the same frame.
         """
-        mission, place_indices = self.mission, edits.places(self.mission)
-        previous_item = edits.checked_place(mission, message.after)
+        mission, place_indices = self.mission, edits.movable_indices(self.mission)
+        previous_item = edits.movable_item(mission, message.after)
         altitude, position = None, place_indices.index(message.after)
         if position + 1 < len(place_indices):
             next_item = mission.items[place_indices[position + 1]]
             has_same_frame = next_item.frame == previous_item.frame and next_item.command not in LANDINGS
             altitude = 0.5 * (previous_item.alt + next_item.alt) if has_same_frame else None
             altitude = altitude if altitude is not None and np.isfinite(altitude) else None
-        new_mission = edits.inserted(
+        new_mission = edits.insert_waypoint(
             mission, message.after, *self.context.to_geographic(message.east, message.north), altitude
         )
         return self.context.with_updated_radii(
-            new_mission, edits.next_index(mission, message.after)
+            new_mission, edits.insertion_index(mission, message.after)
         ), f"insert an item after {previous_item.seq}"
 
     def _delete_items(self, indices: list[int]) -> tuple[Mission, str]:
         mission = self.mission
         for index in sorted(set(indices), reverse=True):
-            mission = edits.deleted(mission, index)
-            place_indices = edits.places(mission)
+            mission = edits.delete_item(mission, index)
+            place_indices = edits.movable_indices(mission)
             nearest_index = min(place_indices, key=lambda place_index: abs(place_index - index))
             mission = self.context.with_updated_radii(mission, nearest_index)
         return mission, f"delete {len(set(indices))} item{'s' if len(set(indices)) != 1 else ''}"
@@ -324,29 +326,29 @@ class Session:
     def _replace_part(self, plan: Plan, first: int, last: int) -> Mission:
         """Return the mission with the items between two items replaced by the waypoints of a planned path."""
         mission = self.mission
-        for index in [index for index in edits.places(mission) if first < index < last][::-1]:
-            mission = edits.deleted(mission, index)
+        for index in [index for index in edits.movable_indices(mission) if first < index < last][::-1]:
+            mission = edits.delete_item(mission, index)
         lat, lon = to_geo(self.context.scenario.origin, plan.waypoints[1:-1, 0], plan.waypoints[1:-1, 1])
         inserted_index = first
         for waypoint_lat, waypoint_lon, altitude in zip(
             lat.tolist(), lon.tolist(), plan.waypoints[1:-1, 2].tolist(), strict=True
         ):
-            previous_index, inserted_index = inserted_index, edits.next_index(mission, inserted_index)
-            mission = edits.inserted(mission, previous_index, waypoint_lat, waypoint_lon)
+            previous_index, inserted_index = inserted_index, edits.insertion_index(mission, inserted_index)
+            mission = edits.insert_waypoint(mission, previous_index, waypoint_lat, waypoint_lon)
             current_altitude = float(
-                self.context.item_positions(mission)[edits.places(mission).index(inserted_index), 2]
+                self.context.item_positions(mission)[edits.movable_indices(mission).index(inserted_index), 2]
             )
-            mission = edits.at_height(mission, inserted_index, altitude, current_altitude)
-        place_indices = edits.places(mission)
+            mission = edits.set_altitude(mission, inserted_index, altitude, current_altitude)
+        place_indices = edits.movable_indices(mission)
         for index in place_indices[place_indices.index(first) : place_indices.index(inserted_index) + 2]:
             mission = self.context.with_updated_radii(mission, index)
         return mission
 
     def item_position(self, index: int) -> tuple[float, float, float]:
         """Return east, north and altitude AMSL of an item, m.  Raises MissionError if the item has no position."""
-        edits.checked_place(self.mission, index)
+        edits.movable_item(self.mission, index)
         east, north, altitude = self.context.item_positions(self.mission)[
-            edits.places(self.mission).index(index)
+            edits.movable_indices(self.mission).index(index)
         ].tolist()
         return east, north, altitude
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.edits import places
+from flight.mission.edits import movable_indices
 from flight.mission.items import AMSL, OVER_HOME, Mission, command_name
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
@@ -168,7 +168,7 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
     """Return page data of the items that can be moved, with their positions on the map and in the mission."""
     points, flown_seqs = context.item_positions(mission), context.reached_items(mission)
     entries = []
-    for k, (east, north, altitude) in zip(places(mission), points.tolist(), strict=True):
+    for k, (east, north, altitude) in zip(movable_indices(mission), points.tolist(), strict=True):
         item = mission.items[k]
         entries.append(
             {

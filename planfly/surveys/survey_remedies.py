@@ -10,7 +10,7 @@ from typing import Literal, TypeGuard
 from flight.autopilots.autopilot import Autopilot
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
-from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
+from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import judged_surveys
 from logs.verdict.rule_words import RULE_WORDS
@@ -169,8 +169,8 @@ class _Trials:
             if not lost_legs.isdisjoint(range(survey.first, survey.last))
         ]
         self._surveys = [all_surveys[number] for number in self._numbers]
-        self._current_turn_around = min(turn_around_of(setup.route, survey) for survey in self._surveys)
-        reasons = (kept_layout(setup.mission, setup.route, survey) for survey in self._surveys)
+        self._current_turn_around = min(min_turn_around(setup.route, survey) for survey in self._surveys)
+        reasons = (layout_obstacle(setup.mission, setup.route, survey) for survey in self._surveys)
         self.kept = next((reason for reason in reasons if reason), "")
         self.nearest: NearMiss | None = None
 
@@ -233,7 +233,7 @@ class _Trials:
 
     def find_turn_around(self) -> SurveyRemedy | None:
         """Find the shortest turn-around that passes, among the turn-arounds longer than the current one."""
-        return self._shortest_turn_around(
+        return self._find_shortest_turn_around(
             1, [length for length in TURN_AROUNDS if length > self._current_turn_around + 1.0], 0.0
         )
 
@@ -260,13 +260,15 @@ class _Trials:
         ]
         max_line_count = max(len(survey.lines) for survey in self._surveys)
         remedies = (
-            self._shortest_turn_around(stride, turn_arounds, lead_in)
+            self._find_shortest_turn_around(stride, turn_arounds, lead_in)
             for stride in INTERLEAVE_STRIDES
             if 2 * stride <= max_line_count
         )
         return next((remedy for remedy in remedies if remedy is not None), None)
 
-    def _shortest_turn_around(self, stride: int, turn_arounds: Sequence[float], lead_in: float) -> SurveyRemedy | None:
+    def _find_shortest_turn_around(
+        self, stride: int, turn_arounds: Sequence[float], lead_in: float
+    ) -> SurveyRemedy | None:
         """Find the shortest of increasing turn-arounds, m, with which all lines are usable; return it if it passes.
 
         The search is a bisection.  A turn-around is too long if the flight runs out of energy before its end.
@@ -330,7 +332,7 @@ class _Trials:
         )
 
     def find_airspeed(self) -> SurveyRemedy | None:
-        """Find the highest reduced airspeed that passes; None for a mission that sets its own airspeed."""
+        """Find the highest reduced airspeed that passes; None if the mission sets its own airspeed."""
         for speed, airframe in self._slower_airspeeds():
             flight = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")
             if self._passes(flight):
@@ -340,7 +342,9 @@ class _Trials:
     # ------------------------------------------------------------------
     # Two changes together.
 
-    def _turn_around_with(self, change: str, airframe: Airframe, mission: Mission | None = None) -> SurveyRemedy | None:
+    def _find_turn_around_with(
+        self, change: str, airframe: Airframe, mission: Mission | None = None
+    ) -> SurveyRemedy | None:
         """Find the shortest turn-around that passes in combination with another change."""
         trials = copy(self)
         trials._airframe, trials._change_prefix = airframe, f"{change}, "
@@ -366,7 +370,7 @@ class _Trials:
             if value == current:
                 continue
             airframe = replace(self._airframe, autopilot=autopilot.with_parameters(**{name: value}))
-            remedy = self._turn_around_with(f"{name} {value:g}", airframe)
+            remedy = self._find_turn_around_with(f"{name} {value:g}", airframe)
             if remedy is not None:
                 return replace(remedy, kind="parameter", name=name, current=current, value=value, unit=unit)
         return None
@@ -374,7 +378,7 @@ class _Trials:
     def find_airspeed_and_turn_around(self) -> SurveyRemedy | None:
         """Try the lowest of the slower airspeeds with longer turn-arounds."""
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
-            remedy = self._turn_around_with(f"{speed:g} m/s", airframe)
+            remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe)
             if remedy is not None:
                 return replace(remedy, kind="airspeed", current=self._airframe.airspeed, value=speed, unit="m/s")
         return None
@@ -391,7 +395,7 @@ class _Trials:
             replace(item, params=(item.params[0], default_airspeed, *item.params[2:])) if item in slow_items else item
             for item in mission.items
         )
-        remedy = self._turn_around_with(f"{default_airspeed:g} m/s", self._airframe, replace(mission, items=items))
+        remedy = self._find_turn_around_with(f"{default_airspeed:g} m/s", self._airframe, replace(mission, items=items))
         if remedy is None:
             return None
         return replace(

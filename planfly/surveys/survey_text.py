@@ -86,7 +86,7 @@ def has_required_overlap(measure: OverlapMeasure | None) -> bool:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe the places from which lines are usable, which shows the turn-arounds that would be needed."""
+    """Describe from where lines are usable, and thereby the turn-arounds that would be needed."""
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (

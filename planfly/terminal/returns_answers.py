@@ -235,10 +235,10 @@ def program_entry(result: ReturnsFound) -> ByProgram | None:
     names = {log.name: str(log) for log in result.files}
     entries = [
         ProgramReturnEntry(
-            at_s=round(pair.law.time, 2),
-            east_m=round(pair.law.start[0], 1),
-            north_m=round(pair.law.start[1], 1),
-            law=_measured_return(pair.law),
+            at_s=round(pair.simulated.time, 2),
+            east_m=round(pair.simulated.start[0], 1),
+            north_m=round(pair.simulated.start[1], 1),
+            law=_measured_return(pair.simulated),
             program=None if pair.flown is None else _measured_return(pair.flown),
             agrees=pair.agrees,
             worse=pair.worse,

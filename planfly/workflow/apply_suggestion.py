@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from flight.mission.edits import at_height, at_speed, moved, places
+from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude
 from flight.mission.items import LANDINGS, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
@@ -77,7 +77,7 @@ class _EditedMission:
     def item_index(self, waypoint: int) -> int | None:
         """Return the index of a waypoint's item in the mission's list, or None if the waypoint has no item."""
         seq = int(self.route.items[waypoint])
-        indices = [index for index in places(self.mission) if self.mission.items[index].seq == seq]
+        indices = [index for index in movable_indices(self.mission) if self.mission.items[index].seq == seq]
         return indices[0] if indices else None
 
     def waypoint_positions(self) -> Floats:
@@ -89,13 +89,13 @@ class _EditedMission:
         for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
-            position = self.context.item_positions(self.mission)[places(self.mission).index(index)]
+            position = self.context.item_positions(self.mission)[movable_indices(self.mission).index(index)]
             if offset[0] or offset[1]:
-                self.mission = moved(
+                self.mission = move_item(
                     self.mission, index, *self.context.to_geographic(*(position[:2] + offset[:2]).tolist())
                 )
             if offset[2] and math.isfinite(position[2]):
-                self.mission = at_height(self.mission, index, float(position[2] + offset[2]), float(position[2]))
+                self.mission = set_altitude(self.mission, index, float(position[2] + offset[2]), float(position[2]))
             self.mission, self.is_changed = self.context.with_updated_radii(self.mission, index), True
 
     def end_waypoints(self, legs: Sequence[int]) -> list[int]:
@@ -130,7 +130,7 @@ def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> N
     edited.move_items([leg + 1], np.array([0.0, 0.0, -end_fraction * excess]))
 
 
-def _set_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> None:
+def _change_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> None:
     """Change the airspeed on a leg, on both legs of a waypoint, or on the whole route."""
     place, route = change.place, edited.route
     airspeed = change.wanted if change.most is None else 0.5 * (change.wanted + change.most)
@@ -142,7 +142,7 @@ def _set_airspeed(edited: _EditedMission, change: Change, _finding: Finding) -> 
     for leg in reversed(legs):
         index = edited.item_index(leg + 1)
         if index is not None:
-            edited.mission = at_speed(edited.mission, index, airspeed, float(route.airspeed[leg]))
+            edited.mission = set_airspeed(edited.mission, index, airspeed, float(route.airspeed[leg]))
             edited.is_changed = True
 
 
@@ -215,7 +215,7 @@ def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> 
 _CHANGE_FUNCTIONS: dict[str, Callable[[_EditedMission, Change, Finding], None]] = {
     "length": _lengthen_leg,
     "rise": _reduce_rise,
-    "airspeed": _set_airspeed,
+    "airspeed": _change_airspeed,
     "turn": _make_turn_gentler,
     "height": _change_altitude,
     "descent": _change_altitude,

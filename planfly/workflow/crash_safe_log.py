@@ -14,7 +14,7 @@ from logs.verdict.places import ReferenceFlights
 from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
 from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
-from world.files import hold
+from world.files import lock_path
 from world.geometry import leg_runs
 from world.interruption import uninterrupted
 
@@ -102,7 +102,7 @@ class CrashSafeLog:
     """
 
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
-        self.ended = INTERRUPTED
+        self.end_reason = INTERRUPTED
         self._path = path
         self._rows = 0
         self._is_open = False
@@ -113,7 +113,7 @@ class CrashSafeLog:
             with uninterrupted(), self._errors_with_file_name():
                 path.touch()
                 # Take the lock before the file is emptied, so that a log locked by another process is not changed.
-                self._locks.enter_context(hold(path))
+                self._locks.enter_context(lock_path(path))
                 self._recorder = Recorder(path, setup, every=every, batch=batch)
                 self._is_open = True
         except BaseException as error:
@@ -141,7 +141,7 @@ class CrashSafeLog:
             if error_type is None or not issubclass(error_type, KeyboardInterrupt):
                 self._recorder.abandon()
             elif self._rows:
-                self._recorder.finish(self.ended)
+                self._recorder.finish(self.end_reason)
             else:
                 self._recorder.abandon()
                 Path(os.path.realpath(self._path)).unlink(missing_ok=True)

@@ -266,25 +266,25 @@ def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thr
     balance: change of the logarithm of the thrust per logarithm of each other factor.
     thrust_sd: deviation of the logarithm of the thrust for the deviation of the climb.
     """
-    drawn = draw_quantities(uncertainty.quantities)
-    logarithms = np.log(drawn.values)
-    names = [name.removeprefix("ident/") for name in drawn.names]
+    draws = draw_quantities(uncertainty.quantities)
+    logarithms = np.log(draws.values)
+    names = [name.removeprefix("ident/") for name in draws.names]
     thrust = names.index("thrust")
     scale = thrust_sd / next(quantity.sd for quantity in uncertainty.quantities if quantity.name == "ident/thrust")
     logarithms[:, thrust] *= scale
     for k, name in enumerate(names):
         if k != thrust:
             logarithms[:, thrust] += balance[name] * logarithms[:, k]
-    return replace(drawn, values=np.exp(logarithms).round(6))
+    return replace(draws, values=np.exp(logarithms).round(6))
 
 
-def _calibrated_power_sd(sized: SizedAircraft, power: float, least_drag_sd: float) -> float:
+def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float) -> float:
     """Return the standard deviation of the logarithm of the power (W) at cruise, as calibrated on real aircraft."""
     aero, sheet, propulsion = sized.numbers.aero, sized.sheet, sized.numbers.propulsion
     lift = sheet.mass * GRAVITY / (0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area)
-    least_share = aero.drag_min / (aero.drag_min + aero.drag_lift * lift**2)
-    avionics_share = propulsion.avionics / power if isinstance(propulsion, ElectricMotor) else 0.0
-    return power_log_sd(least_share, avionics_share, least_drag_sd)
+    min_drag_fraction = aero.drag_min / (aero.drag_min + aero.drag_lift * lift**2)
+    avionics_fraction = propulsion.avionics / power if isinstance(propulsion, ElectricMotor) else 0.0
+    return power_log_sd(min_drag_fraction, avionics_fraction, min_drag_sd)
 
 
 def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float], ...] = ()) -> Floats:
@@ -296,15 +296,15 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
     properties: values of the model's properties by name.
     """
     fdm = Fdm(aircraft, tried=True, variation=Variation(properties=properties))
-    angles = [steepest(fdm, aircraft.airspeed, AMSL) for steepest in (full_throttle, idle)]
-    fastest_trim = fastest(fdm, AMSL)
+    angles = [trim_function(fdm, aircraft.airspeed, AMSL) for trim_function in (full_throttle, idle)]
+    max_speed_trim = fastest(fdm, AMSL)
     level = straight(fdm, aircraft.airspeed, AMSL)
     if level is not None:
         fdm.balance(level.vector())
     return np.array(
         [
             *(math.nan if trim is None else trim.climb for trim in angles),
-            math.nan if fastest_trim is None else fastest_trim.airspeed,
+            math.nan if max_speed_trim is None else max_speed_trim.airspeed,
             math.nan if level is None else math.log(float(fdm.read().power)),
         ]
     )
@@ -412,7 +412,7 @@ def _make_files(
     sheet = sized.sheet
     (folder / f"{name}.toml").write_text(_metadata_text(sized, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
     aircraft = read_aircraft(folder)
-    performance = performance_of(Fdm(aircraft, tried=True), aircraft)
+    performance = measure_performance(Fdm(aircraft, tried=True), aircraft)
     # At the stall the propeller carries part of the weight.  If the model could fly slower, the sheet's stall speed
     # applies.
     stall_speed = max(
@@ -437,7 +437,7 @@ def _make_files(
     }
 
 
-def performance_of(fdm: Simulator, aircraft: Aircraft) -> Performance:
+def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
     """Trim the aircraft in all flight conditions of `Performance`.  Raises FlightError if one has no trim point."""
     cruise = aircraft.airspeed
     level = straight(fdm, cruise, AMSL)

@@ -20,10 +20,10 @@ from flight.mission.commands import Command
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import TAKEOFFS, Frame, Mission
 from flight.mission.placing import PlacedMission, place_stops
-from flight.mission.route import lay_route
+from flight.mission.route import route_through_stops
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
-from flight.simulation.simulate import Flight, simulate, track_of
+from flight.simulation.simulate import Flight, join_blocks, simulate
 from flight.simulation.track import Track
 from logs.importers.clean_places import LONGEST_STEP
 from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
@@ -218,7 +218,7 @@ def _flight_setup(
     return FlightSetup(
         scenario=scenario,
         mission=mission,
-        route=lay_route(placed, limits.airspeed, scenario.flight.fly_over, limits, autopilot.route_rules),
+        route=route_through_stops(placed, limits.airspeed, scenario.flight.fly_over, limits, autopilot.route_rules),
         limits=limits,
         aircraft=aircraft.name,
         battery=battery,
@@ -414,7 +414,7 @@ def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
     return replace(
         setup,
         mission=mission,
-        route=lay_route(
+        route=route_through_stops(
             placed, setup.limits.airspeed, scenario.flight.fly_over, setup.limits, setup.autopilot.route_rules
         ),
         source=replace(source, stretches=(replace(stretch, start=float(track.time[rows[0]])), *others)),
@@ -460,7 +460,7 @@ def _refly_followed_legs(
         blocks.append(block)
         if advance is not None:
             advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-    track, end_reason = track_of(blocks), blocks[-1].ended
+    track, end_reason = join_blocks(blocks), blocks[-1].ended
     if len(track) < 2:
         raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {end_reason}", file=scenario.name)
     if draw is not None:

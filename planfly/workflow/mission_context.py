@@ -1,4 +1,4 @@
-"""Context of a mission whose items change: their places, the setup of its flight, and its geometric verdict.
+"""Context of a mission whose items change: their positions, the setup of its flight, and its geometric verdict.
 
 Scenario and aircraft are loaded once.  An unchanged mission is judged as it was opened, a plan with its certificate;
 a changed mission is judged like a mission file.
@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flight.mission.edits import places
+from flight.mission.edits import movable_indices
 from flight.mission.from_plan import acceptance_radii
 from flight.mission.items import AMSL, LANDINGS, OVER_HOME, Command, Mission, MissionItem
 from flight.mission.placing import PlacedMission, place_stops
@@ -67,14 +67,14 @@ class MissionContext:
         return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
 
     def item_positions(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
-        """Return east, north and altitude AMSL of each place of `flight.mission.edits.places`, (n, 3) m.
+        """Return east, north and altitude AMSL of each item of `flight.mission.edits.movable_indices`, (n, 3) m.
 
         The altitude of a landing is the altitude of its touchdown.  An item that no flight reaches has the altitude
-        that it states, NaN if not known.
+        that it states, NaN if unknown.
         """
         placed = self.place_mission(mission) if placed is None else placed
         heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
-        items = [mission.items[k] for k in places(mission)]
+        items = [mission.items[k] for k in movable_indices(mission)]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [
             self._stated_altitude(mission, item, x, y)
@@ -103,7 +103,7 @@ class MissionContext:
         return frozenset(stop.stop.item for stop in self.place_mission(mission).stops)
 
     def to_geographic(self, east: float, north: float) -> tuple[float, float]:
-        """Return latitude and longitude of a place on the map, degrees."""
+        """Return latitude and longitude of a map position, degrees."""
         lat, lon = to_geo(self.scenario.origin, east, north)
         return float(lat), float(lon)
 
@@ -111,7 +111,7 @@ class MissionContext:
         """Adapt the acceptance radii of a planned mission to its turns near an item."""
         if not self.planned:
             return mission
-        item_indices = places(mission)
+        item_indices = movable_indices(mission)
         position = int(np.searchsorted(item_indices, index))
         nearby = item_indices[max(0, position - 2) : position + 3]
         points = self._planned_positions(mission, nearby)
@@ -127,7 +127,7 @@ class MissionContext:
         return replace(mission, items=tuple(items))
 
     def _planned_positions(self, mission: Mission, indices: tuple[int, ...]) -> Floats:
-        """Return the places of a planned mission, AMSL; a landing has the altitude of the item before it."""
+        """Return the positions of planned items, (n, 3) m AMSL; a landing has the altitude of the item before it."""
         items = [mission.items[k] for k in indices]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [item.alt for item in items]

@@ -9,8 +9,8 @@ from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import OTHER_VEHICLES, Command, Mission, command_name
 from flight.mission.placing import PlacedMission, place_stops
-from flight.mission.preflight_notes import field_notes
-from flight.mission.route import lay_route, with_end_courses
+from flight.mission.preflight_notes import preflight_notes
+from flight.mission.route import route_through_stops, with_end_courses
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FDM_HZ, EngineChoice, FlightSetup
 from planfly.flight_options import MissionOptions, apply_options, load_scenario_with_options
@@ -162,11 +162,11 @@ def make_setup(
         placed = place_stops(
             mission, scenario.origin, scenario.terrain, vertical_legs=True, resets_jump_counters=resets
         )
-    route = lay_route(placed, airspeed, fly_over, limits, autopilot.route_rules)
+    route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
     file_parameters = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
     notes = autopilot.parameter_notes
-    notes += field_notes(mission, route, scenario, autopilot.return_rules, file_parameters)
+    notes += preflight_notes(mission, route, scenario, autopilot.return_rules, file_parameters)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,

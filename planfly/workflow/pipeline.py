@@ -9,7 +9,7 @@ from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
 from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, FlightBlock, simulate, track_of
+from flight.simulation.simulate import Flight, FlightBlock, join_blocks, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
@@ -208,9 +208,9 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
         track, end_reason = _simulate_and_record(task, flight, None)
         return _judge_rows(task, requirements, track, end_reason, flight.engine)
     with CrashSafeLog(task.log, flight.setup, every=task.every, batch=BATCH_S) as recorder:
-        track, recorder.ended = _simulate_and_record(task, flight, recorder)
+        track, recorder.end_reason = _simulate_and_record(task, flight, recorder)
         rows = thin_track(track, task.every)
-        judged_flight = _judge_rows(task, requirements, rows, recorder.ended, flight.engine)
+        judged_flight = _judge_rows(task, requirements, rows, recorder.end_reason, flight.engine)
         for event in judged_flight.events:
             recorder.event(event.time, event.text, event.level)
         summary = return_summary(flight.setup, judged_flight.track) if task.returns else None
@@ -232,7 +232,7 @@ def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: Crash
             task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
         if end_reason:
             break
-    return track_of(blocks), end_reason
+    return join_blocks(blocks), end_reason
 
 
 def _judge_unflown(

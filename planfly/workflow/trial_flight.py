@@ -8,7 +8,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, simulate, track_of
+from flight.simulation.simulate import Flight, join_blocks, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.judge_geometry import judge_geometry
@@ -70,7 +70,7 @@ class Trial:
                     raise TrialAborted
         except StartError as error:
             return join_tracks([]), f"not started: {error.reason}"
-        return track_of(blocks), blocks[-1].ended
+        return join_blocks(blocks), blocks[-1].ended
 
     @cached_property
     def flight_verdict(self) -> Verdict:

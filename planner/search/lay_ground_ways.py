@@ -19,7 +19,7 @@ from aircraft.path_limits import Limits, aircraft_slopes
 from aircraft.tracking import SPEED_RATIOS
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
-from planner.ground_ways import ClimbOut, Descent, GroundWays
+from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.pose_chains import (
@@ -140,7 +140,7 @@ def with_ground_ways(
         descent, reason = _find_approach(site, scenario.landing, final_model)
         problems += [f"landing: {reason}"] if reason else []
     certificate = replace(plan.certificate, problems=(*plan.certificate.problems, *problems))
-    return replace(plan, ways=GroundWays(climb, descent), certificate=certificate)
+    return replace(plan, ways=DepartureAndApproach(climb, descent), certificate=certificate)
 
 
 # ----------------------------------------------------------------------
@@ -467,7 +467,7 @@ class _Final(NamedTuple):
     course: float
     length: float
     height: float
-    line_up: Floats
+    final_waypoints: Floats
     point: Floats
 
 
@@ -502,7 +502,7 @@ def _find_approach(site: _Site, strip: LandingStrip, final_law: FinalModel) -> t
             reason = f"no height would be sufficient for a go-around on {round(math.degrees(candidate.course)) % 360}°"
             continue
         return Descent(
-            corners, candidate.line_up, point, candidate.course, candidate.height / candidate.length, go_around
+            corners, candidate.final_waypoints, point, candidate.course, candidate.height / candidate.length, go_around
         ), ""
     return None, reason
 
@@ -566,7 +566,7 @@ def _line_up_points(site: _Site, point: Floats, course: float, length: float, he
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     """Return a final's margin, m, negative if the final is blocked, and a description of its obstacle, or ""."""
-    glide_start, point = final.line_up[1], final.point
+    glide_start, point = final.final_waypoints[1], final.point
     distances, terrain_heights = _ground_profile(
         site.terrain, (float(glide_start[0]), float(glide_start[1])), final.course, final.length
     )
@@ -587,7 +587,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
     if obstacle:
         return -math.inf, f"is {obstacle}"
     point_above = np.array([point[0], point[1], glide_start[2]])
-    chain = np.concatenate([final.line_up, point_above[None]])
+    chain = np.concatenate([final.final_waypoints, point_above[None]])
     certificate = site.certify_chain(chain, (chain[0], chain[0]))
     if not certificate.ok:
         return min(certificate.clearance, 0.0) - 1.0, f"is not clear: {certificate.problems[0]}"
@@ -596,24 +596,24 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
 
 def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
     """Return corners (n, 3) of the shortest path from the plan's end to a line-up, or None and the reason."""
-    waypoints, line_up_altitude = site.plan.waypoints, float(final.line_up[0, 2])
+    waypoints, final_altitude = site.plan.waypoints, float(final.final_waypoints[0, 2])
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
     destination_course = site.scenario.destination_course
     course = float(leg_courses(waypoints[-2:])[0]) if destination_course is None else destination_course
     start, end = (
         (float(last_waypoint[0]), float(last_waypoint[1])),
-        (float(final.line_up[0, 0]), float(final.line_up[0, 1])),
+        (float(final.final_waypoints[0, 0]), float(final.final_waypoints[0, 1])),
     )
     previous_waypoints = waypoints[-3:-1]
     previous_points = [(float(waypoint[0]), float(waypoint[1])) for waypoint in previous_waypoints]
-    glide_start = (float(final.line_up[1, 0]), float(final.line_up[1, 1]))
+    glide_start = (float(final.final_waypoints[1, 0]), float(final.final_waypoints[1, 1]))
     best_rejected = _BestRejected()
-    point_above = np.array([final.point[0], final.point[1], line_up_altitude])
-    phase = int(line_up_altitude < end_altitude)
+    point_above = np.array([final.point[0], final.point[1], final_altitude])
+    phase = int(final_altitude < end_altitude)
     extra_length = math.dist(previous_points[-1], start) + math.dist(end, glide_start)
     extra_length += sum(math.dist(leg_start, leg_end) for leg_start, leg_end in pairwise(previous_points))
-    min_length = site.min_path_length(end_altitude - line_up_altitude, phase) + extra_length
-    for laps in _list_lap_counts(site, end_altitude - line_up_altitude, phase):
+    min_length = site.min_path_length(end_altitude - final_altitude, phase) + extra_length
+    for laps in _list_lap_counts(site, end_altitude - final_altitude, phase):
         paths = [
             [start, *corners, end]
             for corners in candidate_chains(start, course, end, final.course, site.turn_radius, laps)
@@ -628,11 +628,16 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
         ]
         for _, points in sorted(fitting_paths):
             for slope_factor in _SLOPE_FACTORS:
-                altitudes = _approach_altitudes(site, points, slope_factor, end_altitude, line_up_altitude)
-                if abs(altitudes[0] - end_altitude) > 1e-6 or abs(altitudes[-1] - line_up_altitude) > 1e-6:
+                altitudes = _approach_altitudes(site, points, slope_factor, end_altitude, final_altitude)
+                if abs(altitudes[0] - end_altitude) > 1e-6 or abs(altitudes[-1] - final_altitude) > 1e-6:
                     break
                 chain = np.concatenate(
-                    [previous_waypoints, _join_altitudes(points, altitudes), final.line_up[1:], point_above[None]]
+                    [
+                        previous_waypoints,
+                        _join_altitudes(points, altitudes),
+                        final.final_waypoints[1:],
+                        point_above[None],
+                    ]
                 )
                 certificate = site.certify_chain(chain, (last_waypoint, last_waypoint))
                 if certificate.ok and certificate.kill_distance > 0.0:
@@ -644,7 +649,7 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     if not best_rejected.count:
         return (
             None,
-            f"no path {route_text} is long enough for its turns and {end_altitude - line_up_altitude:.0f} m of descent",
+            f"no path {route_text} is long enough for its turns and {end_altitude - final_altitude:.0f} m of descent",
         )
     remedy = "a higher destination (height_m) or another strip may have one"
     return (
@@ -674,7 +679,7 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
     back to the line-up.
     """
     home_altitude, field_altitude = float(site.home[2]), float(final.point[2])
-    target = final.line_up[0]
+    target = final.final_waypoints[0]
     # The height is above the line-up, because an aircraft that aborts above the go-around height turns at once.
     min_height = max(
         _MIN_GO_AROUND_HEIGHT_M,

@@ -43,7 +43,7 @@ STAGES = (
     "flight.mission.from_plan:plan_mission",
     "flight.mission.itinerary:make_itinerary",
     "flight.mission.placing:place_stops",
-    "flight.mission.route:lay_route",
+    "flight.mission.route:route_through_stops",
     "planfly.workflow.open_flight:make_setup",
     "flight.guidance.path:fly_by_path",
     "flight.simulation.local_map:LocalMap.around",
@@ -55,7 +55,7 @@ STAGES = (
 )
 OURS = ("planfly", "logs", "flight", "planner", "world", "aircraft")
 ONCE = dict.fromkeys(("load_airframe", "load_envelope", "make_limits"), 1)
-ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "lay_route", "make_setup", "fly_by_path"), 1)
+ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "route_through_stops", "make_setup", "fly_by_path"), 1)
 OPENED = ROUTED | {"plan_mission": 1}
 ALIGNED = dict.fromkeys(("route_requirements", "align_track"), 1)
 FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "simulate", "judge_flight"), 1)

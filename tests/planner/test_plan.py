@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from planner.ground_ways import ClimbOut, Descent, GroundWays
+from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
 from planner.plan import Certificate, Objective, Plan, Violation, parse_plan, plan_html, plan_json, read_plan
 from tests.setups import small_scenario
 from world.errors import MissionError, PlanflyError, ScenarioError
@@ -42,8 +42,10 @@ UP = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 1 / 3]]), 0.15)
 DOWN = Descent(np.zeros((0, 3)), np.array([[9.0, 8.0, 90.0], [9.0, 9.0, 90.0]]), np.ones(3), 1.0, 0.08, 60.0)
 
 
-@pytest.mark.parametrize("ways", [GroundWays(), GroundWays(climb=UP), GroundWays(UP, DOWN)])
-def test_ways_from_and_to_the_ground_come_back(ways: GroundWays) -> None:
+@pytest.mark.parametrize(
+    "ways", [DepartureAndApproach(), DepartureAndApproach(climb=UP), DepartureAndApproach(UP, DOWN)]
+)
+def test_ways_from_and_to_the_ground_come_back(ways: DepartureAndApproach) -> None:
     plan = made(ways=ways)
     again = parse_plan(plan_json(plan), "plan.json")
     assert plan_json(again) == plan_json(plan)
@@ -57,7 +59,7 @@ def test_ways_from_and_to_the_ground_come_back(ways: GroundWays) -> None:
 
 
 def test_a_way_that_is_none_is_refused() -> None:
-    data = json.loads(plan_json(made(ways=GroundWays(UP, DOWN))))
+    data = json.loads(plan_json(made(ways=DepartureAndApproach(UP, DOWN))))
     data["ground_ways"]["descent"]["line_up_east_north_amsl_m"].pop()
     with pytest.raises(MissionError, match=r"^x: ground_ways\.descent\.line_up_east_north_amsl_m: "):
         parse_plan(json.dumps(data), "x")

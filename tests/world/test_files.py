@@ -13,7 +13,7 @@ from world import file_locks
 from world.errors import MissionError, PlanflyError, ScenarioError
 from world.files import (
     did_you_mean,
-    hold,
+    lock_path,
     read_at_most,
     read_small_file,
     read_toml,
@@ -225,9 +225,13 @@ def on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_target_is_kept_to_one_process_where_there_is_no_flock(tmp_path: Path) -> None:
     (tmp_path / "a.mcap").touch()
     for target in (tmp_path / "a.mcap", tmp_path):
-        with hold(target), pytest.raises(PlanflyError, match="another planfly process is writing there"), hold(target):
+        with (
+            lock_path(target),
+            pytest.raises(PlanflyError, match="another planfly process is writing there"),
+            lock_path(target),
+        ):
             pass
-        with hold(target):
+        with lock_path(target):
             # It stays open to others, who would read it.
             assert target.exists()
     assert [file.name for file in tmp_path.iterdir()] == ["a.mcap"]
@@ -239,5 +243,5 @@ def test_a_target_that_may_not_be_read_is_not_said_to_be_held(tmp_path: Path, mo
         raise PermissionError(13, "Permission denied", str(tmp_path))
 
     monkeypatch.setattr(os, "open", refused)
-    with pytest.raises(PermissionError), hold(tmp_path):
+    with pytest.raises(PermissionError), lock_path(tmp_path):
         pass

@@ -10,25 +10,25 @@ import pytest
 from tests.world.made.made_scenario import SMALL, THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.scenario_file import check_scenario, parse_scenario
-from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, ScenarioFile, ZoneTable, no_line_break, within
+from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, ScenarioFile, ZoneTable, check_no_line_break, in_range
 
 
 def test_a_range_holds_its_ends_unless_it_says_otherwise() -> None:
-    check: Any = within(0.0, 5.0).func
+    check: Any = in_range(0.0, 5.0).func
     assert [check(value) for value in (0.0, 5.0)] == [0.0, 5.0]
     for value in (-0.001, 5.001, math.nan, math.inf):
         with pytest.raises(ValueError, match=r"^allowed 0\.\.5$"):
             check(value)
-    open_ends: Any = within(0.0, 5.0, above=True, below=True, also=', or "aircraft"').func
+    open_ends: Any = in_range(0.0, 5.0, exclude_min=True, exclude_max=True, also=', or "aircraft"').func
     for value in (0.0, 5.0):
         with pytest.raises(ValueError, match=r'^allowed above 0\.\.below 5, or "aircraft"$'):
             open_ends(value)
 
 
 def test_a_name_is_one_line() -> None:
-    assert no_line_break("Cove Creek") == "Cove Creek"
+    assert check_no_line_break("Cove Creek") == "Cove Creek"
     with pytest.raises(ValueError, match="control characters"):
-        no_line_break("two\nlines")
+        check_no_line_break("two\nlines")
 
 
 # ----------------------------------------------------------------------

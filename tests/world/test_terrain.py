@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
 from world.scenario import load_scenario
-from world.terrain import Peak, Terrain, flat_terrain, gridded, peaks_terrain
+from world.terrain import Peak, Terrain, flat_terrain, gridded_terrain, peaks_terrain
 
 EAST = np.linspace(-1000.0, 1400.0, 25)
 NORTH = np.linspace(-800.0, 700.0, 16)
@@ -18,7 +18,7 @@ BOUNDS = np.array([[-1000.0, 1400.0], [-800.0, 700.0]])
 
 
 def _rough() -> Terrain:
-    return gridded(ROUGH.astype(np.float64), EAST, NORTH, source="test", sha256="", datum="mean sea level")
+    return gridded_terrain(ROUGH.astype(np.float64), EAST, NORTH, source="test", sha256="", datum="mean sea level")
 
 
 ROUGH_TERRAIN = _rough()
@@ -87,7 +87,7 @@ def test_clearance_where_grid_and_path_line_up(a: list[float], b: list[float]) -
 def test_the_lowest_point_may_lie_inside_a_cell() -> None:
     # A saddle: along its diagonal the ground rises as u (1 - u) between two zero corners.
     heights = np.array([[0.0, 100.0], [100.0, 0.0]])
-    saddle = gridded(heights, np.array([0.0, 10.0]), np.array([0.0, 10.0]), source="", sha256="", datum="")
+    saddle = gridded_terrain(heights, np.array([0.0, 10.0]), np.array([0.0, 10.0]), source="", sha256="", datum="")
     low, at = saddle.clearance(np.array([0.0, 0.0, 60.0]), np.array([10.0, 10.0, 60.0]))
     assert (low, at) == (pytest.approx(10.0), pytest.approx(0.5))
 
@@ -98,7 +98,7 @@ def test_leaving_the_raster_or_its_data_is_nan() -> None:
     assert at == pytest.approx(0.7, abs=0.1)
     holed = ROUGH.copy()
     holed[8, 12] = np.nan
-    terrain = gridded(holed.astype(np.float64), EAST, NORTH, source="", sha256="", datum="")
+    terrain = gridded_terrain(holed.astype(np.float64), EAST, NORTH, source="", sha256="", datum="")
     assert math.isnan(terrain.clearance(np.array([-900.0, 0.0, 990.0]), np.array([900.0, 0.0, 990.0]))[0])
     assert not math.isnan(terrain.clearance(np.array([-900.0, 500.0, 990.0]), np.array([900.0, 500.0, 990.0]))[0])
 

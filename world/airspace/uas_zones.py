@@ -91,10 +91,10 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
         raise _value_error(source, "", "horizontalProjection", "expected a polygon or a circle")
     unit = volume.get("uomDimensions")
     limits = {
-        f"{side}Limit": _parse_limit(
-            volume.get(f"{side}Limit"), unit, volume.get(f"{side}VerticalReference"), side, source
+        f"{limit_name}Limit": _parse_limit(
+            volume.get(f"{limit_name}Limit"), unit, volume.get(f"{limit_name}VerticalReference"), limit_name, source
         )
-        for side in ("lower", "upper")
+        for limit_name in ("lower", "upper")
     }
     entries = published_entries(limits, source)
     shape_type = _upper_word(shape.get("type"))
@@ -151,8 +151,10 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
     layer = layer if isinstance(layer, dict) else default_layer
     unit = layer.get("uom") or layer.get("UOM") or "m"
     limits = {
-        f"{side}Limit": _parse_limit(layer.get(side), unit, layer.get(f"{side}Reference"), side, source)
-        for side in ("lower", "upper")
+        f"{limit_name}Limit": _parse_limit(
+            layer.get(limit_name), unit, layer.get(f"{limit_name}Reference"), limit_name, source
+        )
+        for limit_name in ("lower", "upper")
     }
     entries = published_entries(limits, source)
     geometry_type, coordinates = geometry.get("type"), geometry.get("coordinates")
@@ -175,7 +177,7 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
 # Parts that both formats share: limits, shapes, names and times of activity.
 
 
-def _parse_limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> dict[str, Any] | None:
+def _parse_limit(value: Any, unit: Any, datum: Any, limit_name: str, source: str) -> dict[str, Any] | None:
     """Return a limit in openAIP's form, or None if unlimited."""
     if value is None or value == "":
         return None
@@ -185,13 +187,13 @@ def _parse_limit(value: Any, unit: Any, datum: Any, side: str, source: str) -> d
         height = math.nan
     # An infinite upper limit means no limit.
     if not height > -math.inf:
-        raise _value_error(source, "", f"{side} limit", "expected a number")
-    if side == "upper" and height >= _UNLIMITED_VALUE:
+        raise _value_error(source, "", f"{limit_name} limit", "expected a number")
+    if limit_name == "upper" and height >= _UNLIMITED_VALUE:
         return None
     if _upper_word(unit) not in _UNITS:
         raise _value_error(source, "", "unit of its limits", f"allowed {', '.join(_UNITS)}")
     if _upper_word(datum) not in _DATUMS:
-        raise _value_error(source, "", f"vertical reference of its {side} limit", f"allowed {', '.join(_DATUMS)}")
+        raise _value_error(source, "", f"vertical reference of its {limit_name} limit", f"allowed {', '.join(_DATUMS)}")
     return {"value": height, "unit": _UNITS[_upper_word(unit)], "referenceDatum": _upper_word(datum)}
 
 
@@ -233,7 +235,7 @@ def _upper_word(value: Any) -> str:
 
 
 def _period_texts(applicability: Any, source: str) -> list[str]:
-    """Return the periods in which a zone applies, as in a [[zones]] table; empty for a zone that always applies."""
+    """Return the periods of activity of a zone, as in a [[zones]] table; empty for a zone that is always active."""
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):

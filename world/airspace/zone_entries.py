@@ -127,15 +127,15 @@ def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
 def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
     """Convert limits in the FAA's form to openAIP's form."""
     limits = {}
-    for side, key in _FAA_LIMIT_KEYS.items():
-        if (value := properties.get(f"{side}_VAL")) is None:
+    for limit_name, key in _FAA_LIMIT_KEYS.items():
+        if (value := properties.get(f"{limit_name}_VAL")) is None:
             continue
         try:
             height = float(value)
         except (TypeError, ValueError) as error:
-            raise ScenarioError.at(source, f"{side}_VAL", value, "expected a number", shown="") from error
+            raise ScenarioError.at(source, f"{limit_name}_VAL", value, "expected a number", shown="") from error
         if height != _FAA_NOT_APPLICABLE:
-            unit, datum = properties.get(f"{side}_UOM"), properties.get(f"{side}_CODE")
+            unit, datum = properties.get(f"{limit_name}_UOM"), properties.get(f"{limit_name}_CODE")
             limits[key] = {"value": height, "unit": unit, "referenceDatum": datum}
     return limits
 
@@ -155,9 +155,9 @@ def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, floa
     if not isinstance(datum, int | str) or datum not in _DATUMS:
         allowed = f"allowed {', '.join(map(str, _DATUMS))}"
         raise ScenarioError.at(source, f"{key}.referenceDatum", datum, allowed, shown="")
-    side, height_m, datum_name = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
+    limit_name, height_m, datum_name = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
     if datum_name == "agl" and height_m <= 0.0:
-        if side == "floor":
+        if limit_name == "floor":
             return {}
         raise ScenarioError.at(source, key, value, "expected a value above 0: nothing lies below the ground", shown="")
     if _UNITS[unit] == _UNITS["FL"]:
@@ -167,5 +167,5 @@ def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, floa
         if kind == "inclusion":
             allowed = f"{datum_text} bounds no inclusion; give a height in metres above mean sea level"
             raise ScenarioError.at(source, key, value, allowed, shown="")
-        datum_name, height_m = "amsl", height_m + (max_above if side == "ceiling" else -max_below)
-    return {f"{side}_{datum_name}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, height_m))}
+        datum_name, height_m = "amsl", height_m + (max_above if limit_name == "ceiling" else -max_below)
+    return {f"{limit_name}_{datum_name}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, height_m))}

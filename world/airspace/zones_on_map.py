@@ -180,8 +180,8 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
     for key, point in ends:
         zone = _first_violated_by_records(zones, records, point, ground)
         if zone is not None:
-            side = "inside the exclusion" if zone.kind == "exclusion" else "outside the inclusion"
-            raise ScenarioError.at(source, "zones", zone.name, f"{key} lies {side}")
+            location_text = "inside the exclusion" if zone.kind == "exclusion" else "outside the inclusion"
+            raise ScenarioError.at(source, "zones", zone.name, f"{key} lies {location_text}")
 
 
 def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:

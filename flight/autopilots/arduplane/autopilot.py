@@ -46,7 +46,7 @@ from flight.autopilots.autopilot import (
 )
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.guidance.equivalent_airspeed import true_by_equivalent
-from flight.mission.ground_ways import Approach, GroundWays, TakeOff
+from flight.mission.ground_ways import Approach, GroundPhases, TakeOff
 from flight.mission.itinerary import Loiter
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
@@ -316,12 +316,12 @@ class ArduPlane(Autopilot):
             climb_first=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
             first_bank=min(parameters.level_roll_limit, parameters.roll_limit),
             sink=parameters.tecs_sink_max or math.inf,
-            least_slope=parameters.altitude_slope_min,
+            min_slope_height=parameters.altitude_slope_min,
             rally_limit=parameters.rally_limit,
             includes_home=parameters.rally_includes_home > 0.0,
             slope_to_stated_height=True,
             lands=_LANDS.get(int(parameters.rtl_autoland), ""),
-            instead=_RETURN_PATH if int(parameters.rtl_autoland) == 4 else "",
+            deviation_note=_RETURN_PATH if int(parameters.rtl_autoland) == 4 else "",
         )
 
     @property
@@ -329,7 +329,7 @@ class ArduPlane(Autopilot):
         """Rules of loiters from WP_LOITER_RAD, the air's density, and `LOITER_ALTITUDE_TOLERANCE_M`.
 
         >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiter_rules
-        >>> rules.radius, round(rules.growth(1300.0), 3)
+        >>> rules.radius, round(rules.radius_scale(1300.0), 3)
         (-80.0, 1.135)
         """
         parameters = self.parameters
@@ -337,14 +337,14 @@ class ArduPlane(Autopilot):
             radius=parameters.loiter_radius,
             radius_name="WP_LOITER_RAD",
             radius_of=radius_read,
-            growth=_radius_growth,
-            at_middle=True,
-            lines_up=True,
+            radius_scale=_radius_growth,
+            steers_to_center=True,
+            exits_on_heading=True,
             climb=parameters.tecs_climb_max,
             sink=parameters.tecs_sink_max or math.inf,
-            short=LOITER_ALTITUDE_TOLERANCE_M,
-            unflown=_bank_limit_note(parameters.navl1_lim_bank),
-            before_return=_BEFORE_RETURN,
+            altitude_tolerance=LOITER_ALTITUDE_TOLERANCE_M,
+            unflown_note=_bank_limit_note(parameters.navl1_lim_bank),
+            rtl_exit_note=_BEFORE_RETURN,
         )
 
     @property
@@ -381,9 +381,13 @@ class ArduPlane(Autopilot):
         """Return the altitude gained in updrafts while ArduPlane holds airspeed and cannot sink fast enough, m."""
         return height_in_updrafts(sink, turbulence)
 
-    def from_ground(self, ways: GroundWays, aircraft: Aircraft, contacts: Sequence[Contact]) -> "ArduPlaneFromGround":
+    def from_ground(
+        self, ground_phases: GroundPhases, aircraft: Aircraft, contacts: Sequence[Contact]
+    ) -> "ArduPlaneFromGround":
         """Return the same controllers with take-off and landing."""
-        return ArduPlaneFromGround(self.parameters, ways=ways, aircraft=aircraft, contacts=tuple(contacts))
+        return ArduPlaneFromGround(
+            self.parameters, ground_phases=ground_phases, aircraft=aircraft, contacts=tuple(contacts)
+        )
 
     def with_parameters(self, **values: float) -> "ArduPlane":
         """Return ArduPlane's control law with the given parameters changed; it replaces a recorded program."""
@@ -394,12 +398,12 @@ class ArduPlane(Autopilot):
 class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     """ArduPlane's law with take-off, landing, or both.
 
-    ways: take-off and landing that are flown.
+    ground_phases: take-off and landing that are flown.
     contacts: points where the aircraft touches the ground.
     """
 
     own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE_GROUND
-    ways: GroundWays = field(kw_only=True)
+    ground_phases: GroundPhases = field(kw_only=True)
     aircraft: Aircraft = field(kw_only=True)
     contacts: tuple[Contact, ...] = field(kw_only=True)
 
@@ -416,7 +420,7 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     @property
     def motor_start(self) -> float:
         """Time of the motor start, s after the release; inf if it never starts."""
-        take_off = self.ways.take_off
+        take_off = self.ground_phases.take_off
         if take_off is None:
             return -math.inf
         return motor_start(take_off.acceleration, take_off.speed, take_off.launch.incline, self.parameters)
@@ -445,10 +449,10 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
             ground.is_support[index] = contact.stands
         ground.turnover_speed = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
         ground.stage = IN_AIR
-        if self.ways.take_off is not None:
-            self._begin_take_off(self.ways.take_off, ground)
-        if self.ways.approach is not None:
-            self._begin_landing(self.ways.approach, ground)
+        if self.ground_phases.take_off is not None:
+            self._begin_take_off(self.ground_phases.take_off, ground)
+        if self.ground_phases.approach is not None:
+            self._begin_landing(self.ground_phases.approach, ground)
 
     def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
         parameters, launch = self.parameters, take_off.launch
@@ -458,7 +462,11 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
             takeoff_slew(parameters),
             parameters.takeoff_throttle or parameters.throttle_max,
         )
-        ground.home_up, ground.takeoff_end_altitude, ground.launch_up = take_off.base, take_off.top, take_off.home[2]
+        ground.home_up, ground.takeoff_end_altitude, ground.launch_up = (
+            take_off.home_altitude,
+            take_off.end_altitude,
+            take_off.home[2],
+        )
         ground.takeoff_pitch, ground.leg = self._climb_pitch(take_off), take_off.waypoint
         # Start when the aircraft moved at 5 m/s, at which its course over the ground is known.
         acceleration = take_off.acceleration
@@ -480,11 +488,11 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
         landing_altitude = float(approach.point[2])
         glide = self.landing_glide(
-            approach.begin - landing_altitude, approach.run, approach.tail_wind, landing_altitude
+            approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
         )
         ground.has_landing, ground.landing_leg = True, approach.leg
         ground.east, ground.north, ground.up = approach.point
-        ground.glide_start_altitude, ground.slope = approach.begin, glide.slope
+        ground.glide_start_altitude, ground.slope = approach.start_altitude, glide.slope
         # `AP_TECS::_update_height_demand`.
         ground.flares_by_demand = self.parameters.version != "4.6"
         ground.flare_height, ground.flare_distance = glide.flare_height, glide.flare_distance

@@ -30,7 +30,7 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     truncate_at_first_loiter,
 )
 from flight.guidance.lateral_reference_laws import WAYPOINT
-from flight.mission.return_path import LandingStart, nearest_landing
+from flight.mission.return_path import LandingStart, nearest_landing_sequence
 from world.arrays import Floats
 from world.kernels import Record, Records
 from world.wind import mean_wind_speed
@@ -121,7 +121,7 @@ def fly_go_arounds(
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
 
     def fly(k: int, landing: LandingStart) -> Floats:
-        stages = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.onward), parameters)])
+        stages = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.next_stops), parameters)])
         stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
         timeout = rtl_timeout(starts[k], stages[1:], aircraft) + max(0.0, end_altitude - float(starts[k]["up"]))
         track = np.zeros((int(timeout) + 2, 3))
@@ -153,7 +153,9 @@ def fly_go_arounds(
         track, landing = fly(k, landings[0]), landings[0]
         # The climb does not depend on the sequence.
         climb_end = track[min(climb_rows(track, end_altitude), len(track) - 1)]
-        nearest_sequence = nearest_landing((float(climb_end[0]), float(climb_end[1]), float(climb_end[2])), landings)
+        nearest_sequence = nearest_landing_sequence(
+            (float(climb_end[0]), float(climb_end[1]), float(climb_end[2])), landings
+        )
         if nearest_sequence is not None and nearest_sequence != landing:
             track, landing = fly(k, nearest_sequence), nearest_sequence
         flights.append((track, landing))

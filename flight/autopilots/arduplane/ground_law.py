@@ -278,7 +278,7 @@ def end_status(work: Record, ground: Record) -> int:
         ground.rest_time += work.timing.dt
         return COMPLETED if ground.rest_time >= _STOPPED_TIME_S else 0
     ground.rest_time = 0.0
-    if not ground.touches_ground and ground.stage < FLARING and state.airspeed < work.settings.slowest:
+    if not ground.touches_ground and ground.stage < FLARING and state.airspeed < work.settings.min_airspeed:
         return STALLED
     return END_BATTERY_EMPTY if is_battery_empty and not ground.touches_ground else 0
 
@@ -442,7 +442,7 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
     eas2tas = true_by_equivalent(estimated.up)
-    work.memory.done = False
+    work.memory.is_finished = False
     memory.time_to_update -= dt
     if memory.time_to_update < 0.5 * dt:
         memory.time_to_update += NAVIGATION_TICK

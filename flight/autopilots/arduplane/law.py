@@ -402,15 +402,15 @@ def control_as_ardupilot(
         # ArduPlane's own logic ends a loiter; an aircraft that loiters at the mission's end has not missed the route.
         is_last = target.stop == waypoints[-1].stop
         # An altitude that ArduPlane gave up to reach is a missed altitude.
-        guidance.returning = is_last and (
+        guidance.is_in_rtl = is_last and (
             not target.loiters_to_altitude or abs(estimated.up - target.up) <= MISSED_ROUTE_DISTANCE_M
         )
         loiters_forever = target.loiter_time == math.inf and memory.loiter_time > UNLIMITED
-        guidance.done = is_last and (memory.loiter_complete or loiters_forever)
+        guidance.is_finished = is_last and (memory.loiter_complete or loiters_forever)
     if memory.is_in_rtl and waypoints[waypoints.shape[0] - 1].is_rtl:
         end_return(estimated, waypoints[memory.leg + 1], guidance, dt)
     guidance.height_error = estimated.up - profile(nodes, guidance.distance)[0]
-    if guidance.done and target.loiters_to_altitude:
+    if guidance.is_finished and target.loiters_to_altitude:
         guidance.height_error = estimated.up - target.up
     eas2tas = true_by_equivalent(estimated.up)
     if not memory.is_initialised:

@@ -245,7 +245,7 @@ def _make_stages(
 
     A place of a landing sequence is a waypoint, or the center of a loiter of the mission, which is the last target.
     """
-    places = truncate_at_first_loiter(() if landing is None else (landing, *landing.onward))
+    places = truncate_at_first_loiter(() if landing is None else (landing, *landing.next_stops))
     stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
     stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
     if target is not None:

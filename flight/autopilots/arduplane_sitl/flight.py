@@ -91,7 +91,7 @@ class AutopilotFlight(SitlFlight):
 
     def _wait_for_thrust(self) -> Talk:
         """Wait for full thrust before the launch, if the motor runs before it."""
-        take_off = self._ways.take_off
+        take_off = self._ground_phases.take_off
         law = None if take_off is None else self._from_ground
         if take_off is None or take_off.launch.method == "runway" or not isinstance(law, ArduPlaneFromGround):
             return

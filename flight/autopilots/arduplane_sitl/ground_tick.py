@@ -54,7 +54,7 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
     update_ground_contact(work.state, work.place.clearance, ground)
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
-    memory.done = False
+    memory.is_finished = False
     find_phase(work.true, ground, settings.on_last_leg)
     fill_tick(work)
     return end_status(work, ground)

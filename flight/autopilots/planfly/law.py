@@ -187,7 +187,7 @@ def _cross_track_bank_command(
     sideslip = missing_acceleration / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
     memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, sideslip))
     if bank == bank_demand and abs(memory.cross_track) < 20.0:
-        memory.cross_track_sum = min(40.0, max(-40.0, memory.cross_track_sum + memory.cross_track * dt))
+        memory.cross_track_integrator = min(40.0, max(-40.0, memory.cross_track_integrator + memory.cross_track * dt))
     return bank
 
 
@@ -254,7 +254,7 @@ def _lateral_correction(
     is_flying_away = abs(course_error) > 0.5 * math.pi
     cross_track_rate = math.copysign(speed, course_error) if is_flying_away else speed * math.sin(course_error)
     correction: float = rate_gain * (cross_track_rate_demand - (cross_track_rate - memory.roll_offset_rate))
-    correction -= gains.cross_track_integral * memory.cross_track_sum
+    correction -= gains.cross_track_integral * memory.cross_track_integrator
     correction -= gains.side_gain * _unexplained_acceleration(state, estimated, gains, memory, speed, crab, dt)
     return correction
 

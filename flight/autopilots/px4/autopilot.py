@@ -258,7 +258,7 @@ class Px4(Autopilot):
         1, also use a mission's landing, which is not simulated.
 
         >>> rules = Px4(Px4Parameters.defaults()).return_rules
-        >>> rules.includes_home, rules.rally_height, rules.instead
+        >>> rules.includes_home, rules.rally_height, rules.deviation_note
         (False, 100.0, '')
         """
         parameters = self.parameters
@@ -271,8 +271,8 @@ class Px4(Autopilot):
             includes_home=return_type in (0, 3),
             holds_height=True,
             rally_height=parameters["RTL_RETURN_ALT"],
-            landing_counts=return_type == 1,
-            instead=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
+            may_use_landing=return_type == 1,
+            deviation_note=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
         )
 
     @property
@@ -286,11 +286,11 @@ class Px4(Autopilot):
         return LoiterRules(
             radius=parameters["NAV_LOITER_RAD"],
             radius_name="NAV_LOITER_RAD",
-            at_middle=True,
+            steers_to_center=True,
             holds_height=True,
             climb=min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"]),
             sink=min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"]),
-            short=parameters["NAV_FW_ALT_RAD"],
+            altitude_tolerance=parameters["NAV_FW_ALT_RAD"],
             ends_in_circle=True,
         )
 

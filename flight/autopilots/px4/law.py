@@ -173,7 +173,7 @@ def control_as_px4(
     while pieces[guidance.piece].leg < memory.leg - 1 and guidance.piece + 1 < pieces.shape[0]:
         guidance.piece += 1
     leave_sharp_corners(pieces, guidance, memory.leg)
-    guidance.done = guidance.done and is_last_target(waypoints, memory)
+    guidance.is_finished = guidance.is_finished and is_last_target(waypoints, memory)
     airspeed_setpoint = max(commanded_airspeed, memory.min_airspeed / airspeed_scale)
     guidance.speed_command = min(parameters.airspeed_max, airspeed_setpoint) * eas_to_tas
     if memory.is_in_rtl:
@@ -201,22 +201,24 @@ def _end_mission(
     once around.  A circle that begins before the waypoint, and that the aircraft leaves at once because its altitude is
     right, does not end the flight.
     """
-    has_arrived = memory.time_at_mission_end > 0.0 or guidance.done or memory.is_loitering or memory.mission_finished
+    has_arrived = (
+        memory.time_at_mission_end > 0.0 or guidance.is_finished or memory.is_loitering or memory.mission_finished
+    )
     if not has_arrived or last_waypoint.loiter_radius != 0.0:
         return
     memory.time_at_mission_end += dt
     if memory.mission_finished:
         end_around(estimated, guidance, dt)
-        is_over = guidance.done
+        is_over = guidance.is_finished
     else:
         # An aircraft that loiters at the mission's end has not missed the route.
-        guidance.returning = True
+        guidance.is_in_rtl = True
         is_over = (
             not last_waypoint.is_mission_end
-            and guidance.done
+            and guidance.is_finished
             and abs(estimated.up - last_waypoint.up) <= parameters.altitude_acceptance_radius
         )
-    guidance.done = is_over or memory.time_at_mission_end > MISSION_END_TIMEOUT_S
+    guidance.is_finished = is_over or memory.time_at_mission_end > MISSION_END_TIMEOUT_S
 
 
 @inner

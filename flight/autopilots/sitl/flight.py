@@ -27,7 +27,7 @@ from flight.mission.itinerary import UNLIMITED
 from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import GROUND_PATIENCE
-from flight.simulation.start import Release, find_release, gear_of, release
+from flight.simulation.start import Release, default_gear, find_release, release
 from flight.simulation.tick import (
     NOT_A_NUMBER,
     PATH_ROW,
@@ -78,10 +78,10 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
         end_around(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
         cross_track, distance_past = beyond_end(work.true, path.waypoint[: settings.waypoints])
-        memory.done = distance_past >= 0.0
+        memory.is_finished = distance_past >= 0.0
         # An aircraft that loiters at the mission's end, however wide, has not missed the route.
-        memory.returning = previous.loiter_radius != 0.0 and previous.stop == last.stop
-        if memory.done:
+        memory.is_in_rtl = previous.loiter_radius != 0.0 and previous.stop == last.stop
+        if memory.is_finished:
             memory.cross_track = cross_track
     return end_tick(work)
 
@@ -124,21 +124,21 @@ def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> Non
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `circled` is the time in s.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `loiter_time` is the time, s.
     """
     offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
     distance = max(0.1, math.hypot(offset_east, offset_north))
     radial_speed = (true.velocity_east * offset_east + true.velocity_north * offset_north) / distance
     clockwise_speed = (true.velocity_east * offset_north - true.velocity_north * offset_east) / distance
     tangential_speed = math.copysign(1.0, corner.loiter_radius) * clockwise_speed
-    if memory.circled > 0.0 or (
+    if memory.loiter_time > 0.0 or (
         distance < max(RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * abs(corner.loiter_radius))
         and tangential_speed > abs(radial_speed)
     ):
-        memory.circled += dt
+        memory.loiter_time += dt
     # An aircraft that loiters at the mission's end, however wide, has not missed it.
-    memory.returning = True
-    memory.done = memory.circled > UNLIMITED
+    memory.is_in_rtl = True
+    memory.is_finished = memory.loiter_time > UNLIMITED
 
 
 @inner
@@ -204,24 +204,24 @@ class SitlFlight(ProgramFlight):
     _stack: contextlib.ExitStack
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, binary: Path) -> None:
-        self._binary, self._ways, gear = binary, setup.ground_ways, None
-        if self._ways:
-            gear = gear_of(self._ways)
-            self._from_ground = setup.autopilot.from_ground(self._ways, aircraft, contacts_of(aircraft, gear))
+        self._binary, self._ground_phases, gear = binary, setup.ground_phases, None
+        if self._ground_phases:
+            gear = default_gear(self._ground_phases)
+            self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts_of(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
         self._rail = self._trim_on_rail(setup)
         self._start_disturbances(setup)
         self._mission = uploaded_mission(setup)
-        if self._ways:
+        if self._ground_phases:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
             self._from_ground.initialise_records(self.memory, self._workspace.own)
         # Compiled here, while no autopilot waits for it.
-        tick = self._ground_tick if self._ways else autopilot_tick
+        tick = self._ground_tick if self._ground_phases else autopilot_tick
         tick(self._workspace.block.copy(), self._ground.heights)
 
-    def _law(self, setup: FlightSetup) -> Autopilot:
-        return self._from_ground if self._ways else setup.autopilot
+    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
+        return self._from_ground if self._ground_phases else setup.autopilot
 
     @property
     def _ground_tick(self) -> Tick:
@@ -294,11 +294,11 @@ class SitlFlight(ProgramFlight):
         For a take-off, return the rail of the launch.
         """
         start, points = self._find_start(setup), setup.route.waypoints
-        if self._ways.take_off is not None:
+        if self._ground_phases.take_off is not None:
             self._start_trimmed(setup.mission.source, start)
             aircraft = self.fdm.aircraft
-            self._release = find_release(setup, self.map, self._ground, aircraft, self._ways.take_off)
-            return launch_rail(self._release, self._ways.take_off)
+            self._release = find_release(setup, self.map, self._ground, aircraft, self._ground_phases.take_off)
+            return launch_rail(self._release, self._ground_phases.take_off)
         first_leg = points[1, :2] - points[0, :2]
         release_position = points[0, :2] - first_leg / np.hypot(*first_leg) * max(
             RUN_IN, RUN_IN_SECONDS * start.airspeed
@@ -377,7 +377,7 @@ class SitlFlight(ProgramFlight):
             self._lockstep.error = (north, east, up, velocity_north, velocity_east, velocity_up)
         return status
 
-    def _fly(self, count: int) -> int:
+    def _fly_ticks(self, count: int) -> int:
         with self._errors_name_program(CrashError):
             return self._loop(count)
 

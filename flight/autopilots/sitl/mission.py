@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.ground_ways import GroundWays
+from flight.mission.ground_ways import GroundPhases
 from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, on_grid
 from flight.mission.itinerary import loiter_of
 from flight.mission.route import Route, ends_at_plain_waypoint
@@ -53,8 +53,8 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
 
     A flight from the ground to the ground uses the mission itself.
     """
-    if setup.ground_ways:
-        return _unchanged_mission(setup, setup.ground_ways)
+    if setup.ground_phases:
+        return _unchanged_mission(setup, setup.ground_phases)
     route, origin = setup.route, setup.scenario.origin
     items: list[MissionItem] = []
     has_landing = route.return_from >= 0 and route.return_until <= route.legs
@@ -78,18 +78,18 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
     return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally if has_landing else ())
 
 
-def _unchanged_mission(setup: FlightSetup, ways: GroundWays) -> UploadedMission:
+def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> UploadedMission:
     """Return the mission as in its file, with its home; a home without an altitude is put on the ground."""
     home, mission = setup.mission.home, setup.mission
-    if home is None or ways.take_off is None or ways.approach is None:
+    if home is None or ground_phases.take_off is None or ground_phases.approach is None:
         raise ValueError("a mission from the ground to the ground needs a home, a take-off and a landing")
     if math.isnan(home.alt):
-        home = replace(home, alt=ways.take_off.base)
+        home = replace(home, alt=ground_phases.take_off.home_altitude)
     items = []
     for item in mission.items:
         p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
         items.append(replace(item, params=(p1, p2, p3, p4)))
-    last = next(number for number, item in enumerate(items, 1) if item.seq == ways.approach.item)
+    last = next(number for number, item in enumerate(items, 1) if item.seq == ground_phases.approach.item)
     return UploadedMission(home, _renumber(items), mission.rally, last)
 
 

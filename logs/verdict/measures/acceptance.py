@@ -102,7 +102,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
         swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
     turn_width = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
-    if requirements.setup.autopilot.loiter_rules.at_middle:
+    if requirements.setup.autopilot.loiter_rules.steers_to_center:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.min_radius[ends]
         turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.

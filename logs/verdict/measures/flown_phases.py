@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flight.mission.ground_ways import GroundWays, airborne_route
+from flight.mission.ground_ways import GroundPhases, airborne_route
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack, align_track
@@ -23,7 +23,7 @@ def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[R
 
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
     """
-    procedures = whole_requirements.setup.ground_ways
+    procedures = whole_requirements.setup.ground_phases
     if not procedures:
         return whole_requirements, align_track(whole_requirements, track)
     start = _takeoff_end_row(track, procedures)
@@ -42,19 +42,19 @@ def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[R
     return replace(requirements, ground_phases=ground_phases), aligned
 
 
-def _takeoff_end_row(track: Track, procedures: GroundWays) -> int:
+def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
     """Return the row where the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
     if procedures.take_off is None:
         return 0
-    is_above = track.position[:, 2] > procedures.take_off.top
+    is_above = track.position[:, 2] > procedures.take_off.end_altitude
     return int(np.argmax(is_above)) if is_above.any() else len(track) - 1
 
 
-def ground_phase_rows(track: Track, procedures: GroundWays) -> Flags:
+def ground_phase_rows(track: Track, procedures: GroundPhases) -> Flags:
     """Return a mask of the rows of a flown take-off or landing leg, (t,).
 
     >>> from logs.recording.example_log import example_log
-    >>> bool(ground_phase_rows(example_log().track, GroundWays()).any())
+    >>> bool(ground_phase_rows(example_log().track, GroundPhases()).any())
     False
     """
     is_ground_phase = np.arange(len(track)) < _takeoff_end_row(track, procedures)

@@ -22,7 +22,7 @@ from aircraft.path_limits import (
 )
 from flight.guidance.path import FlyByPath, path_polyline
 from flight.mission.fences import fence_zones
-from flight.mission.ground_ways import GroundWays
+from flight.mission.ground_ways import GroundPhases
 from flight.mission.route import Route
 from flight.mission.surveys import Survey, camera_spacing, find_surveys
 from flight.simulation.setup import FlightSetup
@@ -283,7 +283,7 @@ class FlownGround:
     landing_start_row: row of the track at which the landing began; the last row without a landing.
     """
 
-    procedures: GroundWays
+    procedures: GroundPhases
     whole_route: "RouteRequirements"
     track: Track
     takeoff_end_row: int
@@ -477,7 +477,7 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 @functools.lru_cache(maxsize=8)
 def _turnaround_parts(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
     """Return the waypoints and legs of all turnarounds, including the paths onto the first line and off the last."""
-    ends = [pair for survey in surveys for pair in survey.ways_onto_lines()]
+    ends = [pair for survey in surveys for pair in survey.transitions()]
     return (
         frozenset(i for first, last in ends for i in range(first, last + 1)),
         frozenset(i for first, last in ends for i in range(first, last)),

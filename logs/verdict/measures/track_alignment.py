@@ -164,7 +164,7 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
         radii[first_return + 1 : end_return] = [
             max(anywhere, radius) for radius in radii[first_return + 1 : end_return]
         ]
-    if requirements.setup.autopilot.loiter_rules.at_middle:
+    if requirements.setup.autopilot.loiter_rules.steers_to_center:
         # A mission that ends on a loiter about a center ends anywhere on it, as wide as it is flown.
         k, item = route.arcs.size - 1, route.items[-1]
         while k > 0 and route.items[k] == item and route.arcs[k - 1]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED, RETURN_GROUND_IMPACT, fly_returns
-from flight.mission.placing import landing_places
+from flight.mission.placing import landing_positions
 from flight.mission.return_path import ReturnCircle, ReturnTarget
 from logs.verdict.returns.glide_footprint import GlideFootprint
 from logs.verdict.returns.glide_map import (
@@ -275,7 +275,7 @@ def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
     return (
         GlideSite("home", 0, world.home.east, world.home.north),
         *(GlideSite("rally", point.number or k, point.east, point.north) for k, point in enumerate(world.rally, 1)),
-        *(GlideSite("landing", item, east, north) for item, east, north in landing_places(mission, origin)),
+        *(GlideSite("landing", item, east, north) for item, east, north in landing_positions(mission, origin)),
     )
 
 
@@ -303,7 +303,7 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
         None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
     ]
     landing_sequences = [
-        target.landing._replace(onward=()) if target.landing and target.straight else None for target in targets
+        target.landing._replace(next_stops=()) if target.landing and target.straight else None for target in targets
     ]
     outcomes = fly_returns(
         starts.rows,

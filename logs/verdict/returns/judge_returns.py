@@ -30,14 +30,14 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     surroundings,
 )
 from flight.mission.items import LANDINGS, Command
-from flight.mission.placing import landing_starts, return_places
+from flight.mission.placing import landing_starts, return_points
 from flight.mission.return_path import (
     LandingStart,
     ReturnCircle,
-    ReturnPlace,
+    ReturnPoint,
     ReturnTarget,
     choose_target,
-    nearest_landing,
+    nearest_landing_sequence,
 )
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.path_moves import MOVE
@@ -282,8 +282,8 @@ class ReturnWorld:
 
     setup: FlightSetup
     parameters: ArduPilotParameters
-    home: ReturnPlace
-    rally: tuple[ReturnPlace, ...]
+    home: ReturnPoint
+    rally: tuple[ReturnPoint, ...]
     aircraft: PointMass
     environment: ReturnEnvironment
     airspace: Airspace
@@ -349,7 +349,7 @@ class ReturnWorld:
         rules = ArduPlane(self.parameters).return_rules
         position = (float(row["east"]), float(row["north"]), float(row["up"]))
         ending = ending or self.ending
-        if ending == "straight to land" and (landing := nearest_landing(position, self.landings)) is not None:
+        if ending == "straight to land" and (landing := nearest_landing_sequence(position, self.landings)) is not None:
             distance = math.dist(position[:2], landing.place[:2])
             name, reason = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
             return ReturnTarget(landing.place, name, reason, distance, landing=landing, straight=True)
@@ -358,7 +358,7 @@ class ReturnWorld:
 
     def with_landing(self, target: ReturnTarget) -> ReturnTarget:
         """Add the landing sequence that follows the loiter of an RTL to its target, if there is one."""
-        landing = nearest_landing(target.position, self.landings) if self.ending == "on to land" else None
+        landing = nearest_landing_sequence(target.position, self.landings) if self.ending == "on to land" else None
         if landing is None:
             return target
         reasons = [reason for reason in (target.reason, self._choice_reason(landing)) if reason]
@@ -373,7 +373,7 @@ class ReturnWorld:
         """Return a copy with other parameters, by ArduPlane's names and in its units."""
         return replace(self, parameters=self.parameters.changed(**values))
 
-    def with_rally(self, rally: Sequence[ReturnPlace]) -> "ReturnWorld":
+    def with_rally(self, rally: Sequence[ReturnPoint]) -> "ReturnWorld":
         """Return a copy with other rally points."""
         return replace(self, rally=tuple(rally))
 
@@ -389,7 +389,7 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
     The control law is ArduPlane's, with the setup's parameters if it has any, otherwise with the aircraft's parameters.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
     """
-    return_positions = return_places(setup.mission, setup.scenario.origin, setup.scenario.terrain)
+    return_positions = return_points(setup.mission, setup.scenario.origin, setup.scenario.terrain)
     if not return_positions:
         source = setup.mission.source
         message = f"{source}: home: not stated, so there is nowhere to return to"

@@ -86,7 +86,7 @@ def _empty_starts(*, is_flown: bool) -> ReturnStarts:
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
     """Flag the rows that are low in a flown take-off or landing, and those also too slow to fly, (n,) each."""
-    procedures, terrain = setup.ground_ways, setup.scenario.terrain
+    procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
     if terrain is None or not procedures:

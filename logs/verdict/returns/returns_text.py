@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from flight.autopilots.arduplane.failsafes import Cause
-from flight.mission.return_path import ReturnPlace
+from flight.mission.return_path import ReturnPoint
 from logs.verdict.returns.judge_returns import KINDS, Kind, ReturnRange, Returns, SimulatedReturn, UnjudgedPart
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
@@ -308,7 +308,7 @@ def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
     return f"{' and '.join(changes)}: {headline(returns)}"
 
 
-def rally_texts(rally: Sequence[ReturnPlace], scenario: Scenario) -> list[str]:
+def rally_texts(rally: Sequence[ReturnPoint], scenario: Scenario) -> list[str]:
     """Return latitude, longitude and height above home of rally points, for entry in a ground station."""
     texts = []
     for point in rally:

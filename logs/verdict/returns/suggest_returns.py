@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.parameters import CLIMB_BEFORE_TURN
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED
-from flight.mission.return_path import ReturnPlace, ReturnTarget
+from flight.mission.return_path import ReturnPoint, ReturnTarget
 from logs.verdict.returns.judge_returns import (
     KINDS,
     TURN_HEIGHT_LOSS_M,
@@ -48,7 +48,7 @@ class Remedy:
     """
 
     parameters: dict[str, float] = field(default_factory=dict)
-    rally: tuple[ReturnPlace, ...] | None = None
+    rally: tuple[ReturnPoint, ...] | None = None
 
     def apply_to(self, world: ReturnWorld) -> ReturnWorld:
         """Return the world with the change applied."""
@@ -258,7 +258,7 @@ def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | N
     if home_is_good.all() or not start_count or world.ending == "straight to land":
         return None
     searched_starts = np.unique(np.linspace(0, start_count - 1, min(start_count, _MAX_STARTS)).round().astype(int))
-    best_set: tuple[int, tuple[ReturnPlace, ...]] = (int(home_is_good.sum()), ())
+    best_set: tuple[int, tuple[ReturnPoint, ...]] = (int(home_is_good.sum()), ())
     candidates = _rally_candidates(world, starts, _GRID_SPACING_M, _MAX_PATH_DISTANCE_M)
     for _ in range(_GRIDS):
         if not candidates:
@@ -287,13 +287,13 @@ def _search_in_rounds(
     limits: _ReturnLimits,
     searched_starts: NDArray[np.intp],
     initial_count: int,
-) -> tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]]:
+) -> tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]]:
     """Search, simulate all starts, and search again with the starts that remain unsafe.
 
     initial_count: number of first candidates that form the initial set.
     Returns the number of good returns, the points, and the starts that remain unsafe.
     """
-    best_result: tuple[int, tuple[ReturnPlace, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
+    best_result: tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
     for _ in range(_ROUNDS):
         points = tuple(
             search.places[candidate] for candidate in search.find(searched_starts, list(range(initial_count)))
@@ -312,7 +312,7 @@ def _search_in_rounds(
 
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
-) -> list[ReturnPlace]:
+) -> list[ReturnPoint]:
     """Return candidate rally points near the path, at two altitudes, with loiters clear of ground and spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
@@ -341,7 +341,7 @@ def _rally_candidates(
                 and _sphere_clearance(world, (grid_east, grid_north, altitude)) > _LOITER_RADIUS_M + MARGIN
             ):
                 height = math.ceil(altitude - world.home.up)
-                candidates.append(ReturnPlace(grid_east, grid_north, world.home.up + height, world.home.up))
+                candidates.append(ReturnPoint(grid_east, grid_north, world.home.up + height, world.home.up))
     return [place._replace(number=k) for k, place in enumerate(candidates, 1)]
 
 
@@ -369,7 +369,7 @@ class _RallySearch:
     """
 
     def __init__(
-        self, world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, places: list[ReturnPlace], home: Flags
+        self, world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, places: list[ReturnPoint], home: Flags
     ) -> None:
         self._world, self._starts, self._limits, self.places, self._home = world, starts, limits, places, home
         positions = np.array([(place.east, place.north) for place in places])

@@ -162,7 +162,7 @@ def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[flo
     Of these, only the final and the legs after the last waypoint that meets the limit on height above ground count.
     """
     setup, ground = requirements.setup, requirements.ground_phases
-    procedures = setup.ground_ways if ground is None else ground.procedures
+    procedures = setup.ground_phases if ground is None else ground.procedures
     fields_of_leg: dict[int, tuple[tuple[float, float], ...]] = {}
     if procedures.take_off is not None:
         fields_of_leg[procedures.take_off.waypoint] = (

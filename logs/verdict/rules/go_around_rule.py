@@ -20,7 +20,7 @@ from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RET
 from flight.autopilots.autopilot import LandingGlide
 from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
-from flight.mission.placing import home_place, landing_sequence, landing_starts
+from flight.mission.placing import home_point, landing_sequence, landing_starts
 from flight.mission.return_path import LandingStart
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, make_finding, message
 from logs.verdict.measures.path_sweeps import path_clearance
@@ -182,7 +182,7 @@ def _find_landing(
     setup, leg = requirements.setup, waypoint - 1
     glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
     leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
-    home_position = home_place(setup.mission, setup.scenario.origin, terrain)
+    home_position = home_point(setup.mission, setup.scenario.origin, terrain)
     home_altitude = math.nan if home_position is None else home_position.up
     first, takeoff = first_item(requirements)
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
@@ -444,7 +444,7 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
     Near a destination that is lower than `GO_AROUND_CLEARANCE_M`, the destination's own height is required.
     """
     required = np.full(len(points), GO_AROUND_CLEARANCE_M)
-    for east, north, up in (start.place for start in (destination, *destination.onward)):
+    for east, north, up in (start.place for start in (destination, *destination.next_stops)):
         height = up - float(terrain.height(east, north))
         is_near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= LINE_UP_DISTANCE_M
         if height < GO_AROUND_CLEARANCE_M:

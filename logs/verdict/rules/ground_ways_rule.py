@@ -427,7 +427,7 @@ def approach_findings(
             f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
         )
     reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
-    reason += "" if setup.ground_ways.approach is not None else "; not flown, because the flight ends in the air"
+    reason += "" if setup.ground_phases.approach is not None else "; not flown, because the flight ends in the air"
     return [_path_finding("approach", place, obstacles, True, message(reason))]
 
 

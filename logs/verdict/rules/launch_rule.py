@@ -50,17 +50,20 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     if trigger is not None and take_off.acceleration < trigger[0]:
         faults.append(message(gentle_launch_text(take_off.acceleration, trigger), ": the motor never starts"))
     top_altitude = float(position[:, 2].max())
-    if top_altitude <= take_off.top:
-        brief = f"the take-off ended {top_altitude - take_off.base:.0f} m above home"
-        faults.append(message(brief, f", short of {take_off.top - take_off.base:.0f} m"))
+    if top_altitude <= take_off.end_altitude:
+        brief = f"the take-off ended {top_altitude - take_off.home_altitude:.0f} m above home"
+        faults.append(message(brief, f", short of {take_off.end_altitude - take_off.home_altitude:.0f} m"))
     if height_lost > MAX_LAUNCH_HEIGHT_LOSS_M:
         faults.append(
             message(f"sinks {height_lost:.1f} m after the launch", f"; {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed")
         )
     runway_left = _remaining_runway(requirements, take_off, position)
     if runway_left < RUNWAY_MARGIN_M:
-        brief = f"leaves the ground {take_off.launch.run - runway_left:.0f} m from home"
-        runway_text = f"; the runway is {take_off.launch.run:.0f} m long, of which {RUNWAY_MARGIN_M:.0f} m must be left"
+        brief = f"leaves the ground {take_off.launch.effective_length - runway_left:.0f} m from home"
+        runway_text = (
+            f"; the runway is {take_off.launch.effective_length:.0f} m long,"
+            f" of which {RUNWAY_MARGIN_M:.0f} m must be left"
+        )
         faults.append(message(brief, runway_text))
     if clearance < LAUNCH_CLEARANCE_M:
         faults.append(message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course flown"))
@@ -126,7 +129,7 @@ def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, positi
         position[:, 2] - terrain.height(position[:, 0], position[:, 1]) <= standing_height + CONTACT_HEIGHT_M
     )
     last = position[contact_rows[-1] if contact_rows.size else 0]
-    return take_off.launch.run - math.dist(last[:2], take_off.home[:2])
+    return take_off.launch.effective_length - math.dist(last[:2], take_off.home[:2])
 
 
 def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clearance: float) -> list[str]:

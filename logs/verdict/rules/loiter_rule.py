@@ -81,7 +81,7 @@ def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Merge the findings at each loiter's corners into one, and keep only each rule's worst finding on its legs."""
-    joins_at_center = requirements.setup.autopilot.loiter_rules.at_middle
+    joins_at_center = requirements.setup.autopilot.loiter_rules.steers_to_center
     merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
     positions: dict[tuple[str, Place], list[int]] = {}
@@ -160,7 +160,7 @@ def _loiter_finding(
     is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
     min_radius = float(requirements.min_radius[corners].max()) if is_known else math.nan
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
-    joins_at_center = requirements.setup.autopilot.loiter_rules.at_middle
+    joins_at_center = requirements.setup.autopilot.loiter_rules.steers_to_center
     uses_parameter = _uses_parameter_radius(requirements, circle)
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
         failed_corners = []
@@ -237,7 +237,7 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle
     """
     rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
     loiter = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
-    return rules.lines_up and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
+    return rules.exits_on_heading and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
 
 
 def _held_bank(

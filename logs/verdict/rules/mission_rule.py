@@ -185,7 +185,7 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     # An imported flight was flown with its settings.
     texts = setup.autopilot.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
     # The route notes a loiter that is flown with another radius.
-    unflown_radius = setup.autopilot.loiter_rules.unflown
+    unflown_radius = setup.autopilot.loiter_rules.unflown_note
     if unflown_radius and unflown_radius in setup.route.notes and setup.source is None:
         texts = [*texts, unflown_radius]
     settings = [(None, text) for text in texts]
@@ -204,7 +204,7 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
 
 def _mission_parts(setup: FlightSetup) -> MissionParts:
     """Collect the properties of a mission on which the effect of settings depends."""
-    items, procedures = setup.mission.items, setup.ground_ways
+    items, procedures = setup.mission.items, setup.ground_phases
     commands = {item.command for item in items}
     pairs = itertools.pairwise(_flown_items(setup.mission))
     return MissionParts(

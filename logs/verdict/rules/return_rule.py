@@ -216,14 +216,14 @@ def without_path_following_findings(
     # The corner where the return begins belongs to the return; the waypoint there belongs to the mission.
     end_waypoint = requirements.setup.route.return_until
     legs = range(first_leg, min(end_waypoint, requirements.legs))
-    return_places = {requirements.waypoint(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))}
-    return_places |= {requirements.leg(i) for i in legs}
+    return_points = {requirements.waypoint(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))}
+    return_points |= {requirements.leg(i) for i in legs}
     first_corner = requirements.waypoint(first_leg)
     kept_findings = [
         finding
         for finding in findings
         if not (
-            (finding.rule in _LEG_RULES and finding.place in return_places)
+            (finding.rule in _LEG_RULES and finding.place in return_points)
             or (finding.rule == "turn" and finding.place == first_corner)
         )
     ]

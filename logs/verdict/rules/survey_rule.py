@@ -118,7 +118,7 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
     as turnarounds.
     """
     findings = []
-    turnarounds = survey.ways_onto_lines()
+    turnarounds = survey.transitions()
     for number, (first, last) in enumerate(turnarounds):
         if not any(_is_too_tight(requirements, i) for i in range(first, last + 1)):
             continue

@@ -64,7 +64,7 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
     Return [] if the autopilot needs no acceleration.
     """
     setup = requirements.setup
-    trigger, acceleration = setup.autopilot.launch_trigger, launch.acceleration(setup.slowest_launched)
+    trigger, acceleration = setup.autopilot.launch_trigger, launch.acceleration(setup.default_launch_speed)
     if trigger is None or acceleration >= trigger[0]:
         return []
     fault = message(gentle_launch_text(acceleration, trigger), ": the motor never starts")
@@ -144,7 +144,7 @@ def _slope_finding(
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(last_altitude - first_altitude):.0f} m in {distance:.0f} m, {math.degrees(abs(slope)):.1f}°"
     is_within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
-    ground_phases = requirements.setup.ground_ways
+    ground_phases = requirements.setup.ground_phases
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
     reason = f"{text} of {math.degrees(limit):.1f}°"
     reason += "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"

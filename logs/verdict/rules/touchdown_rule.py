@@ -67,7 +67,7 @@ def touchdown_findings(
     """Judge a flown landing; before a flight, only report a strip that is too short."""
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
-        planned_approach = requirements.setup.ground_ways.approach if geometric else None
+        planned_approach = requirements.setup.ground_phases.approach if geometric else None
         return (
             []
             if planned_approach is None
@@ -208,7 +208,7 @@ def _final_clearance(requirements: RouteRequirements, position: Floats, terrain:
     """Return the minimum height above ground before flare or touch-down, m, as in `_Landing.room`."""
     point_altitude = float(approach.point[2])
     glide = requirements.setup.autopilot.landing_glide(
-        approach.begin - point_altitude, approach.run, approach.tail_wind, point_altitude
+        approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
     )
     flare_distance = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
     is_near = approach.place(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flare_distance)

@@ -111,7 +111,7 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
         return ""
     seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
     heights_above_ground = ground_clearance(setup, track)
-    is_ground_phase = ground_phase_rows(track, setup.ground_ways)
+    is_ground_phase = ground_phase_rows(track, setup.ground_phases)
     lowest_text = (
         NOTHING
         if heights_above_ground is None

@@ -71,7 +71,7 @@ class BinaryLink(Protocol):
         only pass or fail.
         """
 
-    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+    def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
         """Return first and second derivative of the log-probability of the outcome."""
 
     def log_density(self, x: Floats) -> Floats:
@@ -112,10 +112,10 @@ class _Probit:
         )
         return end_information + np.maximum(pass_information, 0.0)
 
-    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+    def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
         from scipy.special import log_ndtr
 
-        sign = np.where(failed, 1.0, -1.0)
+        sign = np.where(has_failed, 1.0, -1.0)
         z = sign * x
         # By logarithms, as Phi underflows to 0 long before the derivative of its logarithm does.
         ratio = np.exp(-0.5 * z * z - 0.5 * np.log(2.0 * np.pi) - log_ndtr(z))
@@ -153,11 +153,11 @@ class _ComplementaryLogLog:
         pass_information = np.maximum(_square_integral_above(rate) - _square_integral_above(upper_rate), 0.0)
         return failure_information + pass_information + upper_rate * upper_rate * np.exp(-upper_rate)
 
-    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+    def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
         rate = np.exp(np.clip(x, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT))
         first = _rate_ratio(rate)
         second = first * (1.0 - rate - first)
-        return np.where(failed, first, -rate), np.where(failed, np.minimum(second, 0.0), -rate)
+        return np.where(has_failed, first, -rate), np.where(has_failed, np.minimum(second, 0.0), -rate)
 
     def log_density(self, x: Floats) -> Floats:
         return x - np.exp(np.minimum(x, _MAX_EXPONENT))
@@ -387,20 +387,20 @@ class _Posterior:
 
     def log_density(self, points: Floats) -> Floats:
         """Return the log-density (n,) at n points, up to a constant."""
-        beta, deviations, failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
+        beta, deviations, has_failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
         predictor = self._terms @ beta.T
         predictor_without_margin = (
             self._outcomes.terms @ beta[:, : self.size].T if self.margin_coefficient else predictor
         )
         # Practically impossible, and its logarithm is so large that the other terms would be lost to rounding.
-        is_possible = (predictor_without_margin[~failed] < _MAX_PREDICTOR).all(axis=0)
+        is_possible = (predictor_without_margin[~has_failed] < _MAX_PREDICTOR).all(axis=0)
         predictor, predictor_without_margin = (
             np.where(is_possible, predictor, 0.0),
             np.where(is_possible, predictor_without_margin, 0.0),
         )
         log_densities: Floats = -0.5 * (deviations * deviations) @ self._precision
-        log_densities += self._link.log_cdf(predictor[failed]).sum(axis=0)
-        log_densities += self._link.log_survival(predictor[~failed & ~self._marginal_passes]).sum(axis=0)
+        log_densities += self._link.log_cdf(predictor[has_failed]).sum(axis=0)
+        log_densities += self._link.log_survival(predictor[~has_failed & ~self._marginal_passes]).sum(axis=0)
         if self.margin_coefficient:
             is_possible &= beta[:, -1] > 0.0
             log_densities += self._link.log_density(predictor[self._marginal_passes]).sum(axis=0)

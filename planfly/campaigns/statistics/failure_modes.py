@@ -136,11 +136,11 @@ class FailureMode:
     margin_coefficient: float = 0.0
 
 
-def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> FailureMode:
+def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink) -> FailureMode:
     """Fit a failure mode of n flights, with or without their margins, whichever has more evidence.
 
     terms: (n, 2 + d) terms of each flight: one, the wind relative to some origin, and the draws.
-    failed: (n,).  margin: (n,) margin of each passed flight as a fraction of a scale: 1 for a scale or more, 0 for
+    has_failed: (n,).  margin: (n,) margin of each passed flight as a fraction of a scale: 1 for a scale or more, 0 for
     unknown.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
@@ -151,7 +151,7 @@ def fit_mode(terms: Floats, failed: Bools, margin: Floats, link: BinaryLink) -> 
     >>> fit_mode(terms, failed, chance, PROBIT).margin_coefficient
     0.0
     """
-    outcomes = Outcomes(terms, failed, np.where(failed, 0.0, margin))
+    outcomes = Outcomes(terms, has_failed, np.where(has_failed, 0.0, margin))
     joint_fit = fit_regression(outcomes, link)
     if not outcomes.marginal.any():
         return _make_mode(link, joint_fit, joint_fit.log_evidence)
@@ -187,14 +187,14 @@ def make_terms(speeds: Floats | float, draws: Floats) -> Floats:
 
 def fit_modes(
     terms: Floats,
-    failed: Sequence[frozenset[Hashable]],
+    failed_modes: Sequence[frozenset[Hashable]],
     link: BinaryLink,
     margin: Sequence[Mapping[Hashable, float] | None] = (),
 ) -> tuple[FailureMode, ...]:
     """Fit the failure modes of n flights: first the most frequent mode, then the most frequent of the other flights.
 
     terms: (n, 2 + d), of `make_terms`.
-    failed: modes in which each flight failed; empty if it was flyable.
+    failed_modes: modes in which each flight failed; empty if it was flyable.
     margin: modes that each flight passed marginally, with the margin as a fraction of a scale, 0 to 1, or 0 for a pass
     of unknown margin; other modes were passed by a scale or more.  None for a flight without known margins.
 
@@ -206,14 +206,17 @@ def fit_modes(
     12.0
     """
     modes: list[FailureMode] = []
-    margins = margin or [None] * len(failed)
-    is_remaining = np.ones(len(failed), dtype=bool)
+    margins = margin or [None] * len(failed_modes)
+    is_remaining = np.ones(len(failed_modes), dtype=bool)
     while counts := Counter(
-        mode for remains, failed_modes in zip(is_remaining, failed, strict=True) if remains for mode in failed_modes
+        mode
+        for remains, flight_modes in zip(is_remaining, failed_modes, strict=True)
+        if remains
+        for mode in flight_modes
     ):
         # Ties are broken by name, as the order of a set differs between processes.
         most_common = min(counts, key=lambda mode: (-counts[mode], repr(mode)))
-        has_failed = np.array([most_common in failed_modes for failed_modes in failed])
+        has_failed = np.array([most_common in flight_modes for flight_modes in failed_modes])
         passed_margins = np.array(
             [
                 0.0 if margins_of_flight is None else margins_of_flight.get(most_common, 1.0)

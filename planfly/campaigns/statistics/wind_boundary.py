@@ -26,15 +26,15 @@ from planfly.campaigns.statistics.failure_modes import (
 from world.arrays import Floats
 
 # ----------------------------------------------------------------------
-# The boundary: the wind in which a share 1 - P of flights fails, for each sample of the failure modes' coefficients.
+# The boundary: the wind in which a fraction 1 - P of flights fails, for each sample of the failure modes' coefficients.
 #
-# The share that fails in a wind is the mean of the failure modes over the possible draws.  In every sample more wind
+# The fraction that fails in a wind is the mean of the failure modes over the possible draws.  In every sample more wind
 # never causes fewer failures (`censored_regression`), so that each sample has one boundary.
 
 
 # Number of draws with which each sample's boundary is first bracketed.
 _BRACKET_DRAWS = 256
-# Width of this bracket, m/s; within it the logarithm of the failing share is nearly linear in the wind.
+# Width of this bracket, m/s; within it the logarithm of the failing fraction is nearly linear in the wind.
 _BRACKET_WIDTH_MPS = 0.1
 # Number of secant steps that follow, with all draws.
 _SECANT_STEPS = 2
@@ -90,19 +90,19 @@ def _boundaries(modes: Sequence[FailureMode], draws: Floats, failing_fraction: f
         np.random.default_rng(number).permutation(mode.sample()) if number else mode.sample()
         for number, mode in enumerate(modes)
     ]
-    bracket_shares, all_shares = (
+    bracket_fractions, all_fractions = (
         _FailureFractions(modes, samples, some_draws) for some_draws in (draws[:_BRACKET_DRAWS], draws)
     )
     lower, upper = np.zeros(len(samples[0])), np.full(len(samples[0]), max_speed)
     while (upper - lower).max() > _BRACKET_WIDTH_MPS:
         speed_between = 0.5 * (lower + upper)
-        is_above = bracket_shares.logarithms(speed_between) > np.log(failing_fraction)
+        is_above = bracket_fractions.logarithms(speed_between) > np.log(failing_fraction)
         lower, upper = np.where(is_above, lower, speed_between), np.where(is_above, speed_between, upper)
     speed: Floats = 0.5 * (lower + upper)
     previous_speed = speed - _BRACKET_WIDTH_MPS
-    previous_error = all_shares.logarithms(previous_speed) - np.log(failing_fraction)
+    previous_error = all_fractions.logarithms(previous_speed) - np.log(failing_fraction)
     for _ in range(_SECANT_STEPS):
-        error = all_shares.logarithms(speed) - np.log(failing_fraction)
+        error = all_fractions.logarithms(speed) - np.log(failing_fraction)
         wind_slope = np.maximum(
             (error - previous_error) / np.where(speed == previous_speed, 1.0, speed - previous_speed), 1e-9
         )
@@ -111,14 +111,14 @@ def _boundaries(modes: Sequence[FailureMode], draws: Floats, failing_fraction: f
 
 
 class _FailureFractions:
-    """Failing share of each sample; draws: (m, d)."""
+    """Failing fraction of each sample; draws: (m, d)."""
 
     def __init__(self, modes: Sequence[FailureMode], samples: list[Floats], draws: Floats) -> None:
         self._modes, self._samples = modes, samples
         self._at_origin = [make_terms(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
 
     def logarithms(self, speeds: Floats) -> Floats:
-        """Return the logarithms (n,) of the failing shares, each at its own wind, m/s."""
+        """Return the logarithms (n,) of the failing fractions, each at its own wind, m/s."""
         success = np.ones_like(self._at_origin[0])
         for mode, sample, predictor in zip(self._modes, self._samples, self._at_origin, strict=True):
             success *= mode.link.survival(predictor + sample[:, 1] * (speeds - WIND_ORIGIN_MPS))
@@ -181,60 +181,62 @@ class FailureFit(WeightedModes):
 class Direction:
     """Flights in wind from one direction.
 
-    most: largest wind of the search, m/s.  target, confidence: above 0 and below 1.
-    speeds: wind of each flight, m/s.  draws: index of each flight's draw.  failed: failure modes of each flight.
+    max_speed: largest wind of the search, m/s.  target, confidence: above 0 and below 1.
+    speeds: wind of each flight, m/s.  draws: index of each flight's draw.  failed_modes: failure modes of each flight.
     margin: modes that each flight passed narrowly, with the margin as a fraction of a scale, 0 to 1; None if unknown.
     """
 
-    def __init__(self, most: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
-        self.most, self.target, self.numbers, self.confidence = most, target, numbers, confidence
+    def __init__(self, max_speed: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
+        self.max_speed, self.target, self.numbers, self.confidence = max_speed, target, numbers, confidence
         self.speeds: list[float] = []
         self.draws: list[int] = []
-        self.failed: list[frozenset[Hashable]] = []
+        self.failed_modes: list[frozenset[Hashable]] = []
         self.margin: list[Mapping[Hashable, float] | None] = []
         self._fits: tuple[int, tuple[FailureFit, ...]] | None = None
 
     def add(
-        self, speed: float, draw: int, failed: frozenset[Hashable], margin: Mapping[Hashable, float] | None = None
+        self, speed: float, draw: int, failed_modes: frozenset[Hashable], margin: Mapping[Hashable, float] | None = None
     ) -> None:
-        """Add a flight in a wind from 0 to `most`, m/s; failed: empty if it was flyable.
+        """Add a flight in a wind from 0 to `max_speed`, m/s; failed_modes: empty if it was flyable.
 
         margin: None if its margins are unknown.  Raises ValueError for a wind out of range.
         """
-        if not 0.0 <= speed <= self.most:
-            raise ValueError(f"speed: {speed}: expected 0 to {self.most:g} m/s")
+        if not 0.0 <= speed <= self.max_speed:
+            raise ValueError(f"speed: {speed}: expected 0 to {self.max_speed:g} m/s")
         self.speeds.append(speed)
         self.draws.append(draw)
-        self.failed.append(failed)
+        self.failed_modes.append(failed_modes)
         self.margin.append(margin)
 
     @property
     def all_flew(self) -> bool:
         """True if no flight failed."""
-        return not any(self.failed)
+        return not any(self.failed_modes)
 
     @property
     def all_failed(self) -> bool:
         """True if every flight failed."""
-        return all(self.failed)
+        return all(self.failed_modes)
 
     def fits(self) -> tuple[FailureFit, ...]:
         """Return the failure modes for each link, for a direction with both failed and flyable flights."""
         if self._fits is None or self._fits[0] != len(self.speeds):
             terms = make_terms(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
-            modes_by_link = [fit_modes(terms, self.failed, link, self.margin) for link in LINKS]
+            modes_by_link = [fit_modes(terms, self.failed_modes, link, self.margin) for link in LINKS]
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in modes_by_link])
             weights = np.exp(evidence - evidence.max())
             weights /= weights.sum()
             self._fits = (
                 len(self.speeds),
-                tuple(self._fit(modes, float(weight)) for modes, weight in zip(modes_by_link, weights, strict=True)),
+                tuple(
+                    self._make_fit(modes, float(weight)) for modes, weight in zip(modes_by_link, weights, strict=True)
+                ),
             )
         return self._fits[1]
 
-    def _fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
+    def _make_fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
         draws = self.numbers.population
-        speed = boundary_speed(modes, draws, 1.0 - self.target, self.most)
+        speed = boundary_speed(modes, draws, 1.0 - self.target, self.max_speed)
         return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
 
     def boundary(self) -> WindBoundary:
@@ -252,19 +254,19 @@ class Direction:
         probabilities = (tail, 0.5, 1.0 - tail)
         if self.all_flew or self.all_failed:
             is_flyable = np.full(len(self.speeds), self.all_flew)
-            lower, median, upper = self._laws.posterior_quantiles(
+            lower, median, upper = self._failure_laws.posterior_quantiles(
                 failing_fraction, np.array(self.speeds), is_flyable, np.array(probabilities)
             )
         else:
             lower, median, upper = boundary_quantiles(
-                self.fits(), self.numbers.population, failing_fraction, self.most, probabilities
+                self.fits(), self.numbers.population, failing_fraction, self.max_speed, probabilities
             )
-        lower, median, upper = (float(min(self.most, max(0.0, speed))) for speed in (lower, median, upper))
-        return WindBoundary(median, lower, upper, median >= self.most - 1e-9)
+        lower, median, upper = (float(min(self.max_speed, max(0.0, speed))) for speed in (lower, median, upper))
+        return WindBoundary(median, lower, upper, median >= self.max_speed - 1e-9)
 
     @cached_property
-    def _laws(self) -> FailureLaws:
-        return FailureLaws.for_winds_up_to(self.most)
+    def _failure_laws(self) -> FailureLaws:
+        return FailureLaws.for_winds_up_to(self.max_speed)
 
 
 def needs_more_flights(boundary: WindBoundary, flights: int, accuracy: float, min_flights: int) -> bool:
@@ -288,11 +290,11 @@ def needs_more_flights(boundary: WindBoundary, flights: int, accuracy: float, mi
 
 # Step of the winds that are flown, m/s.
 WIND_GRID_MPS = 0.1
-# Smallest expected failing share of the compared winds.  A fit near the centre of a distribution need not be valid in
-# its tail, where the boundary is.
-_MIN_FAILING_SHARE = 1e-3
-# Largest expected failing share of the compared winds.
-_MAX_FAILING_SHARE = 0.2
+# Smallest expected failing fraction of the compared winds.  A fit near the centre of a distribution need not be valid
+# in its tail, where the boundary is.
+_MIN_FAILING_FRACTION = 1e-3
+# Largest expected failing fraction of the compared winds.
+_MAX_FAILING_FRACTION = 0.2
 # Number of compared winds.
 _WIND_COUNT = 10
 # Number of compared draws that have not been flown.
@@ -309,13 +311,13 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     """Return wind, m/s, and draw of the `count` most informative flights."""
     if direction.all_flew or direction.all_failed:
         speed = _bisect_speed(direction)
-        draws = _extreme_draws(direction) if speed == direction.most else []
+        draws = _extreme_draws(direction) if speed == direction.max_speed else []
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
     return _choose_most_informative(direction, count)
 
 
 def _bisect_speed(direction: Direction) -> float:
-    max_speed = direction.most
+    max_speed = direction.max_speed
     if not direction.speeds:
         return _round_to_grid(0.5 * max_speed, max_speed)
     if direction.all_failed:
@@ -348,10 +350,10 @@ def _extreme_draws(direction: Direction) -> list[int]:
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
-    fits, max_speed, flown_count = direction.fits(), direction.most, len(direction.draws)
+    fits, max_speed, flown_count = direction.fits(), direction.max_speed, len(direction.draws)
     min_speeds, max_speeds = (
         [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
-        for failing_fraction in (_MIN_FAILING_SHARE, _MAX_FAILING_SHARE)
+        for failing_fraction in (_MIN_FAILING_FRACTION, _MAX_FAILING_FRACTION)
     )
     speeds = np.unique(
         [_round_to_grid(wind, max_speed) for wind in np.linspace(min(min_speeds), max(max_speeds), _WIND_COUNT)]

@@ -13,7 +13,7 @@ from aircraft.catalog import Aircraft, load_aircraft
 from benchmarks.tuning.tune_gains import DIGITS, REPORTED, SEARCHED, TRAINED, rounded, search, write
 from benchmarks.tuning.tuning_missions import Case, cases
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.model_gains import airframe_gains, at_airspeed
+from flight.guidance.model_gains import airframe_gains, gains_at_airspeed
 from tests.setups import setup_maker, standard
 
 NAMES = sorted(TRAINED)
@@ -40,10 +40,10 @@ def test_the_missions_are_of_every_kind_and_not_those_reported_on(name: str) -> 
 
 def test_the_search_finds_the_least_and_does_so_again() -> None:
     aircraft = load_aircraft("aerosonde")
-    begun = replace(load_gains(aircraft), **at_airspeed(aircraft.airspeed))
+    begun = replace(load_gains(aircraft), **gains_at_airspeed(aircraft.airspeed))
     best = {
         name: value * (1.0 + 0.4 * math.sin(k))
-        for k, (name, value) in enumerate(at_airspeed(aircraft.airspeed).items())
+        for k, (name, value) in enumerate(gains_at_airspeed(aircraft.airspeed).items())
     }
 
     def far(gains: Gains) -> float:
@@ -60,7 +60,7 @@ def test_the_search_finds_the_least_and_does_so_again() -> None:
 def test_what_is_written_is_what_is_read(tmp_path: Path) -> None:
     aircraft = load_aircraft("aerosonde")
     shutil.copy(aircraft.folder / "gains.toml", tmp_path)
-    chosen = rounded(replace(load_gains(aircraft), **at_airspeed(aircraft.airspeed)))
+    chosen = rounded(replace(load_gains(aircraft), **gains_at_airspeed(aircraft.airspeed)))
     write(replace(aircraft, folder=tmp_path), chosen, 3, 7)
     again = load_gains(replace(aircraft, folder=tmp_path))
     assert asdict(again) == pytest.approx(asdict(chosen), rel=10.0**-DIGITS)

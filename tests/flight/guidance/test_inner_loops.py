@@ -28,15 +28,15 @@ def test_every_law_of_a_scenario_has_its_number() -> None:
 def test_a_fresh_memory_steers_by_the_default_law_from_the_paths_beginning() -> None:
     memory: Record = np.zeros(1, GUIDANCE_MEMORY)[0]
     assert memory.lateral_law == LAWS[FlightTable().steering.guidance]
-    assert (memory.piece, memory.leg, memory.distance, bool(memory.done)) == (0, 0, 0.0, False)
+    assert (memory.piece, memory.leg, memory.distance, bool(memory.is_finished)) == (0, 0, 0.0, False)
 
 
 def test_counts_are_whole_and_an_end_is_a_truth() -> None:
     kinds = {name: GUIDANCE_MEMORY[name] for name in field_names(GUIDANCE_MEMORY)}
     whole = {name for name, kind in kinds.items() if kind == np.int64}
     assert whole == {"lateral_law", "piece", "leg", "l1_leg"}
-    assert {name for name, kind in kinds.items() if kind == np.bool_} == {"done", "returning"}
-    assert all(kind == np.float64 for name, kind in kinds.items() if name not in whole | {"done", "returning"})
+    assert {name for name, kind in kinds.items() if kind == np.bool_} == {"is_finished", "is_in_rtl"}
+    assert all(kind == np.float64 for name, kind in kinds.items() if name not in whole | {"is_finished", "is_in_rtl"})
 
 
 # ----------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
-from flight.guidance.model_gains import airframe_gains, at_airspeed, gains_of_model, gains_text
+from flight.guidance.model_gains import airframe_gains, gains_at_airspeed, gains_of_model, gains_text
 
 AEROSONDE = load_aircraft("aerosonde")
 
@@ -25,7 +25,7 @@ def test_the_airframes_own_are_its_coefficients() -> None:
 
 
 def test_round_figures_go_with_the_airspeed() -> None:
-    slow, usual = at_airspeed(12.5), at_airspeed(25.0)
+    slow, usual = gains_at_airspeed(12.5), gains_at_airspeed(25.0)
     assert slow["roll_frequency"] == 2.0 * usual["roll_frequency"]
     assert slow["turn_lead"] == 0.5 * usual["turn_lead"]
     assert slow["height_integral"] == pytest.approx(8.0 * usual["height_integral"])

@@ -40,7 +40,7 @@ class FakeVehicle:
         home = Home(46.0, 8.0, 400.0)
         snapshot = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
         parameters = vehicle_parameters(
-            airspeed=25.0, slowest=18.0, fastest=30.0, max_bank_deg=30.0, system=1, speed=1.0
+            airspeed=25.0, min_airspeed=18.0, max_airspeed=30.0, max_bank_deg=30.0, system=1, speed=1.0
         )
         self.shown: list[str] = []
         self.flyable = True

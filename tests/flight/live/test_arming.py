@@ -3,7 +3,7 @@
 import pytest
 
 from flight.live.arming import ACCEPTED, DENIED, IN_PROGRESS, ArmingState
-from flight.live.flight_process import MissionJudged, Place
+from flight.live.flight_process import LoiterCenter, MissionJudged
 from flight.live.telemetry import (
     ACTIVE,
     AUTO,
@@ -31,11 +31,11 @@ def judged(*, possible: bool = True, flyable: bool = True) -> ArmingState:
 def test_armed_in_auto_with_a_verdict_starts() -> None:
     state = judged()
     assert state.arm(True, 0.0).result == ACCEPTED
-    assert not state.starts
+    assert not state.should_start
     assert state.set_mode(AUTO).result == ACCEPTED
-    assert state.starts
+    assert state.should_start
     state.on_flight_started()
-    assert (state.starts, state.flying, state.mission_state) == (False, True, ACTIVE)
+    assert (state.should_start, state.flying, state.mission_state) == (False, True, ACTIVE)
     state.on_flight_ended(True)
     assert (state.armed, state.mode, state.mission_state) == (False, MANUAL, COMPLETE)
 
@@ -49,7 +49,7 @@ def test_an_arm_command_waits_for_the_verdict() -> None:
     state = ArmingState()
     state.on_mission_uploaded()
     assert state.arm(True, 0.0).result == IN_PROGRESS
-    assert not state.armable
+    assert not state.can_arm
 
 
 @pytest.mark.parametrize(
@@ -97,24 +97,24 @@ def test_in_flight_only_a_forced_disarm_ends_it() -> None:
 def test_in_flight_a_mode_sends_it_another_way_once(mode: int) -> None:
     state = flying()
     assert state.set_mode(mode).result == ACCEPTED
-    assert (state.mode, state.place, state.mission_state) == (mode, Place(), PAUSED)
-    state.place = None
+    assert (state.mode, state.loiter_center, state.mission_state) == (mode, LoiterCenter(), PAUSED)
+    state.loiter_center = None
     assert state.set_mode(mode).result == ACCEPTED
-    assert state.place is None, "it is on that way already"
+    assert state.loiter_center is None, "it is on that way already"
     assert state.set_mode(AUTO).result == ACCEPTED
-    assert (state.place, state.mission_state) == (Place(), ACTIVE)
+    assert (state.loiter_center, state.mission_state) == (LoiterCenter(), ACTIVE)
     assert judged().set_mode(RTL).result == judged().set_mode(GUIDED).result == DENIED, "on the ground"
 
 
 def test_a_pause_circles_and_a_go_to_needs_a_flight() -> None:
-    state, there = flying(), Place(46.0, 8.0, 150.0)
+    state, there = flying(), LoiterCenter(46.0, 8.0, 150.0)
     assert (state.pause(False).result, state.mode) == (ACCEPTED, LOITER)
     assert (state.pause(True).result, state.mode) == (ACCEPTED, AUTO)
-    assert (state.go_to(there).result, state.mode, state.place) == (ACCEPTED, GUIDED, there)
+    assert (state.go_to(there).result, state.mode, state.loiter_center) == (ACCEPTED, GUIDED, there)
     assert judged().go_to(there).result == judged().pause(False).result == DENIED
     # What ends beside the mission completes nothing of it.
     state.on_flight_ended(True)
-    assert (state.mode, state.place, state.mission_state) == (MANUAL, None, NOT_STARTED)
+    assert (state.mode, state.loiter_center, state.mission_state) == (MANUAL, None, NOT_STARTED)
 
 
 def test_auto_needs_a_mission_and_goes_with_it() -> None:

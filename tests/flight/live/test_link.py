@@ -13,9 +13,9 @@ from flight.live.link import (
     MAX_PEERS,
     SILENCE,
     Access,
-    Dropped,
+    DropCounts,
     Link,
-    Refused,
+    RefusalReason,
     Signing,
     read_key,
     split_frames,
@@ -80,7 +80,7 @@ def test_a_vehicle_started_anew_after_its_clock_was_set_back_is_heard() -> None:
     # What is forged moves nothing.
     (forged,) = split_frames(Signing(bytes(32)).sign(packed(HEARTBEAT), WALL + 1e8))
     before = anew.newest
-    assert anew.find_refusal(forged, back) is Refused.FORGED
+    assert anew.find_refusal(forged, back) is RefusalReason.FORGED
     assert anew.newest == before
 
 
@@ -103,26 +103,26 @@ def test_a_forged_timestamp_locks_nobody_out() -> None:
 def test_each_frame_that_is_not_believed_says_why() -> None:
     vehicle, station = Signing(KEY), Signing(KEY, 4)
 
-    def refused(raw: bytes, wall: float = WALL) -> Refused | None:
+    def refused(raw: bytes, wall: float = WALL) -> RefusalReason | None:
         return vehicle.find_refusal(split_frames(raw)[0], wall)
 
     first, second = (station.sign(packed(HEARTBEAT), WALL) for _ in range(2))
-    assert refused(packed(HEARTBEAT)) is Refused.UNSIGNED
-    assert refused(Signing(bytes(32), 4).sign(packed(HEARTBEAT), WALL)) is Refused.FORGED
+    assert refused(packed(HEARTBEAT)) is RefusalReason.UNSIGNED
+    assert refused(Signing(bytes(32), 4).sign(packed(HEARTBEAT), WALL)) is RefusalReason.FORGED
     # Its own frame under another link's id: the signature covers the id.
     moved = bytearray(second)
     moved[-13] = 5
-    assert refused(bytes(moved)) is Refused.FORGED
+    assert refused(bytes(moved)) is RefusalReason.FORGED
     assert refused(second) is None
-    assert refused(second) is Refused.REPLAYED
-    assert refused(first) is Refused.REPLAYED, "a later frame has been there"
+    assert refused(second) is RefusalReason.REPLAYED
+    assert refused(first) is RefusalReason.REPLAYED, "a later frame has been there"
     # A recording of another link, played when its minute is over, and just before.
     other = Signing(KEY, 6).sign(packed(HEARTBEAT), WALL)
-    assert refused(other, WALL + 60.001) is Refused.OLD
+    assert refused(other, WALL + 60.001) is RefusalReason.OLD
     assert refused(other, WALL + 59.999) is None
     for link in range(10, 10 + 62):
         assert refused(Signing(KEY, link).sign(packed(HEARTBEAT), WALL)) is None
-    assert refused(Signing(KEY, 100).sign(packed(HEARTBEAT), WALL)) is Refused.STREAMS
+    assert refused(Signing(KEY, 100).sign(packed(HEARTBEAT), WALL)) is RefusalReason.STREAMS
 
 
 # Timestamps as the standard counts them: 10 us since 2015-01-01.  3e8 s after it, and a day.
@@ -140,18 +140,18 @@ def signed_at(stamp: int, link_id: int = 1, system: int = 255) -> bytes:
 def test_a_timestamp_more_than_a_day_ahead_is_refused_and_leaves_no_trace() -> None:
     vehicle = Signing(KEY)
 
-    def refused(stamp: int, link_id: int = 1) -> Refused | None:
+    def refused(stamp: int, link_id: int = 1) -> RefusalReason | None:
         return vehicle.find_refusal(split_frames(signed_at(stamp, link_id))[0], WALL)
 
     assert refused(NOW) is None
     for ahead in (2**48 - 1, 2**48 - 2, NOW + DAY + 1):
         for link_id in (1, 2):
-            assert refused(ahead, link_id) is Refused.FUTURE
+            assert refused(ahead, link_id) is RefusalReason.FUTURE
     assert vehicle.newest == NOW
     assert refused(NOW + 1) is None, "its own stream goes on"
     assert refused(NOW + DAY) is None
     # Half a day at a time leads no further than one frame does.
-    assert refused(NOW + DAY + DAY // 2) is Refused.FUTURE
+    assert refused(NOW + DAY + DAY // 2) is RefusalReason.FUTURE
     sent = split_frames(vehicle.sign(packed(HEARTBEAT, 1), WALL))[0].raw
     assert int.from_bytes(sent[-12:-6], "little") == NOW + DAY + 1
 
@@ -224,9 +224,9 @@ def test_nobody_beyond_this_machine_is_believed_before_a_heartbeat() -> None:
         ask = packed(mavlink.MAVLink_param_request_list_message(1, 1))
         assert link.decode_datagram(ask, ("192.0.2.1", 5)) == []
         assert link.peers == {}
-        assert link.notices() == ["192.0.2.1 sends PARAM_REQUEST_LIST and no HEARTBEAT: it is not answered"]
+        assert link.take_notices() == ["192.0.2.1 sends PARAM_REQUEST_LIST and no HEARTBEAT: it is not answered"]
         assert link.decode_datagram(ask, ("192.0.2.1", 6)) == []
-        assert link.notices() == [], "said once"
+        assert link.take_notices() == [], "said once"
         assert len(link.decode_datagram(packed(HEARTBEAT) + ask, ("192.0.2.1", 5))) == 2
         assert link.decode_datagram(ask, ("192.0.2.1", 6)) == []
         other = packed(mavlink.MAVLink_param_request_list_message(7, 1))
@@ -267,12 +267,12 @@ def test_a_sleeping_laptop_loses_no_station_and_none_of_its_wishes() -> None:
         made.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", 5))
         made.peers["127.0.0.1", 5].periods["ATTITUDE"] = 0.02
         real.now += 3600.0
-        made.forget_silent()
+        made.remove_silent_peers()
         assert made.peers["127.0.0.1", 5].periods["ATTITUDE"] == 0.02
         # Awake and silent it is forgotten as ever.
         for _ in range(int(SILENCE)):
             real.now += 1.0
-            made.forget_silent()
+            made.remove_silent_peers()
         assert made.peers == {}
     finally:
         made.close()
@@ -295,7 +295,7 @@ def test_a_clock_set_back_cuts_no_signed_link() -> None:
             made.send_heartbeat(HEARTBEAT)
             message = theirs.decode(bytearray(station.recv(300)))
             assert (message.get_type(), message.get_signed(), message.get_seq()) == ("HEARTBEAT", True, n)
-        assert made.dropped == Dropped()
+        assert made.dropped == DropCounts()
     finally:
         made.close()
         station.close()
@@ -336,14 +336,14 @@ def test_an_address_whose_clock_is_far_ahead_is_named_once() -> None:
         for stamp in (2**48 - 1, 2**48 - 1, NOW + 2 * DAY):
             assert made.decode_datagram(signed_at(stamp), ("127.0.0.1", 5)) == []
         assert (made.dropped.future, made.peers) == (3, {})
-        (notice,) = made.notices()
+        (notice,) = made.take_notices()
         assert notice.startswith("127.0.0.1 signs with timestamps more than a day ahead")
         made.decode_datagram(signed_at(NOW + 2 * DAY), ("127.0.0.1", 6))
-        assert made.notices() == []
+        assert made.take_notices() == []
         # Addresses that are named are bounded, and the vehicle still signs.
         for host in range(1000):
             made.decode_datagram(signed_at(2**48 - 1), (f"127.0.{host // 250}.{2 + host % 250}", 5))
-        assert len(made.notices()) < 20
+        assert len(made.take_notices()) < 20
         made.send_heartbeat(HEARTBEAT)
         assert len(made.decode_datagram(signed_at(NOW), ("127.0.0.1", 5))) == 1
     finally:

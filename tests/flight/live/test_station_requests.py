@@ -12,7 +12,7 @@ from flight.live.flight_process import (
     FlightDiverted,
     FlightEnded,
     JudgeMission,
-    Place,
+    LoiterCenter,
     StartFlight,
     send_event,
 )
@@ -26,7 +26,9 @@ from world.errors import ParameterError
 
 @pytest.fixture
 def parameters() -> Parameters:
-    return vehicle_parameters(airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=2.0)
+    return vehicle_parameters(
+        airspeed=25.0, min_airspeed=18.0, max_airspeed=31.0, max_bank_deg=30.0, system=1, speed=2.0
+    )
 
 
 def test_each_is_found_by_number_and_by_name(parameters: Parameters) -> None:
@@ -191,7 +193,7 @@ def diverted(fake: FakeVehicle) -> DivertFlight:
 def test_a_command_is_a_mode_by_another_name(in_flight: FakeVehicle, asked: object, mode: int) -> None:
     in_flight.send(asked)
     found = diverted(in_flight)
-    assert (found.mode, math.isnan(found.place.lat_deg)) == (mode, True)
+    assert (found.mode, math.isnan(found.center.lat_deg)) == (mode, True)
     send_event(in_flight.flight, FlightDiverted(mode, ""))
     in_flight.turn()
     assert in_flight.vehicle.status.mission_state == PAUSED
@@ -204,10 +206,10 @@ def test_a_reposition_names_a_place_and_what_it_leaves_out_is_that_of_here(in_fl
     in_flight.send(
         mavlink.MAVLink_command_int_message(1, 1, 3, 192, 0, 0, -1, 1, 120, nan, 460_050_000, 80_100_000, 90.0)
     )
-    assert diverted(in_flight).place == Place(46.005, 8.01, 90.0, 3, 120.0)
+    assert diverted(in_flight).center == LoiterCenter(46.005, 8.01, 90.0, 3, 120.0)
     assert diverted(in_flight).mode == GUIDED
     in_flight.send(command(192, -1.0, 1.0, nan, nan, nan, nan, 640.0))
-    place = diverted(in_flight).place
+    place = diverted(in_flight).center
     assert (math.isnan(place.lat_deg), math.isnan(place.lon_deg), place.alt, place.radius) == (True, True, 640.0, 0.0)
     before = len(in_flight.orders)
     in_flight.send(command(192, -1.0, 1.0, 0.0, nan, 95.0, 8.0, 640.0))
@@ -277,5 +279,11 @@ def test_parameters_that_fly_are_set_on_the_ground_and_the_mission_is_judged_ane
 
 def parameters_of_a_law() -> Parameters:
     return vehicle_parameters(
-        airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=2.0, flown=flown
+        airspeed=25.0,
+        min_airspeed=18.0,
+        max_airspeed=31.0,
+        max_bank_deg=30.0,
+        system=1,
+        speed=2.0,
+        autopilot_values=flown,
     )

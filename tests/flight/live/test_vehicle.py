@@ -79,7 +79,7 @@ class FakeLink:
         assert message.get_type() == "HEARTBEAT"
         self.heartbeats += 1
 
-    def forget_silent(self) -> None:
+    def remove_silent_peers(self) -> None:
         self.forgotten += 1
 
 

@@ -24,35 +24,35 @@ def with_items(setup: FlightSetup, *items: MissionItem) -> FlightSetup:
 
 def test_a_catapult_lets_go_at_its_end_and_a_hand_where_it_stands() -> None:
     """6 m of rail at 30 degrees lead 5.196 m ahead and 3 m up, from a metre over the ground."""
-    take_off = circuit(RAIL, None).ground_ways.take_off
+    take_off = circuit(RAIL, None).ground_phases.take_off
     assert take_off is not None
     place, velocity = take_off.release()
     assert place == pytest.approx([5.196, 0.0, 4.0], abs=1e-3)
     assert velocity == pytest.approx([17.321, 0.0, 10.0], abs=1e-3)
     assert take_off.acceleration == pytest.approx(33.33, abs=0.01)
-    hand = circuit(replace(RAIL, method="hand"), None).ground_ways.take_off
+    hand = circuit(replace(RAIL, method="hand"), None).ground_phases.take_off
     assert hand is not None
     assert hand.release()[0] == pytest.approx([0.0, 0.0, 1.8])
-    runway = circuit(replace(RAIL, method="runway", speed=None), None).ground_ways.take_off
+    runway = circuit(replace(RAIL, method="runway", speed=None), None).ground_phases.take_off
     assert runway is not None
     assert runway.release()[0] == pytest.approx([0.0, 0.0, 0.0])
     assert not runway.release()[1].any()
 
 
 def test_without_a_course_it_is_launched_along_the_first_leg_and_without_a_pitch_at_four_degrees() -> None:
-    take_off = circuit(replace(RAIL, course=None), None, pitch=0.0).ground_ways.take_off
+    take_off = circuit(replace(RAIL, course=None), None, pitch=0.0).ground_phases.take_off
     assert take_off is not None
     assert take_off.course == pytest.approx(math.radians(90.0), abs=1e-3)
     assert take_off.pitch == DEFAULT_CLIMB_PITCH
-    assert (take_off.top, take_off.base) == pytest.approx((60.0, 0.0))
+    assert (take_off.end_altitude, take_off.home_altitude) == pytest.approx((60.0, 0.0))
 
 
 def test_the_landing_is_that_of_the_last_leg_and_its_wind() -> None:
-    approach = circuit(None, STRIP).ground_ways.approach
+    approach = circuit(None, STRIP).ground_phases.approach
     assert approach is not None
     assert (approach.leg, approach.item) == (3, 5)
     assert approach.point == pytest.approx([500.0, 600.0, 0.0], abs=0.02)
-    assert approach.run == pytest.approx(600.0, abs=0.05)
+    assert approach.length == pytest.approx(600.0, abs=0.05)
     # From 60 degrees at 5 m/s, to the west: cos 30 of it from behind.
     assert approach.tail_wind == pytest.approx(4.33, abs=0.01)
     along, aside = approach.place(np.array([[450.0, 610.0, 0.0], [520.0, 595.0, 0.0]]))
@@ -72,22 +72,22 @@ def test_pictures_show_the_ends_that_are_flown_on_the_ground() -> None:
 def test_what_a_mission_does_not_hold_is_not_flown_and_says_why() -> None:
     setup = circuit(RAIL, STRIP)
     takeoff, *way, land = setup.mission.items
-    no_takeoff = with_items(setup, *way, land).ground_ways
+    no_takeoff = with_items(setup, *way, land).ground_phases
     assert no_takeoff.take_off is None
     assert no_takeoff.approach is not None
     assert "does not begin with a NAV_TAKEOFF" in no_takeoff.notes[0]
-    no_landing = with_items(setup, takeoff, *way).ground_ways
+    no_landing = with_items(setup, takeoff, *way).ground_phases
     assert no_landing.approach is None
     assert "a NAV_LAND at a third" in no_landing.notes[0]
     low = with_items(setup, takeoff, *way[:-1], replace(way[-1], alt=-5.0), land)
-    assert "no higher than the landing point" in low.ground_ways.notes[0]
+    assert "no higher than the landing point" in low.ground_phases.notes[0]
     homeless = make_ground_setup(setup.scenario, Mission(None, setup.mission.items))
-    assert homeless.ground_ways.take_off is None
+    assert homeless.ground_phases.take_off is None
 
 
 def test_a_scenario_without_launch_and_strip_flies_in_the_air_as_ever() -> None:
     setup = circuit(None, None)
-    assert not setup.ground_ways
+    assert not setup.ground_phases
     assert setup.started == setup.route.started
     assert any("not flown to the ground" in note for note in setup.notes)
 
@@ -95,7 +95,7 @@ def test_a_scenario_without_launch_and_strip_flies_in_the_air_as_ever() -> None:
 def test_the_route_in_the_air_begins_where_the_take_off_ended_and_ends_before_the_landing() -> None:
     setup = circuit(RAIL, STRIP)
     begun = np.array([300.0, 40.0, 60.5])
-    route = airborne_route(setup.route, setup.ground_ways, begun)
+    route = airborne_route(setup.route, setup.ground_phases, begun)
     assert route.waypoints[0].tolist() == begun.tolist()
     assert route.items.tolist() == [1, 2, 3, 4]
     assert np.array_equal(route.waypoints[1:], setup.route.waypoints[1:4])
@@ -107,7 +107,7 @@ def test_a_rally_point_of_another_continent_keeps_nobody_on_the_ground() -> None
     setup = circuit(RAIL, STRIP)
     far = MissionItem(1, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL), (0.0,) * 4, -36.5, 84.2, 100.0)
     moved = make_ground_setup(setup.scenario, replace(setup.mission, rally=(far,)))
-    before, after = setup.ground_ways.take_off, moved.ground_ways.take_off
+    before, after = setup.ground_phases.take_off, moved.ground_phases.take_off
     assert before is not None
     assert after is not None
     assert after.home.tolist() == before.home.tolist()
@@ -120,7 +120,7 @@ def test_a_take_off_item_with_a_place_of_its_own_goes_on_from_there() -> None:
     setup = circuit(RAIL, None)
     takeoff, *rest = setup.mission.items
     away = replace(takeoff, lon_deg=takeoff.lon_deg + 0.004)
-    take_off = with_items(setup, away, *rest).ground_ways.take_off
+    take_off = with_items(setup, away, *rest).ground_phases.take_off
     assert takeoff.command == Command.NAV_TAKEOFF
     assert take_off is not None
     assert take_off.waypoint == 1

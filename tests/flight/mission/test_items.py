@@ -13,7 +13,7 @@ from flight.mission.items import (
     Notes,
     command_name,
     item_problem,
-    renumbered,
+    renumber_items,
 )
 
 
@@ -77,10 +77,10 @@ def test_a_problem_names_the_field_and_the_value(wrong: MissionItem, text: str) 
 
 def test_numbers_move_up_for_home_and_jumps_with_them() -> None:
     jump = item(command=Command.DO_JUMP, frame=Frame.MISSION, lat=0.0, lon=0.0, seq=1, p1=0.0, p2=2.0)
-    moved = renumbered(Mission(Home(36.5, -84.2, 300.0), (item(seq=0), jump)))
+    moved = renumber_items(Mission(Home(36.5, -84.2, 300.0), (item(seq=0), jump)))
     assert [one.seq for one in moved.items] == [1, 2]
     assert moved.items[1].params[:2] == (1.0, 2.0)
-    assert renumbered(moved) is moved
+    assert renumber_items(moved) is moved
 
 
 def test_every_command_has_its_mavlink_name() -> None:

@@ -245,7 +245,7 @@ def test_a_loiter_without_a_radius_has_that_of_the_autopilots_parameter() -> Non
 
 def test_the_way_to_a_loiter_to_a_height_is_level_where_the_height_is_held() -> None:
     lines = wp(0, -1500), wp(0, 0, 250, 31, p="0 200 0 0"), wp(1500, 1500, 250)
-    held = laid_for(LoiterRules(holds_height=True, climb=2.5, short=10.0), *lines)
+    held = laid_for(LoiterRules(holds_height=True, climb=2.5, altitude_tolerance=10.0), *lines)
     corners = held.waypoints[held.items == 2, 2]
     assert (corners[0], corners[-1]) == (400.0, 550.0)
     # 140 m at 2.5 m/s and 25 m/s are 1,400 m, 1.11 of its circles.
@@ -256,7 +256,7 @@ def test_the_way_to_a_loiter_to_a_height_is_level_where_the_height_is_held() -> 
 def test_a_circle_left_when_its_time_is_over_is_drawn_no_longer() -> None:
     lines = wp(0, -1500), wp(0, 0, 100, 19, p="60 0 150 0"), wp(1500, 1500)
     # 60 s at 25 m/s are 1.59 circles of 150 m.
-    assert 0.59 < circled(laid_for(LoiterRules(at_middle=True), *lines), 2)[0] < 1.59
+    assert 0.59 < circled(laid_for(LoiterRules(steers_to_center=True), *lines), 2)[0] < 1.59
     assert 1.59 < circled(laid_for(LoiterRules(), *lines), 2)[0] < 2.59
 
 
@@ -272,7 +272,7 @@ def test_what_comes_after_the_last_waypoint_is_said() -> None:
 def test_a_circle_that_is_left_heading_for_what_follows_is_drawn_as_it_is_flown() -> None:
     """Its turns count from where it turns away from the middle, a quarter of a circle before the tangent's place."""
     onward = {"ahead": wp(0, 1500), "beside": wp(1500, 0), "back": wp(100, -1500)}
-    rules = LoiterRules(at_middle=True, lines_up=True)
+    rules = LoiterRules(steers_to_center=True, exits_on_heading=True)
     for where, parts in (("ahead", 0.0), ("beside", 0.25), ("back", 0.5)):
         for turns in (1, 3):
             lines = wp(0, -1500), wp(0, 0, 100, 18, p=f"{turns} 0 150 0"), onward[where]
@@ -286,8 +286,8 @@ def test_a_circle_that_is_left_heading_for_what_follows_is_drawn_as_it_is_flown(
 def test_a_circle_tighter_than_the_aircraft_turns_is_gone_around_less_often() -> None:
     lines = wp(0, -1500), wp(0, 0, 100, 19, p="120 0 30 0"), wp(1500, 1500)
     # 120 s at 25 m/s are 15.9 circles of 30 m, and 3.7 of the 130 m that the aircraft flies on its own.
-    assert 3.0 < circled(laid_for(LoiterRules(at_middle=True, lines_up=True), *lines), 2)[0] < 4.5
-    assert circled(laid_for(LoiterRules(at_middle=True), *lines), 2)[0] > 14.0
+    assert 3.0 < circled(laid_for(LoiterRules(steers_to_center=True, exits_on_heading=True), *lines), 2)[0] < 4.5
+    assert circled(laid_for(LoiterRules(steers_to_center=True), *lines), 2)[0] > 14.0
 
 
 def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> None:
@@ -295,7 +295,7 @@ def test_a_radius_is_what_the_autopilot_reads_of_it_and_grows_with_height() -> N
         radius=60.0,
         radius_name="WP_LOITER_RAD",
         radius_of=lambda one: 0.0 if one.seconds else 200.0,
-        growth=lambda up: 1.0 + up / 1000.0,
+        radius_scale=lambda up: 1.0 + up / 1000.0,
     )
     unread = "its radius of 150 m is not read: flown with WP_LOITER_RAD, 60 m"
     # 100 m above home's 300 m: 1.4 times as wide.

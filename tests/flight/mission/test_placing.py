@@ -37,10 +37,10 @@ def rally(east: float, north: float, alt: float, frame: int) -> str:
 def test_a_return_has_home_and_the_rally_points_at_their_heights() -> None:
     # Over home at 300 m, above the sea, and above the ground at 250 m.
     points = (rally(900, 0, 120, 3), rally(0, 1800, 420, 0), rally(900, 900, 70, 10))
-    found = placed(wp(0, 500), wp(0, 900), RTL, *points, terrain=ground(250.0)).return_places
+    found = placed(wp(0, 500), wp(0, 900), RTL, *points, terrain=ground(250.0)).return_points
     flat = [(round(place.east), round(place.north), place.up, place.base) for place in found]
     assert flat == [(0, 0, 300.0, 0.0), (900, 0, 420.0, 300.0), (0, 1800, 420.0, 0.0), (900, 900, 320.0, 0.0)]
-    assert placed(wp(0, 500), wp(0, 900), *points, terrain=ground(250.0)).return_places == ()
+    assert placed(wp(0, 500), wp(0, 900), *points, terrain=ground(250.0)).return_points == ()
 
 
 def test_a_rally_point_beyond_the_map_or_the_heights_is_named() -> None:

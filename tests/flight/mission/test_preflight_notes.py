@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Mission
-from flight.mission.preflight_notes import field_notes
+from flight.mission.preflight_notes import preflight_notes
 from flight.mission.return_path import USUAL_RULES, ReturnRules
 from logs.verdict.findings import NOT_FLOWN
 from logs.verdict.rules.mission_rule import mission_findings
@@ -16,7 +16,7 @@ from tests.mission_lines import ORIGIN, setup_of, wp
 from world.airfield import LandingStrip, Launch
 from world.frames import to_geo
 from world.scenario import Scenario
-from world.terrain import Terrain, gridded
+from world.terrain import Terrain, gridded_terrain
 from world.wind import Wind
 
 # To the north from home, at 100 m AMSL like all ground here, and landed on course 090.
@@ -39,7 +39,7 @@ def notes(
     setup = setup_of(*lines, home=home)
     changes |= {} if ground is None else {"terrain": ground}
     scenario: Scenario = replace(setup.scenario, **changes)
-    found = field_notes(setup.mission, setup.route, scenario, rules, parameters or {})
+    found = preflight_notes(setup.mission, setup.route, scenario, rules, parameters or {})
     return [one for one in found if ": lands on " not in one]
 
 
@@ -47,7 +47,7 @@ def landed_on(ground: Terrain | None, wind: Wind, landing: LandingStrip | None =
     """The notes on where `WAY` lands."""
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     scenario = replace(setup.scenario, terrain=ground, wind=wind, landing=landing)
-    found = field_notes(setup.mission, setup.route, scenario, USUAL_RULES, {})
+    found = preflight_notes(setup.mission, setup.route, scenario, USUAL_RULES, {})
     return [one for one in found if ": lands on " in one]
 
 
@@ -55,7 +55,7 @@ def sloped(east: float, north: float) -> Terrain:
     """Ground that rises by so much to the east and to the north, m per m, from 100 m at the landing point."""
     axis = np.arange(-6000.0, 6001.0, 50.0)
     heights = 100.0 + east * (axis[None, :] - 2500.0) + north * (axis[:, None] - 2000.0)
-    return gridded(heights, axis, axis, source="slope", sha256="", datum="mean sea level")
+    return gridded_terrain(heights, axis, axis, source="slope", sha256="", datum="mean sea level")
 
 
 def test_a_mission_in_the_air_has_none() -> None:
@@ -115,7 +115,7 @@ def test_home_far_from_the_launch(north: float, told: bool) -> None:
     assert notes(*WAY, home=_home(0.0, north)) == []
     setup = setup_of(*WAY, home=_home(0.0, north))
     scenario = replace(setup.scenario, home=np.array([0.0, 0.0, 100.0]))
-    said = [one for one in field_notes(setup.mission, setup.route, scenario, ReturnRules(), {}) if "home" in one]
+    said = [one for one in preflight_notes(setup.mission, setup.route, scenario, ReturnRules(), {}) if "home" in one]
     assert bool(said) is told
     assert all(one.startswith("the mission's home is 51 m from the scenario's") for one in said)
 
@@ -152,7 +152,7 @@ def hill(north: float, top: float) -> Terrain:
     axis = np.arange(-6000.0, 6001.0, 50.0)
     heights = np.full((axis.size, axis.size), 100.0)
     heights[np.ix_(np.abs(axis - north) < 60.0, np.abs(axis) < 60.0)] = top
-    return gridded(heights, axis, axis, source="hill", sha256="", datum="mean sea level")
+    return gridded_terrain(heights, axis, axis, source="hill", sha256="", datum="mean sea level")
 
 
 @pytest.mark.parametrize(("north", "top", "told"), [(200.0, 179.0, False), (200.0, 181.0, True), (450.0, 181.0, False)])
@@ -175,5 +175,5 @@ def test_a_landing_sequence_that_does_not_arm(value: float | None, told: bool) -
 def test_a_mission_without_home_has_no_return_to_speak_of() -> None:
     setup = setup_of(*WAY)
     nowhere = Mission(None, setup.mission.items)
-    found = field_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {})
+    found = preflight_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {})
     assert [one for one in found if ": lands on " not in one] == []

@@ -11,19 +11,19 @@ from flight.mission.loiter_circles import RoutePoint
 from flight.mission.return_path import (
     USUAL_RULES,
     ReturnAbility,
-    ReturnPlace,
+    ReturnPoint,
     ReturnRules,
     ReturnTarget,
     choose_target,
-    described_return,
-    lay_return,
+    rtl_note,
+    rtl_waypoints,
 )
 from flight.mission.route import RouteRules, make_route
 from tests.mission_lines import ORIGIN, mission, refusal, route, wp
 from world.frames import to_geo
 
-HOME = ReturnPlace(0.0, 0.0, 300.0)
-RALLY = [ReturnPlace(0.0, 4000.0, 400.0, 300.0), ReturnPlace(3000.0, 6000.0, 500.0)]
+HOME = ReturnPoint(0.0, 0.0, 300.0)
+RALLY = [ReturnPoint(0.0, 4000.0, 400.0, 300.0), ReturnPoint(3000.0, 6000.0, 500.0)]
 STOP = ItineraryStop(7, int(Command.NAV_RETURN_TO_LAUNCH), 0.0, 0.0, math.nan, 0, 25.0)
 ABLE = ReturnAbility(lambda a, b, up: 100.0, 120.0, 0.1, 0.08, math.radians(30.0), 25.0)
 
@@ -70,23 +70,23 @@ def test_the_height_of_a_rally_point_may_be_counted_from_the_sea_for_the_slope()
 
 def test_why_it_goes_there_is_said() -> None:
     far = choose_target(ReturnRules(rally_limit=1900.0), (0.0, 6000.0, 900.0), HOME, RALLY)
-    assert described_return(far, ReturnRules(), 900.0) == (
+    assert rtl_note(far, ReturnRules(), 900.0) == (
         "NAV_RETURN_TO_LAUNCH: to home, 6.0 km away (rally point 1, the nearest, is 2.0 km away, beyond RALLY_LIMIT_KM"
         " 1.9), sinking 500 m on a straight slope to 400 m AMSL; circles for 60 s; the mission ends there"
     )
     climb = choose_target(ReturnRules(includes_home=True), (0.0, 1500.0, 380.0), HOME, RALLY)
-    told = described_return(climb, ReturnRules(climb_first=50.0), 380.0)
+    told = rtl_note(climb, ReturnRules(climb_first=50.0), 380.0)
     assert "nearer than rally point 1, which is 2.5 km away (RALLY_INCL_HOME 1)" in told
     first = "banks no more than 5 degrees before it has climbed 50 m, even above that height;"
     assert f"climbing 20 m at once to 400 m AMSL; {first}" in told
-    assert f"sinking 500 m on a straight slope to 400 m AMSL; {first}" in described_return(
+    assert f"sinking 500 m on a straight slope to 400 m AMSL; {first}" in rtl_note(
         climb, ReturnRules(climb_first=50.0), 900.0
     )
-    assert "before it has climbed 20 m" in described_return(climb, ReturnRules(climb_first=math.inf), 380.0)
-    assert "banks" not in described_return(far, ReturnRules(climb_first=math.inf), 900.0)
+    assert "before it has climbed 20 m" in rtl_note(climb, ReturnRules(climb_first=math.inf), 380.0)
+    assert "banks" not in rtl_note(far, ReturnRules(climb_first=math.inf), 900.0)
     # At its height already, give or take what a height is known to: how long it banks little is anybody's guess.
     for up in (399.6, 400.0, 400.4):
-        level = described_return(climb, ReturnRules(climb_first=math.inf), up)
+        level = rtl_note(climb, ReturnRules(climb_first=math.inf), up)
         assert "at 400 m AMSL; banks no more than 5 degrees until it is above that height;" in level
 
 
@@ -104,7 +104,7 @@ def laid(
         RoutePoint(STOP, (0.0, 0.0, 500.0)),
     ]
     there = ReturnTarget(target, "home", "", math.hypot(*target[:2]), base)
-    points = lay_return(before, STOP, there, rules, ABLE)
+    points = rtl_waypoints(before, STOP, there, rules, ABLE)
     return np.array([(0.0, 0.0, 500.0), *(p.position for p in points)]), np.array([0.0, *(p.arc for p in points)])
 
 
@@ -228,12 +228,12 @@ def test_a_small_fall_is_a_step_at_once() -> None:
     down = way[(arcs == 0.0) & (way[:, 2] == 486.0)][0]
     assert down[1] == pytest.approx(14.0 / 0.08, abs=20.0)
     # What counts is the slope that is drawn.
-    lower = ReturnRules(least_slope=10.0)
+    lower = ReturnRules(min_slope_height=10.0)
     for up, rules, base in ((484.0, USUAL_RULES, 0.0), (486.0, lower, 0.0), (486.0, USUAL_RULES, 5.0)):
         slope, _ = laid(0.0, (0.0, 8000.0, up), rules, base)
         assert not ((slope[:, 1] < 7000.0) & (slope[:, 2] < up + 2.0)).any()
     step = choose_target(ReturnRules(), (0.0, 6000.0, 414.0), HOME, [])
-    assert "sinking 14 m at once to 400 m AMSL" in described_return(step, ReturnRules(), 414.0)
+    assert "sinking 14 m at once to 400 m AMSL" in rtl_note(step, ReturnRules(), 414.0)
 
 
 # ----------------------------------------------------------------------
@@ -286,14 +286,14 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     rules = ReturnRules(holds_height=True)
     begin = [RoutePoint(STOP, (0.0, 9000.0, 900.0)), RoutePoint(STOP, (0.0, 8000.0, 900.0))]
     target = choose_target(rules, begin[-1].position, HOME, ())
-    ups = [point.position[2] for point in lay_return(begin, STOP, target, rules, ABLE)]
+    ups = [point.position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
     # Level until the circle about home, down to 100 m over it there.
     assert (ups[0], ups[-1]) == (900.0, 400.0)
-    assert described_return(target, rules, 900.0).startswith(
+    assert rtl_note(target, rules, 900.0).startswith(
         "NAV_RETURN_TO_LAUNCH: to home, 8.0 km away, level, and sinking 500 m in circles there, to 400 m AMSL; circles"
     )
     low = choose_target(rules, (0.0, 8000.0, 350.0), HOME, ())
-    assert ", climbing 50 m first, to 400 m AMSL" in described_return(low, rules, 350.0)
+    assert ", climbing 50 m first, to 400 m AMSL" in rtl_note(low, rules, 350.0)
 
 
 def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
@@ -303,6 +303,6 @@ def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
     def notes(rules: ReturnRules, *items: str) -> tuple[str, ...]:
         return make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(rules)).notes
 
-    assert told in notes(ReturnRules(landing_counts=True), *lines)
-    assert told not in notes(ReturnRules(landing_counts=True), *lines[:3])
+    assert told in notes(ReturnRules(may_use_landing=True), *lines)
+    assert told not in notes(ReturnRules(may_use_landing=True), *lines[:3])
     assert told not in notes(ReturnRules(), *lines)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flight.mission import surveys as survey_module
 from flight.mission.items import Command, Mission, SurveyPlan
 from flight.mission.route import Route, make_route
-from flight.mission.survey_layout import SurveyLayout, kept_layout, turn_around_of, with_layout
+from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
 from flight.mission.surveys import LineAxis, Survey, camera_spacing, find_surveys, survey_plan
 from tests.mission_lines import ORIGIN, mission, wp
 
@@ -220,7 +220,7 @@ def test_lines_that_bend_are_lines_as_a_whole() -> None:
     assert found.offsets == pytest.approx([0.0, 60.0, 120.0], abs=0.5)
     assert (found.spacing, math.degrees(found.course)) == pytest.approx((60.0, 0.0), abs=0.5)
     assert found.turn_arounds() == [(2, 3), (5, 6)]
-    assert found.ways_onto_lines() == [(0, 0), (2, 3), (5, 6), (8, 8)]
+    assert found.transitions() == [(0, 0), (2, 3), (5, 6), (8, 8)]
 
 
 def test_places_along_and_beside_a_line_that_bends() -> None:
@@ -349,7 +349,7 @@ def places_of(read: Mission) -> np.ndarray:
 def test_turn_arounds_are_laid_out_and_each_line_keeps_its_camera() -> None:
     read, route = with_camera(*grid(count=3))
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert turn_around_of(route, found) == 0.0
+    assert min_turn_around(route, found) == 0.0
     made = with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
     assert made is not None
     assert places_of(made) == pytest.approx(np.array(grid(count=3, lead=100.0)), abs=0.05)
@@ -358,7 +358,7 @@ def test_turn_arounds_are_laid_out_and_each_line_keeps_its_camera() -> None:
     assert [item.seq for item in made.items] == list(range(1, 19))
     again = make_route(made, ORIGIN, None, 15.0, False)
     [laid] = find_surveys(again, camera_spacing(made, again))
-    assert turn_around_of(again, laid) == pytest.approx(100.0, abs=0.1)
+    assert min_turn_around(again, laid) == pytest.approx(100.0, abs=0.1)
     # From there to another: the old turn-arounds are gone.
     longer = with_layout(made, again, laid, SurveyLayout(150.0), ORIGIN)
     assert longer is not None
@@ -379,7 +379,7 @@ def test_a_longer_lead_onto_the_first_line() -> None:
         (6, 7, 5, 8),
         (10, 11, 9, 12),
     ]
-    assert turn_around_of(again, laid) == pytest.approx(100.0, abs=0.1)
+    assert min_turn_around(again, laid) == pytest.approx(100.0, abs=0.1)
     # A shorter one is none.
     same = with_layout(read, route, found, SurveyLayout(100.0, lead_in=60.0), ORIGIN)
     assert same == with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
@@ -463,7 +463,7 @@ def test_why_a_layout_is_kept(place: int, line: str, why: str) -> None:
     # The route of the plain grid, with the items of this mission: an endless loiter would end it.
     items = [item.seq for item in read.items if item.command == 16]
     route = replace(route, items=np.array(items))
-    assert kept_layout(read, route, found) == why
+    assert layout_obstacle(read, route, found) == why
 
 
 def test_a_line_with_a_waypoint_of_another_kind_on_it_is_kept() -> None:
@@ -473,7 +473,7 @@ def test_a_line_with_a_waypoint_of_another_kind_on_it_is_kept() -> None:
     read = mission(*items, home="36.5 -84.2 0")
     route = make_route(read, ORIGIN, None, 15.0, False)
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert kept_layout(read, route, found) == "item 5, NAV_SPLINE_WAYPOINT, lies on a line"
+    assert layout_obstacle(read, route, found) == "item 5, NAV_SPLINE_WAYPOINT, lies on a line"
 
 
 def test_a_take_off_where_the_first_line_begins_stays_before_it() -> None:
@@ -507,7 +507,7 @@ def test_leads_of_the_first_line_and_the_last_go_though_another_has_none() -> No
     read = mission(*lines, home="36.5 -84.2 0")
     route = make_route(read, ORIGIN, None, 15.0, False)
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert turn_around_of(route, found) == 0.0
+    assert min_turn_around(route, found) == 0.0
     made = with_layout(read, route, found, SurveyLayout(100.0), ORIGIN)
     assert made is not None
     assert places_of(made) == pytest.approx(np.array(grid(count=3, lead=100.0)), abs=0.05)
@@ -531,4 +531,4 @@ def test_a_mission_that_jumps_keeps_its_layout() -> None:
     assert Command.DO_JUMP in {item.command for item in read.items}
     found = find_surveys(route, camera_spacing(read, route))
     assert with_layout(read, route, found[0], SurveyLayout(50.0), ORIGIN) is None
-    assert kept_layout(read, route, found[0]) == "the mission jumps"
+    assert layout_obstacle(read, route, found[0]) == "the mission jumps"

@@ -2,7 +2,7 @@
 
 import random
 
-from flight.mission.fences import numbered
+from flight.mission.fences import number_items
 from flight.mission.items import Home, Mission, MissionItem, on_grid
 
 
@@ -18,4 +18,4 @@ def some_mission(count: int, seed: int = 1) -> Mission:
     fences = [MissionItem(0, 5002, 0, (4.0, 0.0, 0.0, 0.0), item.lat_deg, item.lon_deg, 0.0) for item in items[:4]]
     fences += [MissionItem(0, 5004, 0, (250.5, 0.0, 0.0, 0.0), item.lat_deg, item.lon_deg, 0.0) for item in items[4:9]]
     rally = [MissionItem(0, 5100, 3, (0.0,) * 4, item.lat_deg, item.lon_deg, 100.0) for item in items[9:12]]
-    return Mission(Home(place[0], place[1], 300.0), tuple(items), numbered(fences), numbered(rally))
+    return Mission(Home(place[0], place[1], 300.0), tuple(items), number_items(fences), number_items(rally))

@@ -80,7 +80,7 @@ def make_workspace() -> Workspace:
         for name in field_names(factors.dtype):
             factors[name] = 1.0
     work.timing.dt = 1.0 / 60.0
-    work.settings.slowest, work.settings.navigation_time, work.settings.battery = 14.0, 1.0, math.inf
+    work.settings.min_airspeed, work.settings.navigation_time, work.settings.battery = 14.0, 1.0, math.inf
     work.memory.max_bank, work.memory.last_airspeed = 0.5, -1.0
     work.air.ground = GROUND
     return space

@@ -24,7 +24,7 @@ NOTHING = Mission(None, ())
 class Gliding(Airborne):
     """Nobody steers it."""
 
-    def _fly(self, count: int) -> int:
+    def _fly_ticks(self, count: int) -> int:
         return 0
 
 

@@ -16,7 +16,7 @@ import pytest
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import BANK_RESERVE, Flight, fly_to_end, make_loop, simulate, track_of
+from flight.simulation.simulate import BANK_RESERVE, Flight, fly_to_end, join_blocks, make_loop, simulate
 from flight.simulation.tick import OUTPUT, READ_FIELDS, Workspace
 from flight.simulation.track import COLUMNS, Track
 from tests.flight.simulation.hand_made import make_workspace
@@ -216,7 +216,7 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
     assert fly(6) != first
     flight = Flight(setup(5), aerosonde)
     blocks = list(simulate(flight))
-    assert _digest(track_of(blocks)) == first
+    assert _digest(join_blocks(blocks)) == first
     # A second of flight each, up to the end of the path.
     assert {len(block.rows) for block in blocks[:-1]} == {60}
     assert [block.ended for block in blocks] == [""] * (len(blocks) - 1) + ["completed"]

@@ -231,7 +231,7 @@ def ended(memory: Record, away: float, up: float, ticks: int = 1, turning: float
         motion.east = away * math.sin(math.radians(turning * k))
         motion.north = away * math.cos(math.radians(turning * k))
         end_return(motion, b, memory, 1.0)
-    return bool(memory.done)
+    return bool(memory.is_finished)
 
 
 def fresh() -> Record:
@@ -253,13 +253,13 @@ def test_a_mission_that_ends_in_a_circle_ends_once_its_course_has_turned_once_an
     for turning in (10.1, -10.1):
         motion, memory = np.zeros(1, MOTION)[0], fresh()
         for second in range(46):
-            assert not memory.done, second
+            assert not memory.is_finished, second
             motion.velocity_east = 25.0 * math.sin(math.radians(170.0 + turning * second))
             motion.velocity_north = 25.0 * math.cos(math.radians(170.0 + turning * second))
             end_around(motion, memory, 1.0)
         # 450 degrees at 10.1 a second, from the second in which it came there.
-        assert memory.done
-        assert memory.returning
+        assert memory.is_finished
+        assert memory.is_in_rtl
 
 
 def test_a_return_ends_no_sooner_than_it_was_all_around_its_circle() -> None:
@@ -279,13 +279,13 @@ def test_a_return_has_no_cross_track_error_because_it_follows_no_line() -> None:
     memory.cross_track = 155.0
     ended(memory, 5000.0, 400.0, 1)
     assert math.isnan(memory.cross_track)
-    assert memory.returning
+    assert memory.is_in_rtl
 
 
 def test_a_return_does_not_miss_the_end_of_a_path_that_it_need_not_follow() -> None:
     for returning, status in ((False, END_MISSED_ROUTE), (True, COMPLETED)):
         space = make_workspace()
-        space.record.memory.returning = returning
+        space.record.memory.is_in_rtl = returning
         read(space, north=LENGTH + 0.01, east=300.0, up=HEIGHT + 300.0)
         assert planfly_tick(space.block, level_ground()) == status
 
@@ -414,7 +414,7 @@ def test_where_true_north_is_the_maps_east_all_is_turned() -> None:
 
 def test_a_flight_goes_on_across_the_180th_meridian() -> None:
     space = make_workspace()
-    space.record.settings.middle = math.pi
+    space.record.settings.center_longitude = math.pi
     read(space, longitude=-math.pi + 1e-4)
     planfly_tick(space.block, level_ground(math.nan))
     assert space.rows[0].position[0] == pytest.approx(RADIUS * (math.pi + 1e-4))

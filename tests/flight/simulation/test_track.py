@@ -29,7 +29,7 @@ from flight.simulation.track import (
     control_limits,
     held_at_limit,
     join_tracks,
-    quantised,
+    quantise,
     track_columns,
     track_rows,
 )
@@ -47,7 +47,7 @@ def _rows() -> Rows:
 
 def test_each_column_is_rounded_to_its_step_and_time_is_not() -> None:
     rows = _rows()
-    kept = quantised(rows)
+    kept = quantise(rows)
     assert (kept["time"] == rows["time"]).all()
     for name in list(COLUMNS)[1:]:
         step = 2.0 ** -DIGITS.get(name, 0)
@@ -60,8 +60,8 @@ def test_each_column_is_rounded_to_its_step_and_time_is_not() -> None:
 
 
 def test_once_is_enough_and_a_track_holds_it_exactly() -> None:
-    kept = quantised(_rows())
-    assert quantised(kept).tobytes() == kept.tobytes()
+    kept = quantise(_rows())
+    assert quantise(kept).tobytes() == kept.tobytes()
     # Columns that are float32 in a track are too small here to lose a digit.
     again = track_rows(as_track(kept))
     for name in COLUMNS:

@@ -11,7 +11,7 @@ from planfly.campaigns.dispersions import (
     QUANTITIES,
     QUANTITY_BY_NAME,
     SpreadError,
-    Varying,
+    VaryingQuantity,
     default_dispersions,
     parse_dispersions,
     read_dispersions,
@@ -48,7 +48,7 @@ def test_values_are_the_distributions_own() -> None:
 
 
 def test_what_lies_beyond_the_range_is_never_drawn() -> None:
-    wide = Varying(QUANTITY_BY_NAME["mass"], "norm", (("loc", 1.0), ("scale", 0.2)), "by hand")
+    wide = VaryingQuantity(QUANTITY_BY_NAME["mass"], "norm", (("loc", 1.0), ("scale", 0.2)), "by hand")
     values = [wide.value(share) for share in np.linspace(0.0, 1.0, 201)]
     assert min(values) == pytest.approx(0.5)
     assert max(values) == pytest.approx(2.0)

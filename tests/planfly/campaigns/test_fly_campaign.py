@@ -22,7 +22,7 @@ from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from planfly.campaigns.fly_campaign import (
     _FlightTally,
     _fly_remaining,
-    _Pace,
+    _ProgressReport,
     fly_campaign,
     open_store,
     resumed_goal,
@@ -101,7 +101,7 @@ def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_p
     goal, told = Goal(None, False, 6), list[tuple[float, float, str]]()
     estimator = Estimator(goal)
     book = _FlightTally(estimator, goal)
-    pace = _Pace(goal, estimator, book.tally, lambda *said: told.append(said))
+    pace = _ProgressReport(goal, estimator, book.tally, lambda *said: told.append(said))
     with open_store(base, goal, tmp_path, resume=False) as store:
         _fly_remaining(cast("WorkerPool", AtOnce()), book, store, pace)
     # How many there are is said before the first; they were quicker than another line is due.

@@ -128,5 +128,5 @@ def test_arduplane_returns_as_its_law_does(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     found = planfly.returns("hill.waypoints", scenario="hill.toml", every=10, sitl=need_arduplane(), points=2)
     assert found.by_program is not None
-    assert found.by_program.pairs[0].law.kind == "ground"
+    assert found.by_program.pairs[0].simulated.kind == "ground"
     assert all(one.agrees for one in found.by_program.pairs), found.program_lines

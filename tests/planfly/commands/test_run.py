@@ -97,7 +97,7 @@ def test_the_verdict_file_has_findings_of_every_rule(demo: Path) -> None:
 
 def test_the_demo_is_flown_from_the_ground_to_the_ground_and_comes_home(demo: Path) -> None:
     log = read_log(demo / "flight.mcap")
-    ways = log.setup.ground_ways
+    ways = log.setup.ground_phases
     assert ways.take_off is not None
     assert ways.approach is not None
     assert log.track.clearance[0] < 5.0

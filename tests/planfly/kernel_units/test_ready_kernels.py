@@ -16,7 +16,7 @@ from planfly.kernel_units.unit_kernels import (
     UNIT_KERNELS,
     list_unit_kernels,
 )
-from world.compile_events import kernel_is_compiled
+from world.compile_events import announce_compilation
 from world.kernels import compiled
 
 ROOT = Path(__file__).parents[3]
@@ -61,7 +61,7 @@ def test_kernels_are_told_once_as_soon_as_they_are_ready(monkeypatch: pytest.Mon
 
     def work() -> None:
         for name in ("first", "second", "third"):
-            kernel_is_compiled()
+            announce_compilation()
             ready.add(name)
             told.append(name)
 

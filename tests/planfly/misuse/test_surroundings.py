@@ -21,7 +21,7 @@ from tests.planfly.conftest import FIELD
 from tests.soak import SOAK
 from tests.soak.test_hostile_files import WPL
 from world.errors import PlanflyError
-from world.files import hold, write_whole
+from world.files import lock_path, write_whole
 
 ROOT = Path(__file__).parents[3]
 Done: TypeAlias = subprocess.CompletedProcess
@@ -220,13 +220,13 @@ def test_a_pipe_that_nobody_writes_into_is_not_waited_for(
 def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The second is refused while the first writes; afterwards the folder is free."""
     (folder / "out").mkdir()
-    with hold(folder / "out"):
+    with lock_path(folder / "out"):
         assert main(["run", "tight", "--out", "out"]) == 2
     assert capsys.readouterr().err.endswith(
         "planfly: out: another planfly process is writing there; name another target\n"
     )
     assert list((folder / "out").iterdir()) == []
-    with hold(folder / "out"):
+    with lock_path(folder / "out"):
         pass
 
 

@@ -81,7 +81,7 @@ def gated(folder: Path) -> Iterator[tuple[OriginGate, list[str]]]:
     with socket.create_server(("127.0.0.1", 0)) as behind:
         threading.Thread(target=serve, daemon=True).start()
         gate = OriginGate(0, VIEWERS, refused.append)
-        gate.open(behind.getsockname()[1], certificate)
+        gate.start_forwarding(behind.getsockname()[1], certificate)
         try:
             yield gate, refused
         finally:

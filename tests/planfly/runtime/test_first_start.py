@@ -15,7 +15,7 @@ from planfly.runtime.first_start import warm_up
 from planfly.runtime.stages import send_progress_to
 from planfly.terminal.output import ON_STANDARD_ERROR, SILENT
 from tests.soak import some
-from world.compile_events import kernel_is_compiled
+from world.compile_events import announce_compilation
 
 ROOT = Path(__file__).parents[3]
 CODE = """
@@ -54,25 +54,25 @@ def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], caps
         assert capsys.readouterr().err == ""
         assert numba.njit(lambda a: a + 1)(1) == 2
         begun, done = capsys.readouterr().err.splitlines()
-        kernel_is_compiled()
+        announce_compilation()
     assert begun == f"{SAID} ... (0 of {whole}, no estimate yet)"
     assert done.startswith(f"{SAID}: done in ")
     assert done.endswith(f" s: 2 of {whole}")
     assert capsys.readouterr().err == ""
     # What this process has shared out it does not share out again.
     with warm_up("scores", "flight"):
-        kernel_is_compiled()
+        announce_compilation()
     with warm_up("scores"):
-        kernel_is_compiled()
+        announce_compilation()
     assert shared == [["scores", "paper"], ["flight"]]
 
 
 def test_nothing_is_said_in_silence(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     with send_progress_to(SILENT), warm_up("scores"):
-        kernel_is_compiled()
+        announce_compilation()
     assert shared == [["scores"]]
     with send_progress_to(SILENT), warm_up():
-        kernel_is_compiled()
+        announce_compilation()
     assert capsys.readouterr().err == ""
 
 
@@ -87,7 +87,7 @@ def test_a_cache_that_cannot_be_written_is_named(
     folder = Path("/proc/none/kernels")
     monkeypatch.setattr("world.kernels.cache_folder", lambda: folder)
     with send_progress_to(ON_STANDARD_ERROR), warm_up("scores"):
-        kernel_is_compiled()
+        announce_compilation()
     said = f"compiling the numeric kernels: {folder} cannot be written, so they are not stored; {WAY_OUT}\n"
     assert (capsys.readouterr().err, shared) == (said, [])
 

@@ -34,7 +34,7 @@ def test_items_that_have_other_numbers_are_the_same() -> None:
     """Before all but the first leg a waypoint is inserted: all numbers are others, and nothing else has changed."""
     session = drawn_session(8, 8)
     before = figures_of(session)
-    own = edits.places(session.mission)
+    own = edits.movable_indices(session.mission)
     (east, north, _), (far, further, _) = session.item_position(own[0]), session.item_position(own[1])
     assert [one.place for one in before.results.values() if one.ok is False] == [
         "item 6",
@@ -49,7 +49,7 @@ def test_items_that_have_other_numbers_are_the_same() -> None:
         "leg 2\u20133: slope -\u00b0, fails now",
         "the former leg 1\u20132: slope -\u00b0, is gone",
     ]
-    session.edit(messages.Delete(kind="delete", rev=session.rev, ks=[edits.places(session.mission)[1]]))
+    session.edit(messages.Delete(kind="delete", rev=session.rev, ks=[edits.movable_indices(session.mission)[1]]))
     assert [re.sub(r"-[\d.]+", "-", line) for line in describe_changes(inserted, figures_of(session))] == [
         "leg 1\u20132: slope -\u00b0, fails now",
         "the former leg 1\u20132: slope -\u00b0, is gone",

@@ -51,14 +51,14 @@ def changed(session: Session, k: int, how: str, rng: np.random.Generator) -> tup
     lat, lon = session.context.to_geographic(*(np.array([east, north]) + rng.normal(0.0, 150.0, 2)).tolist())
     match how:
         case "up":
-            return edits.raised(session.mission, [k], float(rng.normal(0.0, 60.0))), k
+            return edits.raise_items(session.mission, [k], float(rng.normal(0.0, 60.0))), k
         case "insert":
-            return edits.inserted(session.mission, k, lat, lon), edits.next_index(session.mission, k)
+            return edits.insert_waypoint(session.mission, k, lat, lon), edits.insertion_index(session.mission, k)
         case "delete":
-            mission = edits.deleted(session.mission, k)
-            return mission, min(edits.places(mission), key=lambda one: abs(one - k))
+            mission = edits.delete_item(session.mission, k)
+            return mission, min(edits.movable_indices(mission), key=lambda one: abs(one - k))
         case _:
-            return edits.moved(session.mission, k, lat, lon), k
+            return edits.move_item(session.mission, k, lat, lon), k
 
 
 def test_windows_say_what_the_whole_says() -> None:
@@ -68,7 +68,7 @@ def test_windows_say_what_the_whole_says() -> None:
         rng = np.random.default_rng(10_000 + seed)
         how = ("move", "up", "insert", "move", "delete")[seed % 5]
         try:
-            mission, k = changed(session, int(rng.choice(edits.places(session.mission))), how, rng)
+            mission, k = changed(session, int(rng.choice(edits.movable_indices(session.mission))), how, rng)
             found = judge_windows(session.context, mission, k, session.judged.setup)
             whole = by_place(place_findings(route_requirements(session.context.setup(mission))))
         except MissionError:
@@ -116,9 +116,9 @@ def test_windows_violate_the_zones_that_the_whole_does() -> None:
     zones = [Zone(str(k), "exclusion", Cylinder(x, y, 120.0)) for k, (x, y) in enumerate(places)]
     zones.append(Zone("stay", "inclusion", Cylinder(0.0, 0.0, 0.7 * east)))
     context = replace(session.context, scenario=replace(session.context.scenario, zones=tuple(zones)))
-    for k in edits.places(session.mission)[::8]:
+    for k in edits.movable_indices(session.mission)[::8]:
         x, y = places[min(range(ZONES), key=lambda one: math.dist(places[one], session.item_position(k)[:2]))]
-        mission = edits.moved(session.mission, k, *context.to_geographic(x, y))
+        mission = edits.move_item(session.mission, k, *context.to_geographic(x, y))
         _, windows = judge_windows(context, mission, k)
         whole = route_requirements(context.setup(mission))
         legs, again = fenced(whole, place_findings(whole), 0)
@@ -139,7 +139,7 @@ def test_a_moved_route_is_the_one_that_is_laid() -> None:
         setup, context = session.judged.setup, session.context
         for how in ("move", "up", "move"):
             try:
-                mission, _ = changed(session, int(rng.choice(edits.places(session.mission))), how, rng)
+                mission, _ = changed(session, int(rng.choice(edits.movable_indices(session.mission))), how, rng)
                 laid = context.route(mission)
             except MissionError:
                 continue
@@ -155,13 +155,13 @@ def test_a_moved_route_is_the_one_that_is_laid() -> None:
 def test_what_a_move_may_change_elsewhere_has_the_route_laid_anew() -> None:
     session = drawn_session(11, 12, jumps=False)
     context, mission, setup = session.context, session.mission, session.judged.setup
-    own = edits.places(mission)
+    own = edits.movable_indices(mission)
     circles = {k for k in own if mission.items[k].command != Command.NAV_WAYPOINT}
     beside = next(a for a, b in pairwise(own) if a not in circles and b in circles)
     free = next(b for a, b, c in zip(own, own[1:], own[2:], strict=False) if not circles & {a, b, c})
 
     def made(k: int, place: MissionItem, north: float = 0.0) -> Route | None:
-        after = edits.moved(mission, k, place.lat_deg + north, place.lon_deg)
+        after = edits.move_item(mission, k, place.lat_deg + north, place.lon_deg)
         return update_moved_route(setup.route, mission, after, context.scenario, context.airframe)
 
     assert made(free, mission.items[free], 0.001) is not None
@@ -173,9 +173,9 @@ def test_what_a_move_may_change_elsewhere_has_the_route_laid_anew() -> None:
 
 def test_a_move_is_seen_where_it_matters() -> None:
     session = drawn_session(11, 60)
-    k = edits.places(session.mission)[40]
+    k = edits.movable_indices(session.mission)[40]
     east, north, _ = session.item_position(k)
-    mission = edits.moved(session.mission, k, *session.context.to_geographic(east + 400.0, north))
+    mission = edits.move_item(session.mission, k, *session.context.to_geographic(east + 400.0, north))
     found = judge_windows(session.context, mission, k)
     assert found[1][0].last - found[1][0].first < found[0].legs
     before = by_place(session.judged.verdict.findings)

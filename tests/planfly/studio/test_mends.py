@@ -129,7 +129,7 @@ def test_an_edited_plan_keeps_its_ways_to_the_ground_while_the_legs_next_to_them
     base = read_plan(file)
     assert base.ways is not None
     session, _ = open_session(str(file), MissionOptions())
-    places = edits.places(session.mission)
+    places = edits.movable_indices(session.mission)
     first = next(
         n
         for n, k in enumerate(places)
@@ -283,7 +283,7 @@ def test_the_zones_of_a_named_fence_stand_in_the_next_world(tmp_path: Path) -> N
         open_dropped("m.waypoints", mission_text(mission, "waypoints").encode(), world), world
     )
     assert len(session.context.scenario.zones) == 1
-    k = edits.places(session.mission)[-1]
+    k = edits.movable_indices(session.mission)[-1]
     east, north, _ = session.item_position(k)
     before = session.world_rev
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 2500.0, north=north))

@@ -29,7 +29,7 @@ EDITS = scaled(1000, 12)
 def draw_edit(session: Session, rng: np.random.Generator) -> None:
     """One edit at random, or an undo or a redo; one that no mission may have is refused and changes nothing."""
     kind = rng.choice(["move", "up", "insert", "delete", "raise", "undo", "redo", "apply"])
-    k = int(rng.choice(edits.places(session.mission)))
+    k = int(rng.choice(edits.movable_indices(session.mission)))
     east, north, up = session.item_position(k)
     east, north = (float(np.clip(v + rng.normal(0.0, 200.0), -9000.0, 9000.0)) for v in (east, north))
     rev = session.rev
@@ -81,7 +81,7 @@ def test_edits_and_undos_come_to_the_verdict_of_the_api(tmp_path: Path) -> None:
 def test_undo_goes_back_to_the_first_mission_itself() -> None:
     session = drawn_session(5, 12)
     first, verdict = session.mission, session.judged.verdict
-    k = edits.places(first)[2]
+    k = edits.movable_indices(first)[2]
     for step in range(3):
         session.edit(messages.Move(kind="move", rev=session.rev, k=k, up=900.0 + step))
     for _ in range(4):
@@ -95,7 +95,7 @@ def test_undo_goes_back_to_the_first_mission_itself() -> None:
 
 def test_an_edit_of_an_older_sheet_is_refused() -> None:
     session = drawn_session(5, 12)
-    k, rev = edits.places(session.mission)[2], session.rev
+    k, rev = edits.movable_indices(session.mission)[2], session.rev
     session.edit(messages.Move(kind="move", rev=rev, k=k, up=900.0))
     with pytest.raises(StaleEdit):
         session.edit(messages.Delete(kind="delete", rev=rev, ks=[k]))
@@ -105,7 +105,7 @@ def test_an_edit_of_an_older_sheet_is_refused() -> None:
 
 def test_a_preview_changes_nothing_and_is_what_the_move_comes_to() -> None:
     session = drawn_session(6, 14)
-    k, before = edits.places(session.mission)[5], session.mission
+    k, before = edits.movable_indices(session.mission)[5], session.mission
     east, north, _ = session.item_position(k)
     asked = messages.Drag(kind="drag", rev=session.rev, n=1, k=k, east=east + 300.0, north=north, whole=True)
     shown = session.preview(asked)["sheet"]
@@ -127,7 +127,7 @@ def test_an_unmoved_mission_saved_is_the_file(name: str) -> None:
 
 def test_a_moved_mission_saved_is_read_as_it_is() -> None:
     session = drawn_session(7, 14)
-    k = edits.places(session.mission)[3]
+    k = edits.movable_indices(session.mission)[3]
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=100.0, north=200.0))
     session.save("kml")
     assert session.sheet()["unsaved"] is True
@@ -326,7 +326,7 @@ def test_a_scenario_opens_with_its_straight_line() -> None:
     document = open_document("jacksboro", MissionOptions())
     assert document.to_plan
     session = Session.from_document(document, MissionOptions())
-    assert len(edits.places(session.mission)) == 2
+    assert len(edits.movable_indices(session.mission)) == 2
     assert session.sheet()["verdict"]["state"] == "fail"
 
 
@@ -336,7 +336,7 @@ def test_a_mission_without_a_scenario_takes_its_world_along() -> None:
         "m.waypoints", mission_text(mission, "waypoints").encode(), MissionOptions(terrain="jacksboro")
     )
     session = Session.from_document(document, MissionOptions(terrain="jacksboro"))
-    k = edits.places(session.mission)[-1]
+    k = edits.movable_indices(session.mission)[-1]
     east, north, _ = session.item_position(k)
     world = session.world_rev
     session.edit(messages.Move(kind="move", rev=session.rev, k=k, east=east + 2500.0, north=north))

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from flight.mission.items import Command, Mission
-from flight.mission.survey_layout import turn_around_of
+from flight.mission.survey_layout import min_turn_around
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_requirements import judged_surveys
@@ -29,7 +29,7 @@ Answer = Callable[[float], tuple[bool, dict[str, float]]]
 
 def verdict_of(setup: FlightSetup, answer: Answer) -> Verdict:
     [survey] = judged_surveys(setup)
-    usable, failed = answer(turn_around_of(setup.route, survey))
+    usable, failed = answer(min_turn_around(setup.route, survey))
     findings: list[Finding] = [
         make_finding("survey", Place("leg", line.first), ok=usable, reason="", flown=90.0, limit=95.0, margin=-5.0)
         for line in survey.lines
@@ -49,7 +49,7 @@ class Flights:
     flown: list[float] = field(default_factory=list)
 
     def __call__(self, setup: FlightSetup, *_: Any) -> Any:
-        self.flown.append(round(turn_around_of(setup.route, judged_surveys(setup)[0])))
+        self.flown.append(round(min_turn_around(setup.route, judged_surveys(setup)[0])))
         return SimpleNamespace(setup=setup, flight_verdict=verdict_of(setup, self.answer))
 
 

@@ -138,7 +138,7 @@ def test_a_flight_that_was_over_is_said_to_be(tmp_path: Path) -> None:
     path = tmp_path / "flight.mcap"
     with pytest.raises(KeyboardInterrupt), CrashSafeLog(path, FLOWN.setup) as log:  # noqa: PT012
         log.write(track_rows(FLOWN.track))
-        log.ended = "completed"
+        log.end_reason = "completed"
         raise KeyboardInterrupt
     assert read_log(path).ended == "completed"
 

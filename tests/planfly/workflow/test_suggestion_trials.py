@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flight.mission.edits import places, raised
+from flight.mission.edits import movable_indices, raise_items
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.places import Change, Place, Suggestion
@@ -122,7 +122,7 @@ def test_flights_are_few_and_shared(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
     """And one that leads beyond the ceiling is not offered."""
     context = SESSION.context
-    judged = context.judge(raised(SESSION.mission, places(SESSION.mission), -90.0))
+    judged = context.judge(raise_items(SESSION.mission, movable_indices(SESSION.mission), -90.0))
     [first, *_] = [item for item in judged.verdict.failed if item.rule == "clearance"]
     wrong = replace(first, suggestions=(higher(first.place.index or 0, 9000.0), *first.suggestions))
     findings = tuple(wrong if item is first else item for item in judged.verdict.findings)

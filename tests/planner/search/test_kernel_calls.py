@@ -5,7 +5,7 @@ import pytest
 from planfly.workflow.airframe import load_airframe
 from planner.search.kernel_calls import PARTS, call_kernels
 from planner.search.plan_path import plan_path
-from world.compile_events import tell_before_compiling
+from world.compile_events import notify_before_compiling
 from world.scenario import load_scenario
 
 
@@ -15,7 +15,7 @@ def test_a_plan_compiles_nothing_after_them() -> None:
     for part in PARTS:
         call_kernels(part, scenario, limits)
     compiled: list[None] = []
-    with tell_before_compiling(lambda: compiled.append(None)):
+    with notify_before_compiling(lambda: compiled.append(None)):
         assert plan_path(scenario, limits, seed=1).safe
     assert compiled == []
 

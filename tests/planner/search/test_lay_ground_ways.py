@@ -17,7 +17,7 @@ from tests.setups import spec_around
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario, from_spec
-from world.terrain import Terrain, gridded
+from world.terrain import Terrain, gridded_terrain
 
 Ground = Callable[[Floats, Floats], Floats]
 
@@ -36,7 +36,7 @@ def level(east: Floats, north: Floats) -> Floats:
 def terrain_of(heights: Ground) -> Terrain:
     axis = np.arange(-HALF - 1000.0, HALF + 1000.0 + GRID, GRID)
     made = np.broadcast_to(heights(axis[None, :], axis[:, None]), (axis.size, axis.size))
-    return gridded(np.array(made), axis, axis, source="walls", sha256="", datum="mean sea level")
+    return gridded_terrain(np.array(made), axis, axis, source="walls", sha256="", datum="mean sea level")
 
 
 def scenario_of(heights: Ground = level, **tables: Any) -> Scenario:
@@ -212,7 +212,7 @@ def test_the_final_is_flown_into_the_wind_to_the_ground_below_the_field() -> Non
         assert down is not None
         assert degrees(down.course) == pytest.approx(from_deg, abs=1e-6)
         assert down.point.tolist() == [2000.0, 2500.0, BASE]
-        begin, last = down.line_up
+        begin, last = down.final_waypoints
         assert begin[2] == last[2]
         run = math.dist(last[:2], down.point[:2])
         assert (last[2] - BASE) / run == pytest.approx(down.slope)
@@ -231,7 +231,7 @@ def test_a_stated_final_is_kept_and_one_that_is_too_steep_is_named() -> None:
     down = plan.ways.descent
     assert down is not None
     assert degrees(down.course) == pytest.approx(45.0)
-    assert math.dist(down.line_up[1, :2], down.point[:2]) == pytest.approx(1100.0)
+    assert math.dist(down.final_waypoints[1, :2], down.point[:2]) == pytest.approx(1100.0)
     assert math.degrees(math.atan(down.slope)) == pytest.approx(4.0)
     able = GLIDE_SHARE * math.tan(limits().slopes(math.radians(45.0), BASE, 22.0)[1])
     most = math.degrees(math.atan(able))
@@ -290,7 +290,7 @@ def test_the_go_around_is_higher_over_a_mound_behind_the_field() -> None:
         assert ways.descent is not None
         found.append(ways.descent.go_around)
         # Field and home are at one height; it climbs 30 m over the line-up, in steps of 10 m.
-        up = float(ways.descent.line_up[0, 2]) - BASE
+        up = float(ways.descent.final_waypoints[0, 2]) - BASE
         assert up + 30.0 <= found[0] < up + 40.0
     assert (found[0], found[1]) == (70.0, 80.0)
 

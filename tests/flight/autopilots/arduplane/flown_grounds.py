@@ -64,8 +64,8 @@ class Flown:
     @property
     def approach(self) -> Approach:
         """The landing that was to be flown."""
-        assert self.setup.ground_ways.approach is not None
-        return self.setup.ground_ways.approach
+        assert self.setup.ground_phases.approach is not None
+        return self.setup.ground_phases.approach
 
 
 def make_ground_setup(scenario: Scenario, mission: Mission, **parameters: float) -> FlightSetup:

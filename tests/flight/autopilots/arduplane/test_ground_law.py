@@ -74,12 +74,12 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     flown, real = fly_kept(flight), kept(flight, "landing")
     approach, track = flown.approach, flown.track
     glide = flown.setup.autopilot.landing_glide(
-        approach.begin - approach.point[2], approach.run, approach.tail_wind, float(approach.point[2])
+        approach.start_altitude - approach.point[2], approach.length, approach.tail_wind, float(approach.point[2])
     )
     assert flown.flight.ended == "completed"
     along, aside = approach.place(np.stack([real["east_m"], real["north_m"]], axis=1))
     over = real["amsl_m"] - approach.point[2]
-    final = (along < -glide.flare_distance - 10.0) & (along > -approach.run + 100.0)
+    final = (along < -glide.flare_distance - 10.0) & (along > -approach.length + 100.0)
     way, off = approach.place(np.asarray(track.position, dtype=np.float64))
     if flight != "d":  # where the last descent was too steep to be flown straight
         # As far before the point as ArduPlane's is kept.
@@ -235,7 +235,7 @@ def test_each_release_flares_by_its_own_sink_rate(version: ArduPlaneVersion) -> 
     aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
     assert isinstance(setup.autopilot, ArduPlane)
     own = record(ARDUPLANE_GROUND)
-    setup.autopilot.in_release(version).from_ground(setup.ground_ways, aircraft, ()).initialise_records(
+    setup.autopilot.in_release(version).from_ground(setup.ground_phases, aircraft, ()).initialise_records(
         record(WORKSPACE), own
     )
     assert own.ground.flares_by_demand == (version == "4.7")
@@ -321,6 +321,6 @@ def test_the_first_leg_after_a_take_off_has_no_line() -> None:
 
 
 def test_home_is_where_kept_flights_began() -> None:
-    take_off = fly_kept("a").setup.ground_ways.take_off
+    take_off = fly_kept("a").setup.ground_phases.take_off
     assert take_off is not None
     assert take_off.home == pytest.approx(HOME, abs=0.05)

@@ -37,7 +37,7 @@ def test_returns_go_on_to_the_landing_as_arduplane_does(flight: str) -> None:
     flown, real = flown_sequence(flight), kept_sequence(flight)
     assert flown.flight.ended == "completed"
     time, position = since_return(flown, flight)
-    on_way = real["amsl_m"] > flown.approach.begin - 1.0
+    on_way = real["amsl_m"] > flown.approach.start_altitude - 1.0
     # The way at the same places: one is up to 2 s ahead of the other.
     aside, higher = [], []
     for t, east, north, up in zip(*(real[name] for name in ("time_s", "east_m", "north_m", "amsl_m")), strict=True):
@@ -71,7 +71,7 @@ def test_returns_touch_down_where_arduplane_does(flight: str) -> None:
 def on_glide(approach: Approach, places: Floats, up: Floats) -> float:
     """Slope of the straight part of a glide, degrees; places (n, 2) and heights (n,), m."""
     along, aside = approach.place(places)
-    final = (along < -120.0) & (along > -approach.run + 100.0) & (np.abs(aside) < 20.0)
+    final = (along < -120.0) & (along > -approach.length + 100.0) & (np.abs(aside) < 20.0)
     return math.degrees(math.atan(-float(np.polyfit(along[final], up[final], 1)[0])))
 
 
@@ -107,7 +107,7 @@ def aborted(pitch: float = math.radians(10.0), height: float = 50.0) -> tuple[Re
     for name in ("east", "north", "up"):
         start[f"velocity_{name}"] = real[f"velocity_{name}_mps"][0]
     places = landing_sequence(setup.mission, setup.scenario.origin, setup.scenario.terrain, 6)
-    landing = places[0]._replace(onward=places[1:])
+    landing = places[0]._replace(next_stops=places[1:])
     top = world.home.up + height
     found = fly_go_arounds(start, top, pitch, [landing], world.parameters, world.aircraft, world.environment)
     return found.flown[0], found.ways[0]

@@ -20,7 +20,7 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     fly_returns,
     surroundings,
 )
-from flight.mission.return_path import ReturnCircle, ReturnPlace, choose_target
+from flight.mission.return_path import ReturnCircle, ReturnPoint, choose_target
 from planfly.workflow.airframe import Airframe, load_airframe
 from tests.flight.autopilots.arduplane.kept_flights import HOME, KEPT, WIND, flown_return, jacksboro, kept_track, rally
 from tests.soak import SOAK
@@ -86,10 +86,10 @@ def swift(flight: str) -> tuple[str, SwiftReturns]:
     )
     rules = ArduPlane(made).return_rules
     points = [
-        ReturnPlace(east, north, HOME[2] + up, HOME[2], k) for k, (east, north, up) in enumerate(rally(flight), 1)
+        ReturnPoint(east, north, HOME[2] + up, HOME[2], k) for k, (east, north, up) in enumerate(rally(flight), 1)
     ]
     here = (float(begin["east"][0]), float(begin["north"][0]), float(begin["up"][0]))
-    target = choose_target(rules, here, ReturnPlace(*HOME), points)
+    target = choose_target(rules, here, ReturnPoint(*HOME), points)
     circle = ReturnCircle(*target.position, rules.radius, target.slope_base)
     return target.name, fly_returns(begin, [circle], made, aerosonde(), around(), keep=True)
 

@@ -56,7 +56,7 @@ def test_the_mission_goes_up_as_it_is_with_home_where_it_is() -> None:
 
 def test_with_one_end_alone_it_is_put_into_the_air_and_says_so() -> None:
     for launch, strip, lacks in ((RAIL, None, "landing"), (None, STRIP, "take-off")):
-        ways = by_program(circuit(launch, strip)).ground_ways
+        ways = by_program(circuit(launch, strip)).ground_phases
         assert not ways
         assert ways.notes[-1].startswith(f"without a {lacks} that is flown from the ground")
 
@@ -81,7 +81,7 @@ def test_what_the_scenario_asks_of_its_returns_is_set() -> None:
 
 def test_the_rail_of_a_launch_is_as_steep_and_as_quick_as_the_launch() -> None:
     """From 6 m before its end, 1.2 m lower, at rest, to 20 m/s in 0.6 s; 33 m/s^2 are felt along the nose."""
-    take_off = circuit(RAIL, STRIP).ground_ways.take_off
+    take_off = circuit(RAIL, STRIP).ground_phases.take_off
     assert take_off is not None
     place, velocity = take_off.release()
     begin = Release(
@@ -130,7 +130,7 @@ def test_a_stand_in_flies_from_the_catapult_to_rest_on_the_strip(fake_autopilot:
     flown, flew = fly_autopilot(setup, AEROSONDE, arduplane_program(fake_autopilot("none")), {})
     track = flown.track
     assert flown.ended == "completed"
-    assert flew.ground_ways
+    assert flew.ground_phases
     # It begins at the rail's end, at 20 m/s over the ground, and comes to rest within 150 m of the landing point.
     assert np.hypot(*track.position[0, :2]) < 7.0
     assert np.linalg.norm(track.velocity[0]) == pytest.approx(20.0, abs=0.5)

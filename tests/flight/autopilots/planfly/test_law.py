@@ -67,7 +67,7 @@ def test_on_the_path_nothing_is_asked(tick: Tick) -> None:
     assert commands.elevator == pytest.approx(-0.1, abs=1e-12)
     assert commands.throttle == pytest.approx(0.5)
     memory = tick.memory
-    assert [memory.leg, memory.cross_track, memory.height_error, memory.done] == [0, 0.0, 0.0, False]
+    assert [memory.leg, memory.cross_track, memory.height_error, memory.is_finished] == [0, 0.0, 0.0, False]
     assert tick.memory.distance == 1000.0
 
 
@@ -111,9 +111,9 @@ def test_end_of_the_path(tick: Tick) -> None:
     tick(north=2999.0)
     assert tick.memory.leg in (0, 1)
     tick(east=1500.0, north=3000.0, course=math.pi / 2)
-    assert [tick.memory.leg, tick.memory.done] == [1, False]
+    assert [tick.memory.leg, tick.memory.is_finished] == [1, False]
     tick(east=3000.1, north=3000.0, course=math.pi / 2)
-    assert [tick.memory.leg, tick.memory.done] == [1, True]
+    assert [tick.memory.leg, tick.memory.is_finished] == [1, True]
 
 
 # ----------------------------------------------------------------------

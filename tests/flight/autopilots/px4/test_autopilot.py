@@ -13,7 +13,7 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4_sitl.autopilot import Px4Sitl
 from flight.autopilots.px4_sitl.parameters import FLYING
-from flight.mission.return_path import ReturnPlace, choose_target
+from flight.mission.return_path import ReturnPoint, choose_target
 from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import MakeSetup
 from world.errors import ScenarioError
@@ -80,11 +80,11 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
 )
 def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> None:
     rules = Px4(Px4Parameters.of_text(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).return_rules
-    home, rally = ReturnPlace(0.0, 0.0, 300.0), ReturnPlace(0.0, 4000.0, 450.0)
+    home, rally = ReturnPoint(0.0, 0.0, 300.0), ReturnPoint(0.0, 4000.0, 450.0)
     target = choose_target(rules, (0.0, 1000.0, 800.0), home, [rally])
     assert (target.name, target.position[2]) == (name, up)
     assert choose_target(rules, (0.0, 1000.0, 800.0), home, []).name == "home"
-    assert bool(rules.instead) is (kind == "RTL_TYPE 3")
+    assert bool(rules.deviation_note) is (kind == "RTL_TYPE 3")
 
 
 def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:

@@ -21,7 +21,7 @@ from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel, make_polygon
 from world.frames import POLYMAP
 from world.kernels import Record, Records
-from world.terrain import Terrain, flat_terrain, gridded
+from world.terrain import Terrain, flat_terrain, gridded_terrain
 
 # ----------------------------------------------------------------------
 # How a path meets a zone, by plain sums: depths, times, places of entry and exit, on lines and arcs, over slopes.
@@ -59,7 +59,7 @@ def box(kind: str = "exclusion", *, floor: ZoneLevel | None = None, ceiling: Zon
 def slope(rise: float) -> Terrain:
     """Ground that rises this many m per m to the east, 0 m at east 0."""
     east, north = np.linspace(-2000.0, 2000.0, 41), np.linspace(-2000.0, 2000.0, 41)
-    return gridded(np.tile(rise * east, (41, 1)), east, north, source="slope", sha256="", datum="")
+    return gridded_terrain(np.tile(rise * east, (41, 1)), east, north, source="slope", sha256="", datum="")
 
 
 @pytest.mark.parametrize("aside", [80.0, 20.0, 5.0, 0.5])
@@ -176,7 +176,7 @@ def test_a_ridge_between_two_looks_is_seen() -> None:
     east = np.linspace(-1000.0, 1000.0, 201)
     heights = np.zeros((201, 201))
     heights[:, 121] = 40.0  # at east 210 m
-    ridge = gridded(heights, east, east, source="ridge", sha256="", datum="")
+    ridge = gridded_terrain(heights, east, east, source="ridge", sha256="", datum="")
     found = visit(
         [move(-100.0, 100.0, 130.0, length=600.0, lasts=600.0)], box(ceiling=ZoneLevel(100.0, "ground")), ridge
     )

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Command, Frame, MissionItem
-from flight.mission.return_path import ReturnPlace
+from flight.mission.return_path import ReturnPoint
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.returns.judge_returns import (
@@ -228,7 +228,7 @@ def test_what_was_low_before_it_left_the_elevation_file_is_low(tmp_path: Path) -
     # Home lies 3 km west of the file, which ends at -3000 m, its circle 225 m below the ground here.  From x metres
     # east it sinks 825 m in D = x + 6000 m, 3 s late at 26 m/s: where the file ends it is at -225 + 825 * 3078 / D.
     # That is the least height of 30 m for D = 9960 m, and the ground for 11290 m.
-    away = replace(world, home=ReturnPlace(-6000.0, 0.0, -325.0))
+    away = replace(world, home=ReturnPoint(-6000.0, 0.0, -325.0))
     starts = planned_starts(world.setup, 2.0)
     found = judge_returns(away, starts, 2.0)
     assert {one.kind for one in found.each} == {"ground", "low", "unknown"}

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.mission.return_path import ReturnPlace, ReturnTarget
+from flight.mission.return_path import ReturnPoint, ReturnTarget
 from logs.verdict.returns.judge_returns import Kind, Returns, ReturnWorld, SimulatedReturn, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.suggest_returns import (
@@ -130,7 +130,7 @@ def test_the_search_finds_as_few_points_as_all_sets_tried(tmp_path: Path, seed: 
     """Eight candidates and forty starts of a made table: as many good returns, and no more points, as the best set."""
     world, starts = asked(tmp_path, 6.5)
     rng = np.random.default_rng(seed)
-    places = [ReturnPlace(*rng.uniform(0.0, 6500.0, 2), 300.0) for _ in range(8)]
+    places = [ReturnPoint(*rng.uniform(0.0, 6500.0, 2), 300.0) for _ in range(8)]
     count = len(starts)
     needs = _ReturnLimits(np.zeros(count), np.zeros(count))
     search = _RallySearch(world, starts, needs, places, rng.random(count) < 0.2)

@@ -78,5 +78,5 @@ def test_the_first_leg_is_held_to_its_corridor_once_it_is_flown_along() -> None:
 def test_an_autopilot_that_flies_no_take_off_says_so_in_a_line(autopilot: str) -> None:
     setup = flown_circuit().setup
     other = replace(setup, autopilot=restore_autopilot(autopilot, StoredAutopilot()))
-    assert not other.ground_ways
+    assert not other.ground_phases
     assert "take-off and landing are not flown, and not judged as flown" in judge_geometry(other).summary

@@ -283,7 +283,7 @@ def test_a_boundary_surely_beyond_all_that_was_looked_at_is_settled() -> None:
     for draw in range(1200):
         speed = 8.0 + 2.0 * (draw % 6) / 5.0
         direction.add(speed, draw, frozenset() if speed < random.normal(12.0, 1.0) else frozenset({"slope"}))
-    assert any(direction.failed)
+    assert any(direction.failed_modes)
     found = direction.boundary()
     assert found.beyond
     assert found.width < 0.2

@@ -45,7 +45,7 @@ def test_a_strip_that_the_error_leaves_nothing_of_is_left_open(
     length: float, stop: float, faults: int, open_: int
 ) -> None:
     """On 60 m and less only a stop more than 30 m off the strip's end is known to be off it."""
-    approach = flown_circuit().setup.ground_ways.approach
+    approach = flown_circuit().setup.ground_phases.approach
     assert approach is not None
     short = replace(approach, strip=replace(approach.strip, length=length))
     at = _Landing(0.0, 0.0, (0.0, 0.0), (stop, 0.0), 0.5 * length - stop, 1.0, 1.0, 10.0, 0.0)
@@ -69,7 +69,7 @@ def test_in_turbulence_fifty_metres_of_the_strip_are_left(
     touch: float, stop: float, gusts: bool, ok: bool | None
 ) -> None:
     """On a strip of 200 m."""
-    approach = flown_circuit().setup.ground_ways.approach
+    approach = flown_circuit().setup.ground_phases.approach
     assert approach is not None
     strip = replace(approach, strip=replace(approach.strip, length=200.0))
     at = _Landing(0.0, 0.0, (touch, 0.0), (stop, 0.0), 100.0 - stop, 1.0, 1.0, 10.0, 0.0)
@@ -139,9 +139,9 @@ def test_a_final_within_three_metres_of_the_ground_is_left_open(up: float, ok: b
 def test_from_fifteen_metres_over_the_point_on_it_may_flare(more: float, ok: bool | None) -> None:
     """The glide's distance to where it is 15 m over the point, by its slope and where its flare begins."""
     setup = flown_circuit().setup
-    approach = setup.ground_ways.approach
+    approach = setup.ground_phases.approach
     assert approach is not None
-    glide = setup.autopilot.landing_glide(approach.begin, approach.run, approach.tail_wind, 0.0)
+    glide = setup.autopilot.landing_glide(approach.start_altitude, approach.length, approach.tail_wind, 0.0)
     before = glide.flare_distance + (15.0 - glide.flare_height) / glide.slope
     assert with_low_final(before + more, 2.0).ok is ok
 
