@@ -88,7 +88,7 @@ def aircraft_options(command_line: LineParser) -> None:
         "--until",
         metavar="S",
         type=number_parser("until"),
-        help="with --identify: use only rows before this time of the log; `planfly predict` judges the rest",
+        help="with --identify: use only rows before this time of the log; 'planfly predict' judges the rest",
     )
     result_options(
         parser,
