@@ -45,9 +45,8 @@ def plan_mission(
     The acceptance radius is the fly-by offset R(1/cos(theta/2) - 1), the distance at which a turn at this speed and
     bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE`, rounded up to a whole
     meter, so that no arc of the flight misses the waypoint. PX4 has its own radius for fixed-wing aircraft. If the
-    tracking error of an
-    autopilot is known, the radius is the one with the smallest error: ArduPlane turns to the next leg at that distance
-    before a waypoint.
+    tracking error of an autopilot is known, the radius is the one with the smallest error: ArduPlane turns to the next
+    leg at that distance before a waypoint.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -66,11 +65,8 @@ def plan_mission(
     home = _home_position(plan)
     builder = _ItemBuilder(plan.scenario.origin)
     if procedures.climb is not None:
-        builder.add(
-            Command.NAV_TAKEOFF,
-            (LAUNCH_PITCH, 0.0, 0.0, 0.0),
-            np.append(procedures.climb.home[:2], procedures.climb.up),
-        )
+        takeoff_position = np.append(procedures.climb.home[:2], procedures.climb.up)
+        builder.add(Command.NAV_TAKEOFF, (LAUNCH_PITCH, 0.0, 0.0, 0.0), takeoff_position)
     builder.add(Command.DO_CHANGE_SPEED, (0.0, _round_to_thousandths(airspeed), -1.0, 0.0))
     first_waypoint = 0 if procedures.climb is None else 1
     end_waypoint = len(points) if procedures.descent is None else len(points) - 3

@@ -371,10 +371,8 @@ def _corners_around(
     loiter = node.stop.loiter
     if loiter is not None and loiter.to_height:
         climb_slope, dive_slope = slopes(node.stop.airspeed, max(previous_altitude, node.up))
-        climb_slope, dive_slope = (
-            min(climb_slope, rules.climb / node.stop.airspeed),
-            min(dive_slope, rules.sink / node.stop.airspeed),
-        )
+        climb_slope = min(climb_slope, rules.climb / node.stop.airspeed)
+        dive_slope = min(dive_slope, rules.sink / node.stop.airspeed)
         entry_altitude = (
             previous_altitude
             if rules.holds_height

@@ -435,9 +435,9 @@ def route_through_stops(
     all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else list(placed_mission.stops)
     placed_stops = [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in all_stops]
     return_stop = placed_stops.pop() if placed_mission.itinerary.returns else None
-    direct_landing = (
-        None if return_stop is None else _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
-    )
+    direct_landing = None
+    if return_stop is not None:
+        direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
     if direct_landing is not None:
         placed_stops += [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in direct_landing.stops]
     lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
@@ -449,18 +449,17 @@ def route_through_stops(
         if landing is not None:
             points += lay_out([_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in landing.stops])[0]
     _check_point_count(mission.source, len(points))
-    stops = [point.stop for point in points]
+    stops, arcs = [point.stop for point in points], np.array([point.arc for point in points])
     waypoints = np.array([point.position for point in points])
-    arcs = np.array([point.arc for point in points])
     airspeed = np.array([stop.airspeed for stop in stops[1:]])
     acceptance = np.minimum([stop.acceptance for stop in stops], acceptance_limit)
     _note_cruise_speed(mission, default_airspeed, stops[1], notes)
-    misses_arc = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
     return Route(
         waypoints=waypoints,
         airspeed=airspeed,
         acceptance=acceptance,
-        fly_over=(arcs == 0.0) & (fly_over | misses_arc),
+        fly_over=(arcs == 0.0)
+        & (fly_over | fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_start_text(placed_mission.itinerary, stops[0], placed_mission.origin, waypoints),
         notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),

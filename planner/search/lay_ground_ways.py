@@ -631,14 +631,8 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
                 altitudes = _approach_altitudes(site, points, slope_factor, end_altitude, final_altitude)
                 if abs(altitudes[0] - end_altitude) > 1e-6 or abs(altitudes[-1] - final_altitude) > 1e-6:
                     break
-                chain = np.concatenate(
-                    [
-                        previous_waypoints,
-                        _join_altitudes(points, altitudes),
-                        final.final_waypoints[1:],
-                        point_above[None],
-                    ]
-                )
+                path = _join_altitudes(points, altitudes)
+                chain = np.concatenate([previous_waypoints, path, final.final_waypoints[1:], point_above[None]])
                 certificate = site.certify_chain(chain, (last_waypoint, last_waypoint))
                 if certificate.ok and certificate.kill_distance > 0.0:
                     return chain[len(previous_waypoints) + 1 : len(previous_waypoints) + len(points) - 1], ""

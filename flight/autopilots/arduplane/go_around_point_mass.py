@@ -153,9 +153,7 @@ def fly_go_arounds(
         track, landing = fly(k, landings[0]), landings[0]
         # The climb does not depend on the sequence.
         climb_end = track[min(climb_rows(track, end_altitude), len(track) - 1)]
-        nearest_sequence = nearest_landing_sequence(
-            (float(climb_end[0]), float(climb_end[1]), float(climb_end[2])), landings
-        )
+        nearest_sequence = nearest_landing_sequence(tuple(climb_end.tolist()), landings)
         if nearest_sequence is not None and nearest_sequence != landing:
             track, landing = fly(k, nearest_sequence), nearest_sequence
         flights.append((track, landing))

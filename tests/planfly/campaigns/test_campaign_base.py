@@ -12,9 +12,11 @@ from aircraft.data_sheet import DataSheet
 from planfly.campaigns.campaign_base import (
     CampaignBase,
     GivenWind,
+    _draw_strip_error,
     check_level_flight_at_medians,
     open_campaign,
     vary_flight,
+    vary_terrain,
 )
 from planfly.campaigns.dispersions import (
     QUANTITIES,
@@ -28,7 +30,9 @@ from planfly.campaigns.dispersions import (
 from planfly.workflow.data_sheets import make_data_sheet_folder
 from planfly.workflow.open_flight import open_flight
 from tests.planfly.campaigns.made_campaigns import write_short
+from world.airfield import LandingStrip
 from world.errors import MissionError
+from world.scenario import load_scenario
 
 
 def test_it_has_the_mission_as_fly_opens_it(base: CampaignBase, tmp_path: Path) -> None:
@@ -215,3 +219,32 @@ def test_bad_draws_are_refused(sheet: Path, text: str, told: str) -> None:
     with pytest.raises(SpreadError) as caught:
         _opened(sheet, read_dispersions(sheet / "bad.toml"))
     assert told in str(caught.value)
+
+
+def test_the_terrain_error_at_a_surveyed_strip_is_that_of_the_survey() -> None:
+    """10 m elsewhere; 0.5 m up to 200 m beyond the strip's ends (400 m), and half way between 900 m from the centre."""
+    scenario = load_scenario("jacksboro")
+    strip, terrain = scenario.landing, scenario.terrain
+    assert strip is not None
+    assert terrain is not None
+    assert (strip.length, strip.height_sd) == (400.0, 0.5)
+    varied = vary_terrain(terrain, 10.0, strip, 0.5)
+    for distance, error in ((0.0, 0.5), (370.0, 0.5), (900.0, 5.25), (1430.0, 10.0), (4000.0, 10.0)):
+        for east, north in ((distance, 0.0), (0.0, distance)):
+            place = strip.east + east, strip.north + north
+            difference = float(varied.height(*place) - terrain.height(*place))
+            # Heights between pixels, some 25 m apart, are interpolated.
+            assert difference == pytest.approx(error, abs=0.25), (distance, east)
+    everywhere = vary_terrain(terrain, 10.0, strip, None)
+    assert float(everywhere.height(strip.east, strip.north) - terrain.height(strip.east, strip.north)) == pytest.approx(
+        10.0, abs=1e-3
+    )
+
+
+def test_strip_errors_have_the_stated_deviation_and_do_not_change_the_other_draws() -> None:
+    strip = replace(LandingStrip(0.0, 0.0), height_sd=2.0)
+    errors = np.array([_draw_strip_error(strip, seed) for seed in range(2000)], dtype=np.float64)
+    # The standard deviation of 2,000 normal draws has a standard error of 2 / sqrt(4000) = 0.03.
+    assert errors.std() == pytest.approx(2.0, abs=0.1)
+    assert abs(errors.mean()) < 0.15
+    assert _draw_strip_error(LandingStrip(0.0, 0.0), 1) is None
