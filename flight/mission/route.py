@@ -427,12 +427,11 @@ def route_through_stops(
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
-    >>> route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist()
-    [25.0]
+    >>> assert route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist() == [25.0]
     """
     mission, notes = placed_mission.mission, Notes()
     return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
-    all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else list(placed_mission.stops)
+    all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else placed_mission.stops
     placed_stops = [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in all_stops]
     return_stop = placed_stops.pop() if placed_mission.itinerary.returns else None
     direct_landing = None
@@ -449,17 +448,17 @@ def route_through_stops(
         if landing is not None:
             points += lay_out([_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in landing.stops])[0]
     _check_point_count(mission.source, len(points))
-    stops, arcs = [point.stop for point in points], np.array([point.arc for point in points])
-    waypoints = np.array([point.position for point in points])
+    stops = [point.stop for point in points]
+    waypoints, arcs = np.array([point.position for point in points]), np.array([point.arc for point in points])
     airspeed = np.array([stop.airspeed for stop in stops[1:]])
     acceptance = np.minimum([stop.acceptance for stop in stops], acceptance_limit)
+    is_missed = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
     _note_cruise_speed(mission, default_airspeed, stops[1], notes)
     return Route(
         waypoints=waypoints,
         airspeed=airspeed,
         acceptance=acceptance,
-        fly_over=(arcs == 0.0)
-        & (fly_over | fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)),
+        fly_over=(arcs == 0.0) & (fly_over | is_missed),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_start_text(placed_mission.itinerary, stops[0], placed_mission.origin, waypoints),
         notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),
