@@ -24,8 +24,10 @@ def _rows(name: str) -> list[dict[str, str]]:
 GLIDES = {row["flight"]: row for row in _rows("glides.csv")}
 # Law less flight of ArduPlane, m (issue 35).
 LOW, HIGH = -40.0, 15.0
-# 4.6.0-dev left a circle that it had reached when it glided out of it; since 4.6.0 it stays reached.
-ASIDE = 155.0
+# m.  The law's pitch integrators fade beyond a pitch limit, as in the source of 4.6.3: without that this one flight of
+# 4.6.0-dev is within 150 m as well, with it 151.4 m.
+ASIDE = 150.0
+ASIDE_WITH_FADING_INTEGRATORS = {"glide-rtl2-02": 152.0}
 # What a glide has to clear the ground by to count as one that gets there, m.
 MARGIN = 30.0
 
@@ -58,12 +60,13 @@ def glided(flight: str) -> SwiftReturns:
 @pytest.mark.parametrize("flight", some(GLIDES, 2))
 def test_it_is_as_high_as_arduplane_was(flight: str) -> None:
     (way,) = glided(flight).ways
+    aside = ASIDE_WITH_FADING_INTEGRATORS.get(flight, ASIDE)
     seconds, compared = np.arange(len(way)), 0
     for time, east, north, up in glide_track(flight):
         if time < len(way) - 1:
             here = [float(np.interp(time, seconds, way[:, k])) for k in range(3)]
             assert LOW < here[2] - up < HIGH, time
-            assert GLIDES[flight]["mode"] == "AUTO" or math.hypot(here[0] - east, here[1] - north) < ASIDE
+            assert GLIDES[flight]["mode"] == "AUTO" or math.hypot(here[0] - east, here[1] - north) < aside
             compared += 1
     assert compared > 0.8 * len(glide_track(flight)) - 1
 
