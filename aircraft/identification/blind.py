@@ -115,7 +115,7 @@ def band_limits(values: Floats) -> tuple[Floats, Floats]:
     band is unknown (NaN) where fewer than `_MIN_DRAWS` of the draws have a value.
 
     >>> low, high = band_limits(np.arange(39.0)[:, np.newaxis])
-    >>> low.tolist(), high.tolist()
+    >>> low.round(9).tolist(), high.round(9).tolist()
     ([0.0], [38.0])
     """
     tail = 0.5 * (1.0 - COVERAGE)

@@ -66,7 +66,7 @@ class Predicted:
     windows: number of judged windows; 0 by the mission.
     start, end: judged part of the log, s.
     source: file of the log.  aircraft: name of the aircraft.
-    lines: description for people.
+    heading: what was predicted, by what, and how often.  lines: description for people, the heading first.
     files: written files.
     leg_ends: distance along the legs at which each ends, m; empty by the controls.
     """
@@ -79,6 +79,7 @@ class Predicted:
     end: float
     source: str
     aircraft: str
+    heading: str
     lines: tuple[str, ...]
     files: tuple[Path, ...] = ()
     leg_ends: tuple[float, ...] = ()
@@ -182,7 +183,7 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
         f" flights each; their errors are drawn from {before} windows before {start:.1f} s"
     )
     lines = (heading, *_band_lines(bands))
-    return Predicted("controls", bands, DRAWS, count, start, end, motion.source, aircraft.name, lines)
+    return Predicted("controls", bands, DRAWS, count, start, end, motion.source, aircraft.name, heading, lines)
 
 
 def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[FlightRecord], start: float | None) -> float:
@@ -267,7 +268,17 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     lines = (heading, *_band_lines(bands))
     ends = tuple(flights[0].ends.tolist())
     return Predicted(
-        "mission", bands, len(flights), 0, stretch.start, stretch.end, str(path), aircraft.name, lines, leg_ends=ends
+        "mission",
+        bands,
+        len(flights),
+        0,
+        stretch.start,
+        stretch.end,
+        str(path),
+        aircraft.name,
+        heading,
+        lines,
+        leg_ends=ends,
     )
 
 
@@ -301,5 +312,5 @@ def _write_page(folder: Path, predicted: Predicted) -> tuple[Path, ...]:
     chart = band_chart(predicted.bands, title, by_time=predicted.by == "controls")
     page, picture = (folder / name for name in PREDICT_FILES)
     write_whole(picture, png_bytes(draw_chart(chart)))
-    write_whole(page, prediction_page(predicted.lines[0], predicted.bands, chart).encode())
+    write_whole(page, prediction_page(predicted.heading, predicted.bands, chart).encode())
     return page, picture
