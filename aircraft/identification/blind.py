@@ -29,15 +29,15 @@ DRAWS = 40
 # Probability with which the flight is inside a band.
 COVERAGE = 0.95
 # Smallest fraction of the draws with which a band is known.
-_MIN_DRAWS = 0.9
+_MIN_KNOWN_FRACTION = 0.9
 # Duration of a window, s.
 WINDOW_S = 2.0
 # Time between the starts of windows in the earlier part, s; they may overlap.
 _CALIBRATION_STEP_S = 0.5
 # Time in a stretch before its first window, s; the filter has settled then.
 _SETTLING_TIME_S = 2.0
-# One of this many samples is kept, at 50 samples a second.
-_THINNING = 5
+# One of this many samples is kept, at `GRID_HZ`.
+_THINNING_FACTOR = 5
 # Seed of the blocks of errors.
 _SEED = 68
 
@@ -112,14 +112,14 @@ def band_limits(values: Floats) -> tuple[Floats, Floats]:
     """Return the ends of the band (n,) of draws (d, n), at the plotting positions k / (d + 1) (Weibull 1939).
 
     The next draw is inside with the probability `COVERAGE`; percentiles of the draws themselves would hold fewer.  The
-    band is unknown (NaN) where fewer than `_MIN_DRAWS` of the draws have a value.
+    band is unknown (NaN) where fewer than `_MIN_KNOWN_FRACTION` of the draws have a value.
 
     >>> low, high = band_limits(np.arange(39.0)[:, np.newaxis])
     >>> low.round(9).tolist(), high.round(9).tolist()
     ([0.0], [38.0])
     """
     tail = 0.5 * (1.0 - COVERAGE)
-    is_known = np.isfinite(values).mean(axis=0) >= _MIN_DRAWS
+    is_known = np.isfinite(values).mean(axis=0) >= _MIN_KNOWN_FRACTION
     limits = np.full((2, *values.shape[1:]), np.nan)
     limits[:, is_known] = np.nanquantile(values[:, is_known], [tail, 1.0 - tail], axis=0, method="weibull")
     return limits[0], limits[1]
@@ -158,7 +158,7 @@ class BlindPrediction:
         self._errors = measured - self._fly(self._earlier, base, starts)
         self._changes = measured - measured[:, :1]
         # Of the height, the change beyond that of a constant height rate.
-        seconds = np.arange(measured.shape[1]) * _THINNING / GRID_HZ
+        seconds = np.arange(measured.shape[1]) * _THINNING_FACTOR / GRID_HZ
         self._changes[:, :, _HEIGHT] -= measured[:, :1, _HEIGHT_RATE] * seconds
         self._starts = _window_starts(self._judged, self._count, self._count)
         self._flown = _measured(self._judged, self._starts, self._count)
@@ -181,13 +181,13 @@ class BlindPrediction:
         flights[:, :, :, _POWER] = np.maximum(0.0, flights[:, :, :, _POWER])
         low, high = band_limits(flights)
         times = self._times[self._starts[:, np.newaxis] + _rows(self._count)].ravel()
-        made = []
+        bands = []
         for k, quantity in enumerate(QUANTITIES):
             unchanged = np.quantile(np.abs(self._changes[:, :, k]), COVERAGE, axis=0)
             lower, upper, flown = (quantity.factor * values[:, :, k].ravel() for values in (low, high, self._flown))
             width = quantity.factor * float(np.median(unchanged))
-            made.append(Band(quantity.name, quantity.unit, times, lower, upper, flown, width))
-        return tuple(made)
+            bands.append(Band(quantity.name, quantity.unit, times, lower, upper, flown, width))
+        return tuple(bands)
 
     def _fly(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
         """Return `QUANTITIES` (w, k, q) over windows from some rows (w,), with trims of the earlier part."""
@@ -216,7 +216,7 @@ def _scaled(signals: Signals, factor: float) -> Signals:
 
 def _rows(count: int) -> Ints:
     """Return the samples of a window that are kept, without its start, which is measured."""
-    return np.arange(_THINNING, count + 1, _THINNING)
+    return np.arange(_THINNING_FACTOR, count + 1, _THINNING_FACTOR)
 
 
 def _window_starts(signals: Signals, count: int, step: int) -> Ints:

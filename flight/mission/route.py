@@ -427,16 +427,15 @@ def route_through_stops(
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
-    >>> assert route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist() == [25.0]
+    >>> route_through_stops(placed, 25.0, fly_over=False).airspeed.tolist()
+    [25.0]
     """
     mission, notes = placed_mission.mission, Notes()
     return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
     all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else placed_mission.stops
     placed_stops = [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in all_stops]
     return_stop = placed_stops.pop() if placed_mission.itinerary.returns else None
-    direct_landing = None
-    if return_stop is not None:
-        direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
+    direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
     if direct_landing is not None:
         placed_stops += [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in direct_landing.stops]
     lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
@@ -523,11 +522,11 @@ def _lay_out_waypoints(
 def _find_direct_landing(
     placed_mission: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence to which an RTL flies directly, or None.
+    """Return the landing sequence to which the mission's RTL flies directly, or None.
 
     stops: stops before the RTL.
     """
-    if rules.lands != "straight" or not stops:
+    if not placed_mission.itinerary.returns or rules.lands != "straight" or not stops:
         return None
     east, north, up = stops[-1].position.tolist()
     landing = _find_landing(placed_mission, (east, north, up), notes)

@@ -307,7 +307,7 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
     if memory.time_to_update < 0.5 * dt:
         memory.time_to_update += NAVIGATION_TICK
         _demand_heading(state, estimated, arduplane.parameters, ground, memory)
-        memory.altitude_demand_raw, memory.altitude_demand_limited = estimated.up, estimated.up
+        memory.altitude_demand_in, memory.altitude_demand_limited = estimated.up, estimated.up
         memory.altitude_demand, memory.climb_rate_demand = estimated.up, 0.0
         memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
         _set_take_off_parameters(estimated, arduplane.parameters, stage_parameters, ground)
@@ -574,7 +574,7 @@ def _demand_glide(
         ground.flare_ideal += memory.climb_rate_demand * NAVIGATION_TICK
         # As in `AP_TECS::_update_height_demand` since 4.6.3.
         memory.altitude_demand = ground.flare_adjusted * (1.0 - fraction) + ground.flare_ideal * fraction
-    memory.altitude_demand_raw, memory.altitude_demand_limited = memory.altitude_demand, memory.altitude_demand
+    memory.altitude_demand_in, memory.altitude_demand_limited = memory.altitude_demand, memory.altitude_demand
 
 
 @inner

@@ -63,7 +63,7 @@ ARDUPILOT_MEMORY = record_dtype(
     ("sloped_leg", np.int64),  # current leg with a slope between altitudes, plus one; 0 before the first
     "from_height_above_terrain",  # m, height above terrain at the start of the leg above terrain
     "altitude_offset",  # m, height above terrain to gain on that leg at its start (`target_altitude.offset_cm`)
-    "altitude_demand_raw",  # m, demand of the leg, frozen while the aircraft cannot follow it (`_hgt_dem_in`)
+    "altitude_demand_in",  # m, demand of the leg, frozen while the aircraft cannot follow it (`_hgt_dem_in`)
     "altitude_demand_limited",  # m, the same after the rate limit (`_hgt_dem_rate_ltd`)
     "altitude_demand",  # m, the same after the rate limit and the lag (`_hgt_dem`)
     "climb_rate_demand",  # m/s, rate of the altitude demand (`_hgt_rate_dem`)
@@ -137,10 +137,10 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
     memory.max_climb_scaler += lag_fraction * ((0.0 if cannot_climb else 1.0) - memory.max_climb_scaler)
     memory.max_sink_scaler += lag_fraction * ((0.0 if cannot_sink else 1.0) - memory.max_sink_scaler)
     if cannot_climb:
-        altitude_target = min(altitude_target, memory.altitude_demand_raw)
+        altitude_target = min(altitude_target, memory.altitude_demand_in)
     if cannot_sink:
-        altitude_target = max(altitude_target, memory.altitude_demand_raw)
-    memory.altitude_demand_raw = altitude_target
+        altitude_target = max(altitude_target, memory.altitude_demand_in)
+    memory.altitude_demand_in = altitude_target
     max_climb = parameters.tecs_climb_max * memory.max_climb_scaler * dt
     max_sink = parameters.tecs_sink_max * memory.max_sink_scaler * dt
     memory.altitude_demand_limited += min(max_climb, max(-max_sink, altitude_target - memory.altitude_demand_limited))
@@ -216,7 +216,7 @@ def _leg_altitude_above_terrain(estimated: Record, target: Record, parameters: R
     """
     if memory.terrain_leg != memory.leg + 1:
         # The leg began in this update: the ground at its start is looked up before the next update.
-        return memory.altitude_demand_raw
+        return memory.altitude_demand_in
     if memory.reached_loiter_target:
         return memory.terrain_altitude + target.above_ground
     end_e, end_n = target_position(target)
@@ -438,7 +438,7 @@ def initialise_memory(
     """Initialise the controller's memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
-    memory.altitude_demand_raw = estimated.up
+    memory.altitude_demand_in = estimated.up
     memory.altitude_demand_limited = estimated.up
     memory.altitude_demand = estimated.up
     memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0

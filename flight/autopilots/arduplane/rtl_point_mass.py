@@ -451,7 +451,7 @@ def _demand_climb(
     airspeed_demand: equivalent airspeed, m/s.
     """
     memory.lateral_acceleration = 0.0
-    memory.altitude_demand_raw, memory.altitude_demand_limited, memory.altitude_demand = (
+    memory.altitude_demand_in, memory.altitude_demand_limited, memory.altitude_demand = (
         estimated.up,
         estimated.up,
         estimated.up,
@@ -584,7 +584,7 @@ def _initialise_memory(
     state.pitch = math.asin(min(1.0, max(-1.0, climb_rate / state.airspeed))) + state.alpha
     memory.is_initialised = True
     memory.altitude_demand, memory.climb_rate_demand = start.up, climb_rate
-    memory.altitude_demand_raw = memory.altitude_demand_limited = (
+    memory.altitude_demand_in = memory.altitude_demand_limited = (
         start.up + climb_rate * parameters.tecs_height_demand_time
     )
     memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0

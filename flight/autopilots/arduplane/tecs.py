@@ -83,9 +83,10 @@ def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float,
 #
 # TECS (Total Energy Control System, Lambregts, AIAA 83-2239) sets throttle from the error in total energy, and pitch
 # from the error in the balance between potential and kinetic energy.  The meaning of its parameters is from ArduPilot's
-# documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list).  The formulas were found by
-# regression of ArduPlane 4.6's flight logs (messages TECS, TEC2, TEC3); they reproduce the logged pitch demands to
-# eight digits.
+# documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list).  The formulas of throttle and
+# pitch were found by regression of ArduPlane 4.6's flight logs (messages TECS, TEC2, TEC3); they reproduce the logged
+# pitch demands to eight digits.  The limits of the airspeed demand, bad descent and the fading of saturated integrators
+# are rules of libraries/AP_TECS/AP_TECS.cpp (4.6.3), stated there and written anew here.
 #
 # Energies are per kilogram, m^2/s^2; their rates m^2/s^3.  Speeds are true airspeeds.  Names as in AP_TECS: SPE and SKE
 # are potential and kinetic energy, STE their sum, SEB their balance.

@@ -55,7 +55,7 @@ def memory(**values: Any) -> Record:
     usual: dict[str, Any] = {
         "is_initialised": True,
         "from_up": 500.0,
-        "altitude_demand_raw": 500.0,
+        "altitude_demand_in": 500.0,
         "altitude_demand_limited": 500.0,
         "altitude_demand": 500.0,
         "max_climb_scaler": 1.0,

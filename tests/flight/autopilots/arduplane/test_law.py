@@ -85,7 +85,7 @@ def demanded(own: Record, north: float, end: float, up: float = 500.0, **values:
     """Height that a leg of 1,000 m from 500 m asks for."""
     (b,) = waypoints((0, 1000, end))
     update_height_demand(flying(0.0, north, up), b, parameters(**values), own, DT)
-    return float(own.altitude_demand_raw)
+    return float(own.altitude_demand_in)
 
 
 @pytest.mark.parametrize(
@@ -125,7 +125,7 @@ def test_a_climb_that_begins_low_over_home_is_a_step(
     made = parameters("4.6", FLIGHT_OPTIONS=float(options), ALT_SLOPE_MAXHGT=0.0)
     for north, up in ((0.0, 500.0), (500.0, 540.0)):
         update_height_demand(flying(0.0, north, up), b, made, own, DT)
-    assert own.altitude_demand_raw == pytest.approx(expected)
+    assert own.altitude_demand_in == pytest.approx(expected)
 
 
 def test_each_leg_is_a_step_or_a_slope_by_the_height_at_its_own_begin() -> None:
@@ -134,7 +134,7 @@ def test_each_leg_is_a_step_or_a_slope_by_the_height_at_its_own_begin() -> None:
         own.leg, own.from_up = leg, 500.0
         (b,) = waypoints((0, 1000, 600.0), home_up=500.0 - over_home)
         update_height_demand(flying(0.0, 500.0, 500.0), b, made, own, DT)
-        assert own.altitude_demand_raw == pytest.approx(expected)
+        assert own.altitude_demand_in == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_in_47_a_climb_is_a_slope_from_a_height_over_home(
     begin = waypoints((0, 1000, end), home_up=0.0)[0]
     update_height_demand(flying(0.0, 0.0, 500.0), begin, made, own, DT)
     update_height_demand(flying(0.0, 500.0, 500.0), b, made, own, DT)
-    assert own.altitude_demand_raw == pytest.approx(expected)
+    assert own.altitude_demand_in == pytest.approx(expected)
 
 
 def test_before_and_past_a_leg_its_ends_heights_hold() -> None:
@@ -185,7 +185,7 @@ def test_a_slope_is_followed_one_time_constant_late(time: float) -> None:
             break
     climb = 2.5
     # The sampled lag is behind by its time constant x the rate, and up to a sample.
-    assert own.altitude_demand_raw - own.altitude_demand == pytest.approx(time * climb, abs=climb * DT)
+    assert own.altitude_demand_in - own.altitude_demand == pytest.approx(time * climb, abs=climb * DT)
     assert own.climb_rate_demand == pytest.approx(climb, rel=DT / time + 1e-6)
 
 
@@ -204,17 +204,17 @@ def test_what_cannot_be_followed_waits(held: int) -> None:
     own, (b,) = memory(), waypoints((0, 1000, end))
     for k in range(100):
         update_height_demand(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
-    asked, share = own.altitude_demand_raw, own.max_climb_scaler if held > 0 else own.max_sink_scaler
+    asked, share = own.altitude_demand_in, own.max_climb_scaler if held > 0 else own.max_sink_scaler
     assert share == pytest.approx(1.0)
     own.saturation = held
     for k in range(100, 130):
         update_height_demand(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
-    assert own.altitude_demand_raw == asked
+    assert own.altitude_demand_in == asked
     # After three seconds of a lag of three, 1 / e of the rate is left.
     assert (own.max_climb_scaler if held > 0 else own.max_sink_scaler) == pytest.approx((3.0 / 3.1) ** 30)
     own.saturation = -held
     update_height_demand(flying(0.0, 25.0 * 13.0), b, parameters(), own, DT)
-    assert abs(own.altitude_demand_raw - 500.0) == pytest.approx(2.5 * 13.0)
+    assert abs(own.altitude_demand_in - 500.0) == pytest.approx(2.5 * 13.0)
 
 
 def weighed(own: Record, seen: Record, at: Record, **values: float) -> None:

@@ -18,7 +18,7 @@ def asked(own: Record, north: float, up: float, above: float = 100.0, **values: 
     """Return the altitude that a leg of 1,000 m to a height above ground asks for, m AMSL."""
     (b,) = waypoints((0, 1000, 0), follows_terrain=True, above_ground=above)
     update_height_demand(flying(0.0, north, up), b, parameters(**values), own, DT)
-    return float(own.altitude_demand_raw)
+    return float(own.altitude_demand_in)
 
 
 def begun(from_above: float, offset: float = 0.0) -> Record:
@@ -57,7 +57,7 @@ def test_a_descent_leaves_out_what_it_descends_of_the_rise_ahead() -> None:
 
 
 def test_before_the_ground_at_its_begin_is_known_a_leg_keeps_the_demand() -> None:
-    own = memory(terrain_altitude=400.0, altitude_demand_raw=512.0)
+    own = memory(terrain_altitude=400.0, altitude_demand_in=512.0)
     assert asked(own, 0.0, 500.0) == 512.0
 
 

@@ -82,7 +82,7 @@ def navigated(own: Record, here: Record, way: np.ndarray, **values: float) -> Re
 def asked(own: Record, here: Record, way: np.ndarray, **values: float) -> float:
     """Height that is asked for after that."""
     update_height_demand(here, way[own.leg + 1], parameters(**values), own, 0.1)
-    return float(own.altitude_demand_raw)
+    return float(own.altitude_demand_in)
 
 
 def test_it_turns_to_the_middle_of_its_circle_at_once() -> None:
@@ -99,7 +99,7 @@ def test_it_turns_to_the_middle_of_its_circle_at_once() -> None:
 
 def test_it_sinks_on_a_straight_slope_in_distance_and_climbs_at_once() -> None:
     way = back(100.0)
-    own = navigated(memory(altitude_demand_raw=500.0), flying(), way)
+    own = navigated(memory(altitude_demand_in=500.0), flying(), way)
     # A quarter of the way, 100 m aside of the line, which counts for nothing.
     run = math.hypot(EAST, NORTH)
     ue, un = EAST / run, NORTH / run
