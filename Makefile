@@ -1,5 +1,6 @@
 # make demo: set up, then plan over real terrain, export, fly, log, check, report
-# make test: set up, then run every test
+# make test: set up, then run the tests, but for the 5 % of tests/slow/cases.txt, which take two thirds of the time
+# make slow: set up, then run those
 # make lint: set up, then check style, types and the pages of docs/
 # make dev: set up what a developer needs, and nothing more
 PYTHON ?= python3
@@ -8,7 +9,7 @@ VENV := .venv
 export PYTHONDONTWRITEBYTECODE :=
 BIN := $(VENV)/bin
 # Three processes test on two cores: threads of NumPy's linear algebra would stand in the other's way.
-test low newest: export OPENBLAS_NUM_THREADS := 1
+test slow low newest: export OPENBLAS_NUM_THREADS := 1
 # A file's tests run in one of three processes, so that what they share is made once; files in their own order.  Three,
 # since a tenth of the tests' time is waiting: for a port, a timeout, a process that ends.
 SPREAD := -n 3 --dist loadfile --no-loadscope-reorder
@@ -42,18 +43,20 @@ TESTED := $(VENV)/.ready-test
 BUILD_PAGES := $(BIN)/python -m sphinx -W -q -b html -d build/docs-trees docs build/docs
 
 # make low, make newest: the tests with the lowest versions supported, and with the newest there are
-.PHONY: demo test lint bench soak wheels low newest dev docs tables setup clients clean
+.PHONY: demo test slow lint bench soak wheels low newest dev docs tables setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
 
 # Kernels are compiled once, before the tests: each of pytest's processes would compile for itself.
-test:
+test: CASES := not slow
+slow: CASES := slow
+test slow:
 	@$(MAKE) --no-print-directory --jobs=2 $(TESTED) clients
 	@$(BIN)/python -m tests.kernels >/dev/null; \
 	echo "tested with the versions of constraints.txt:"; \
 	{ $(BIN)/uv pip list --python $(BIN)/python || $(BIN)/python -m pip list; } 2>/dev/null | grep -i -E "$(DIRECT)"; \
-	$(IN_MEMORY); $(BIN)/python -m pytest $(SPREAD)
+	$(IN_MEMORY); $(BIN)/python -m pytest -m "$(CASES)" $(SPREAD)
 
 # The tables of docs/ that the code knows, written into the pages.
 tables: $(TESTED)

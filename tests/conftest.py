@@ -16,6 +16,7 @@ from planfly.runtime.process_setup import prepare_process
 from planfly.terminal import output
 from tests.kernels import note_of_compiled
 from tests.shared import remove_made
+from tests.slow import measured, slow_cases
 from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files, scaled
 
 # Looking for garbage among all that tests import takes a tenth of their time.
@@ -85,14 +86,24 @@ def _models_are_tried_here() -> Iterator[None]:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests of files that have more to do in a soak, leave out those that one before has passed, and sort."""
+    """Mark slow cases and tests with more to do in a soak, leave out files that a soak has passed, and sort."""
+    slow = slow_cases()
     for item in items:
+        if item.nodeid in slow:
+            item.add_marker("slow")
         if {"SOAK", "only_in_soak", "scaled", "some"} & vars(getattr(item, "module", object)).keys():
             item.add_marker("soak")
     if passed := passed_files():
         config.hook.pytest_deselected(items=[item for item in items if _file(item.nodeid) in passed])
         items[:] = [item for item in items if _file(item.nodeid) not in passed]
     items.sort(key=lambda item: not _file(item.nodeid).endswith(COMPILING))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Measure how long each case takes, if PLANFLY_TEST_TIMES names a file."""
+    with measured(item.nodeid):
+        return (yield)
 
 
 def _file(nodeid: str) -> str:

@@ -27,7 +27,6 @@ def sampled(path: np.ndarray) -> np.ndarray:
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("number", some(DRAWS, 2))
 def test_planned_where_a_grid_can_and_flown_inside_all(number: int) -> None:
     flown = fly(number)
