@@ -52,7 +52,7 @@ from planfly.campaigns.summary import (
     closest_text,
     summarise_campaign,
     summary_json,
-    worst_flight_log_name,
+    worst_flight_logs,
 )
 from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, Store, check_not_locked, is_same_flight
 from planfly.workflow.make_plan import Advance
@@ -87,9 +87,9 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
                 "; ".join(f"{RULE_WORDS[rule].title} at {place_text(place)}" for rule, place in row.failed[:4])
                 or row.ended,
                 closest_text(row),
-                worst_flight_log_name(row) if row.duration > 0.0 else "",
+                log,
             )
-            for row in summary.worst
+            for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True)
         ],
         drawn=summary.dispersions.get("aircraft"),
         dispersions=[
@@ -305,18 +305,18 @@ def write_files(
     command: str,
     advance: Advance | None = None,
 ) -> None:
-    """Write ``summary.json``, ``report.html`` and the worst flights' logs; remove logs of other flights."""
+    """Write ``summary.json``, ``report.html`` and the logs of the three worst flights; remove logs of other flights."""
     (folder / "worst").mkdir(exist_ok=True)
-    kept_logs = {folder / worst_flight_log_name(row) for row in summary.worst}
-    for path in _worst_flight_logs(folder):
-        if path not in kept_logs:
-            path.unlink()
-    for count, row in enumerate(summary.worst):
-        path = folder / worst_flight_log_name(row)
-        if row.duration > 0.0 and not path.exists():
-            fly_row_again(base, row, path)
+    logged_flights = [
+        (row, folder / log) for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True) if log
+    ]
+    for path in set(_worst_flight_logs(folder)) - {log for _, log in logged_flights}:
+        path.unlink()
+    for count, (row, log) in enumerate(logged_flights):
+        if not log.exists():
+            fly_row_again(base, row, log)
         if advance is not None:
-            advance(count + 1.0, float(len(summary.worst)), f"flight {row.draw.index}")
+            advance(count + 1.0, float(len(logged_flights)), f"flight {row.draw.index}")
     write_whole(folder / "summary.json", summary_json(summary))
     write_whole(folder / "report.html", campaign_page(base, summary, store, command))
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -22,8 +23,10 @@ from planfly.campaigns.tables import Store
 SUMMARY_SCHEMA = "planfly.campaign-summary/1"
 # Minimum share of a margin's variance that a quantity must explain to be named.
 _MIN_NAMED_FRACTION = 0.05
-# Number of worst flights with a log.
+# Number of worst flights that the summary lists.
 WORST_FLIGHT_COUNT = 10
+# Number of those with a log.  A log takes as long as the flight itself, and `--refly` writes that of any flight.
+LOGGED_FLIGHT_COUNT = 3
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,9 @@ def summary_json(summary: CampaignSummary) -> str:
             }
             for sensitivity in summary.sensitivities
         ],
-        "worst": [_flight_data(row) for row in summary.worst],
+        "worst": [
+            _flight_data(row, log) for row, log in zip(summary.worst, worst_flight_logs(summary.worst), strict=True)
+        ],
         "spread": summary.dispersions,
         "conditions": asdict(summary.conditions),
         "made_of": summary.made_of,
@@ -170,7 +175,7 @@ def summary_json(summary: CampaignSummary) -> str:
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def _flight_data(row: FlightRow) -> dict[str, Any]:
+def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
     return {
         "flight": row.draw.index,
         "outcome": row.outcome,
@@ -179,7 +184,7 @@ def _flight_data(row: FlightRow) -> dict[str, Any]:
         "closest": closest_text(row),
         "drawn": {name: _to_plain_number(value) for name, value in row.draw.values.items() if name in QUANTITY_BY_NAME},
         "seed": row.draw.seed,
-        "log": worst_flight_log_name(row) if row.duration > 0.0 else None,
+        "log": log or None,
     }
 
 
@@ -194,9 +199,10 @@ def closest_text(row: FlightRow) -> str:
     return f"{RULE_WORDS[rule].title} {margin.value:+.1f} {margin.unit} at {place_text(margin.place)}"
 
 
-def worst_flight_log_name(row: FlightRow) -> str:
-    """Return the path of a flight's log, relative to the campaign's folder."""
-    return f"worst/flight-{row.draw.index:06d}.mcap"
+def worst_flight_logs(worst: Sequence[FlightRow]) -> list[str]:
+    """Return the path of each flight's log, relative to the campaign's folder, or "" for a flight without a log."""
+    logged_indices = [row.draw.index for row in worst if row.duration > 0.0][:LOGGED_FLIGHT_COUNT]
+    return [f"worst/flight-{row.draw.index:06d}.mcap" if row.draw.index in logged_indices else "" for row in worst]
 
 
 def campaign_lines(summary: CampaignSummary) -> list[str]:
