@@ -4,12 +4,15 @@ import numpy as np
 
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
+from aircraft.power_prior import EFFICIENCY_LOG_SD
 from world.arrays import Floats
 
 # Number of draws.
 COUNT = 512
 # Seed of the draws.
 SEED = 1
+# Factor on the battery's power in the model of an identified aircraft, 1 for the estimate.
+DRIVE_POWER = "ident/drive-power"
 # Draws per aircraft that is kept, of which those within the bounds are used.
 _DRAWS_PER_AIRCRAFT = 20
 
@@ -25,3 +28,15 @@ def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> F
     # For an estimate close to its bounds too few draws are within; clipped draws follow them.
     chosen = np.concatenate([within_bounds, np.clip(samples, lower, upper)])[:count]
     return np.asarray(chosen)
+
+
+def draw_drive_power(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
+    """Draw the factor on the battery's power, (count,): 1 if the battery's current was logged.
+
+    No other signal holds the efficiency of the drive; that of real aircraft varies by `EFFICIENCY_LOG_SD`.
+    """
+    if estimate.with_current:
+        return np.ones(count)
+    # The parameters take the generator of the seed itself.
+    normals = np.random.default_rng([seed, 1]).standard_normal(count)
+    return np.asarray(np.exp(EFFICIENCY_LOG_SD * normals))

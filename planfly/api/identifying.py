@@ -186,6 +186,9 @@ def _load_base(base: str | Path) -> Aircraft:
     if (aircraft.folder / "posterior.toml").is_file():
         allowed = "identified from flight logs itself: name its base, which its posterior.toml states"
         raise FlightError.of_argument("base", str(base), allowed)
+    if aircraft.battery_voltage == 0.0:
+        allowed = "burns fuel, and no engine is estimated: expected an electric aircraft"
+        raise FlightError.of_argument("base", str(base), allowed)
     return aircraft
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,10 +10,11 @@ import numpy as np
 from aircraft.catalog import Aircraft, read_aircraft
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.drag import NUISANCES
-from aircraft.identification.draws import draw_aircraft
+from aircraft.identification.draws import DRIVE_POWER, draw_aircraft, draw_drive_power
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
 from aircraft.identification.performance import GRAVITY, Performance, fastest_level, level_controls, performance
+from aircraft.power_prior import EFFICIENCY_LOG_SD
 from aircraft.uncertainty import Draws, draws_text
 from flight.autopilots.arduplane.parameters import DEFINITIONS, ArduPilotParameters
 from flight.dynamics.envelope_tables import load_envelope
@@ -87,10 +88,22 @@ class Identified:
 
     def performance(self) -> tuple[Performance, Performance]:
         """Return the performance of the estimate, (1,), and of all draws, (512,)."""
-        return (
-            performance(self.numbers, self.estimate.values, self.cruise, DENSITY),
-            performance(self.numbers, self.draws, self.cruise, DENSITY),
+        best, samples = (
+            performance(self.numbers, values, self.cruise, DENSITY) for values in (self.estimate.values, self.draws)
         )
+        return best, replace(samples, power=samples.power * self.drive_power)
+
+    @property
+    def drive_power(self) -> Floats:
+        """Factor on the battery's power in each draw, (512,)."""
+        return draw_drive_power(self.estimate, len(self.draws))
+
+    def aircraft_draws(self) -> Draws:
+        """Return the draws as the model's properties; the factor on the battery's power only if it is not known."""
+        properties = tuple(parameter.property_name for parameter in PARAMETERS)
+        if self.estimate.with_current:
+            return Draws(properties, self.draws)
+        return Draws((*properties, DRIVE_POWER), np.column_stack([self.draws, self.drive_power]))
 
     def drive_conflict(self) -> DriveConflict | None:
         """Return the conflict of the estimate's drag and power in level flight, or None."""
@@ -141,12 +154,11 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
         if home is not None:
             mission = identification_mission(aircraft, envelope, *home)
             files["identify.waypoints"] = waypoints_text(mission)
-    properties = tuple(parameter.property_name for parameter in PARAMETERS)
     return files | {
         "ardupilot.parm": _parameter_file_text(identified.logs[-1]),
         "ardupilot.toml": _servo_file_text(identified.outputs),
         "posterior.toml": posterior_text(identified),
-        "draws.csv": draws_text(Draws(properties, identified.draws)),
+        "draws.csv": draws_text(identified.aircraft_draws()),
     }
 
 
@@ -300,22 +312,37 @@ def posterior_text(identified: Identified) -> str:
         lines += ["", "[[log]]", f'file = "{_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
         lines += [] if identified.until is None else [f"until_s = {identified.until:.9g}  # later rows were not used"]
     for k, parameter in enumerate(PARAMETERS):
-        lines += [
-            "",
-            "[[quantity]]",
-            f'property = "{parameter.property_name}"',
-            f'unit = "{"factor" if parameter.kind == "factor" else "1"}"',
-            f"prior = {parameter.prior:g}",
-            f"prior_sd = {parameter.sd:g}",
-            f"estimate = {estimate.values[k]:.6g}",
-            f"sd = {estimate.sds[k]:.4g}",
-            f"of_log = {log_fractions[k]:.3f}  # share of the interval that is the logs'",
-            f'reason = "{parameter.title}"',
-        ]
+        numbers = parameter.prior, parameter.sd, estimate.values[k], estimate.sds[k], log_fractions[k]
+        unit = "factor" if parameter.kind == "factor" else "1"
+        lines += _quantity_lines(parameter.property_name, unit, numbers, parameter.title)
     correlation = estimate.covariance / np.outer(estimate.sds, estimate.sds)
+    if not estimate.with_current:
+        numbers = 1.0, EFFICIENCY_LOG_SD, 1.0, EFFICIENCY_LOG_SD, 0.0
+        lines += _quantity_lines(DRIVE_POWER, "factor", numbers, "power of the drive, which only the current shows")
+        correlation = np.block([[correlation, np.zeros((len(correlation), 1))], [np.zeros(len(correlation)), 1.0]])
     lines += ["", "[correlation]", "# Rows and columns in the order of the quantities.", "matrix = ["]
     lines += [f"  [{', '.join(f'{value:.4f}' for value in row)}]," for row in correlation]
     return "\n".join([*lines, "]", ""])
+
+
+def _quantity_lines(name: str, unit: str, numbers: tuple[float, float, float, float, float], reason: str) -> list[str]:
+    """Return the lines of a quantity.
+
+    numbers: prior, its standard deviation, estimate, its standard deviation, and the share that is the logs'.
+    """
+    prior, prior_sd, value, sd, log_share = numbers
+    return [
+        "",
+        "[[quantity]]",
+        f'property = "{name}"',
+        f'unit = "{unit}"',
+        f"prior = {prior:g}",
+        f"prior_sd = {prior_sd:g}",
+        f"estimate = {value:.6g}",
+        f"sd = {sd:.4g}",
+        f"of_log = {log_share:.3f}  # share of the interval that is the logs'",
+        f'reason = "{reason}"',
+    ]
 
 
 def _toml_safe(text: str) -> str:

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 
 from aircraft.catalog import Aircraft
 from aircraft.identification.base_model import BaseModel
+from aircraft.identification.draws import DRIVE_POWER
 from aircraft.identification.electric_motor import ElectricMotor
 from aircraft.identification.motor import Motor
 from aircraft.identification.motor_table import MotorTable
@@ -213,6 +214,7 @@ def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[El
     base_text = "\n".join(ElementTree.tostring(element, encoding="unicode").strip() for element in base_properties)
     motor = numbers.motor
     functions = _motor_functions(motor)
+    functions["battery-power-w"] = f"<product> <p> {DRIVE_POWER} </p> {functions['battery-power-w']} </product>"
     body = "\n".join(f'<function name="motor/{name}"> {text} </function>' for name, text in functions.items())
     torque = """<moment name="torque" frame="BODY">
   <function> <product> <p> motor/torque-n_m </p> <v> -0.7375621492772654 </v> </product> </function>
@@ -221,6 +223,7 @@ def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[El
     return f"""<external_reactions>
 {base_text}
 {identified_text}
+<property value="1"> {DRIVE_POWER} </property>
 <property value="{number(motor.voltage)}"> motor/battery-v </property>
 <property value="0"> motor/braking </property>
 {body}

@@ -129,20 +129,25 @@ def flight_records(
         source=log.source,
     )
     records = [flight.rows(slice(begin, end)) for begin, end in _find_stretches(usable)]
-    _check_length(log, records, min_seconds, cut=bool(_vtol_rows(log, grid, pulses).any()))
+    _check_length(log, records, min_seconds, until, cut=bool(_vtol_rows(log, grid, pulses).any()))
     return records
 
 
-def _check_length(log: MotionLog, records: list[FlightRecord], min_seconds: float, *, cut: bool) -> None:
+def _check_length(log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, cut: bool) -> None:
     """Raise LogError for too little usable flight.
 
+    until: end of the part that is used, s of the log.
     cut: True if flight on lifting motors was cut.
     """
     seconds = sum(record.seconds for record in records)
     if seconds < min_seconds:
         vtol_note = "; flight on its lifting motors is cut" if cut else ""
-        message = f"{seconds / 60.0:.1f} min of it are flight on the wing that can be used{vtol_note}"
-        raise LogError(f"{log.source}: {message}: at least {min_seconds / 60.0:g} min are needed", file=log.source)
+        until_note = f" before {until:g} s" if math.isfinite(until) else ""
+        message = f"{seconds:.0f} s of it{until_note} are flight on the wing that can be used{vtol_note}"
+        allowed = f"at least {min_seconds:g} s are needed"
+        if min_seconds == MIN_SECONDS:
+            allowed += f" to identify an aircraft, and {MIN_CHECK_SECONDS:g} s to check one"
+        raise LogError(f"{log.source}: {message}: {allowed}", file=log.source, value=seconds, allowed=allowed)
 
 
 def _pulses_to_controls(outputs: Mapping[str, ServoOutput], pulses: Floats) -> Floats:

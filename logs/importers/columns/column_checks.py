@@ -26,6 +26,10 @@ _FORCE_RANGE_MPS2 = (-20.0, -4.0)
 _CLEAR_ALIGNMENT = 0.7
 # Largest mean angle between heading and ground course, rad.
 _MAX_HEADING_DIFFERENCE_RAD = math.radians(50.0)
+# Least range of a throttle that moves.
+_MIN_THROTTLE_RANGE = 0.01
+# Least range of the current, 5 to 95 %, that only a throttle changes, A.
+_MIN_CURRENT_RANGE_A = 3.0
 _EARTH_RADIUS_M = 6_371_008.8
 
 
@@ -54,6 +58,8 @@ def check_signs_and_units(log: ColumnLog) -> None:
         _check_force(log, float(np.median(_on_grid(log.series("acceleration_down"), grid))))
     if log.has("yaw"):
         _check_heading(log, grid)
+    if log.has("throttle", "current"):
+        _check_throttle(log, grid)
 
 
 def _flying_grid(log: ColumnLog) -> Floats:
@@ -118,6 +124,9 @@ def _pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
         yield _Pair("velocity_north", "the change of latitude", _on_grid(log.series("velocity_north"), grid), north)
         east = _change(log.series("longitude"), grid) * _EARTH_RADIUS_M * np.cos(_on_grid(latitude, grid))
         yield _Pair("velocity_east", "the change of longitude", _on_grid(log.series("velocity_east"), grid), east)
+    if log.has("throttle", "current"):
+        throttle, current = (_on_grid(log.series(name), grid) for name in ("throttle", "current"))
+        yield _Pair("throttle", "the current", throttle, current, exact=False)
     if log.has("pitch", "altitude"):
         climb = _change(log.series("altitude"), grid)
         yield _Pair("pitch", "the change of altitude", _on_grid(log.series("pitch"), grid), climb, exact=False)
@@ -128,7 +137,7 @@ def _check_pair(log: ColumnLog, pair: _Pair) -> None:
     values, expected = pair.values - pair.values.mean(), pair.expected - pair.expected.mean()
     size = float(np.sqrt((values @ values) * (expected @ expected)))
     correlation = float(values @ expected) / size if size > 0.0 else 0.0
-    field, column = f"columns.{pair.quantity}", log.table.columns[pair.quantity][0].column
+    field, column = f"columns.{pair.quantity}", log.column(pair.quantity)
     if correlation < -_CLEAR_CORRELATION:
         hint = "check sign and frame"
         message = f"{column} runs against {pair.partner} (correlation {correlation:.2f}): {hint}"
@@ -152,6 +161,22 @@ def _check_force(log: ColumnLog, force: float) -> None:
         )
 
 
+def _check_throttle(log: ColumnLog, grid: Floats) -> None:
+    """Raise LogError for a throttle that stays where it is while the current changes."""
+    throttle, current = (_on_grid(log.series(name), grid) for name in ("throttle", "current"))
+    low, high = np.percentile(current, [5.0, 95.0]).tolist()
+    if np.ptp(throttle) < _MIN_THROTTLE_RANGE and high - low > _MIN_CURRENT_RANGE_A:
+        hint = "check the column"
+        message = f"{log.column('throttle')} stays at {throttle[0]:.3g} in flight, and the current goes from {low:.3g}"
+        field = "columns.throttle"
+        raise LogError(
+            f"{log.table_path}: {field}: {message} to {high:.3g} A: {hint}",
+            file=log.table_path,
+            field=field,
+            allowed=hint,
+        )
+
+
 def _check_heading(log: ColumnLog, grid: Floats) -> None:
     """Raise LogError if the heading is not that of the ground course, or runs against it."""
     if log.has("velocity_north", "velocity_east"):
@@ -164,7 +189,7 @@ def _check_heading(log: ColumnLog, grid: Floats) -> None:
     yaw = _on_grid(log.series("yaw"), grid, turning=True)
     same, reversed_yaw = (complex(np.mean(np.exp(1j * (course - sign * yaw)))) for sign in (1.0, -1.0))
     difference = math.degrees(math.atan2(same.imag, same.real))
-    column = log.table.columns["yaw"][0].column
+    column = log.column("yaw")
     text = ""
     if abs(same) > _CLEAR_ALIGNMENT and abs(math.radians(difference)) > _MAX_HEADING_DIFFERENCE_RAD:
         text = f"{column} differs by {difference:.0f} deg from the ground course on average"

@@ -19,7 +19,15 @@ from logs.importers.columns.column_table import (
 )
 from logs.importers.columns.data_files import Column, DataFile, read_data_file
 from logs.importers.columns.file_names import find_table, is_table
-from logs.importers.columns.quantities import QUANTITIES, UNIT_ZEROS, UNITS, better_unit, to_frame
+from logs.importers.columns.quantities import (
+    ANGLES,
+    QUANTITIES,
+    QUATERNION,
+    UNIT_ZEROS,
+    UNITS,
+    better_unit,
+    to_frame,
+)
 from world.arrays import Flags, Floats
 from world.errors import LogError
 from world.files import did_you_mean
@@ -28,6 +36,8 @@ from world.files import did_you_mean
 _MAX_RATE_RATIO = 1.25
 # Share of the values that must lie in a quantity's plausible range.
 _PLAUSIBLE_SHARE = 0.98
+# Largest difference of a quaternion's length from 1.
+_MAX_QUATERNION_ERROR = 0.05
 # Minimum correlation of the two signals that align a clock.
 _MIN_CORRELATION = 0.6
 # Times above this are seconds since 1970.
@@ -76,8 +86,18 @@ class ColumnLog:
         return digest.hexdigest()
 
     def has(self, *quantities: str) -> bool:
-        """Return True if the table names all these quantities."""
-        return all(quantity in self.table.columns for quantity in quantities)
+        """Return True if the table names all these quantities; a quaternion is roll, pitch and yaw."""
+        named = self.table.columns.keys()
+        return all(quantity in named or self._is_from_quaternion(quantity) for quantity in quantities)
+
+    def _is_from_quaternion(self, quantity: str) -> bool:
+        named = self.table.columns.keys()
+        return quantity in ANGLES and quantity not in named and named >= set(QUATERNION)
+
+    def column(self, quantity: str) -> str:
+        """Return the column of the first entry of a quantity, or the quantity's name for a constant."""
+        source = QUATERNION[0] if self._is_from_quaternion(quantity) else quantity
+        return self.table.columns[source][0].column or quantity
 
     def unit(self, quantity: str) -> str:
         """Return the unit of the first entry of a quantity."""
@@ -92,6 +112,8 @@ class ColumnLog:
 
         Raises LogError for a missing column, text in place of numbers, and implausible values.
         """
+        if self._is_from_quaternion(quantity):
+            return self._angle_of_quaternion(quantity)
         entries = self.table.columns[quantity]
         parts = [self._entry_series(quantity, entry) for entry in entries]
         if len(parts) == 1:
@@ -103,6 +125,30 @@ class ColumnLog:
                 raise self._error(f"columns.{quantity}.clock", entry.clock, "all entries of a quantity share one clock")
             values = np.where(np.isfinite(values), values, part.values)
         return Series(time, values)
+
+    def _angle_of_quaternion(self, angle: str) -> Series:
+        """Return roll, pitch or yaw of the quaternion from FRD to NED, or from FLU to ENU.
+
+        Raises LogError for parts of different length, and for a quaternion whose length is not 1.
+        """
+        parts = [self.series(name) for name in QUATERNION]
+        time = parts[0].time
+        if any(not np.array_equal(part.time, time) for part in parts):
+            allowed = "expected the clock of quaternion_w"
+            raise self._error("columns.quaternion_x.clock", self.column("quaternion_x"), allowed)
+        w, x, y, z = (part.values for part in parts)
+        lengths = np.sqrt(w * w + x * x + y * y + z * z)
+        known = lengths[np.isfinite(lengths)]
+        if known.size and np.mean(np.abs(known - 1.0) < _MAX_QUATERNION_ERROR) < _PLAUSIBLE_SHARE:
+            shown = f"{self.column('quaternion_w')} and the other parts have a length of {np.median(known):.3g}"
+            raise self._error("columns.quaternion_w", shown, "expected 1")
+        angles = {
+            "roll": lambda: np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+            "pitch": lambda: np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
+            "yaw": lambda: np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+        }
+        factor, offset = to_frame(angle, self.frame("quaternion_w"))
+        return Series(time, factor * angles[angle]() + offset)
 
     def raw(self, quantity: str) -> tuple[Floats, Column]:
         """Return times and unconverted values of a quantity, for texts and numbers of modes."""
@@ -325,9 +371,10 @@ class ColumnLog:
         zero = UNIT_ZEROS.get(entry.unit, 0.0)
         unit = better_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
         hint = f"; is it in {unit}?" if unit else ""
-        shown = f"{(worst - zero) / factor:.4g} {entry.unit}"
+        shown = f"{(worst - zero) / factor:.4g} {entry.unit}".rstrip()
         bounds = " to ".join(f"{(limit - zero) / factor:.4g}" for limit in (limits.low, limits.high))
-        raise self._error(f"columns.{quantity}", f"{entry.column} has {shown}", f"expected {bounds} {entry.unit}{hint}")
+        allowed = f"expected {bounds} {entry.unit}".rstrip()
+        raise self._error(f"columns.{quantity}", f"{entry.column} has {shown}", f"{allowed}{hint}")
 
     def _fresh_rows(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
         """Return the rows with a new value of a column that is written more often than it is measured."""

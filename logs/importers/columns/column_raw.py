@@ -55,7 +55,7 @@ def _position(log: ColumnLog) -> LogSeries:
         altitude = join([log.series("altitude")])
         up = np.interp(parts.time, altitude.time, altitude.values[:, 0])
     values = np.column_stack([np.degrees(parts.values), up])
-    return LogSeries(_name(log, "altitude" if log.has("altitude") else "latitude"), parts.time, values)
+    return LogSeries(log.column("altitude" if log.has("altitude") else "latitude"), parts.time, values)
 
 
 def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
@@ -68,18 +68,14 @@ def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
         yield "attitude", LogSeries("attitude", attitude.time, attitude.values)
     air = read_air(log)
     if len(air.true_airspeed.time):
-        yield "airspeed", LogSeries(_name(log, "airspeed"), air.true_airspeed.time, air.true_airspeed.values)
+        yield "airspeed", LogSeries(log.column("airspeed"), air.true_airspeed.time, air.true_airspeed.values)
     if len(air.wind.time):
         yield "wind", LogSeries(air.wind_source, air.wind.time, air.wind.values[:, ::-1])
     if log.has("current"):
         yield "battery", _battery(log)
     if log.has("throttle"):
         throttle = join([log.series("throttle")])
-        yield "throttle", LogSeries(_name(log, "throttle"), throttle.time, throttle.values)
-
-
-def _name(log: ColumnLog, quantity: str) -> str:
-    return log.table.columns[quantity][0].column or quantity
+        yield "throttle", LogSeries(log.column("throttle"), throttle.time, throttle.values)
 
 
 def _battery(log: ColumnLog) -> LogSeries:

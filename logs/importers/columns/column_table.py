@@ -130,7 +130,7 @@ class LogTable(_Table):
 
     def _check_entry(self, quantity: str, entry: ColumnTable) -> None:
         field, known = f"columns.{quantity}", QUANTITIES[quantity]
-        if not (known.dimension == "mode" and not entry.unit):
+        if entry.unit or "" not in UNITS[known.dimension]:
             _check_choice(f"{field}.unit", entry.unit, UNITS[known.dimension])
         if entry.frame:
             _check_choice(f"{field}.frame", entry.frame, known.frames)

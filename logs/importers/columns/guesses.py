@@ -11,7 +11,7 @@ import numpy as np
 
 from logs.importers.columns.column_table import MAIN_CLOCK
 from logs.importers.columns.data_files import Column, DataFile, read_data_file
-from logs.importers.columns.quantities import QUANTITIES, UNIT_ZEROS, UNITS
+from logs.importers.columns.quantities import ANGLES, QUANTITIES, QUATERNION, UNIT_ZEROS, UNITS
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -28,6 +28,10 @@ NAMES: dict[str, tuple[str, ...]] = {
     "roll": ("roll", "phi", "bank", "rollangle"),
     "pitch": ("pitch", "theta", "pitchangle"),
     "yaw": ("yaw", "psi", "heading", "hdg", "yawangle"),
+    "quaternion_w": ("q0", "qw", "quaternionw", "orientationw"),
+    "quaternion_x": ("q1", "qx", "quaternionx", "orientationx"),
+    "quaternion_y": ("q2", "qy", "quaterniony", "orientationy"),
+    "quaternion_z": ("q3", "qz", "quaternionz", "orientationz"),
     "roll_rate": ("p", "rollrate", "gyrx", "gyrox", "rollspeed", "wx"),
     "pitch_rate": ("q", "pitchrate", "gyry", "gyroy", "pitchspeed", "wy"),
     "yaw_rate": ("r", "yawrate", "gyrz", "gyroz", "yawspeed", "wz"),
@@ -104,6 +108,7 @@ _TRIED = {
     "current": ("A", "cA", "mA"),
     "pressure": ("kPa", "hPa", "Pa"),
     "temperature": ("degC", "K"),
+    "ratio": ("",),
 }
 # Range of usual intervals between rows, s.
 _STEPS_S = (0.001, 5.0)
@@ -256,13 +261,14 @@ def _guess(quantity: str, column: str, clock: _Clock, values: Column, stated: st
     if not known.size or not np.ptp(known):
         return None
     unit = stated if stated in UNITS[entry.dimension] else _plausible_unit(quantity, known)
-    if not unit:
+    if unit is None:
         return None
     reason = f": largest value {np.abs(known).max():.4g}" + ("" if unit != stated else f", named {stated}")
     return _Guess(quantity, column, clock, unit, _frame(quantity, column, known), reason)
 
 
-def _plausible_unit(quantity: str, known: Floats) -> str:
+def _plausible_unit(quantity: str, known: Floats) -> str | None:
+    """Return the first unit in which values are plausible, or None."""
     entry = QUANTITIES[quantity]
     for unit in _TRIED[entry.dimension]:
         values = known * UNITS[entry.dimension][unit] + UNIT_ZEROS.get(unit, 0.0)
@@ -272,7 +278,7 @@ def _plausible_unit(quantity: str, known: Floats) -> str:
         is_usual &= quantity != "voltage" or median <= _HIGHEST_VOLTAGE_V
         if inside >= 0.98 and is_usual:
             return unit
-    return ""
+    return None
 
 
 def _frame(quantity: str, column: str, known: Floats) -> str:
@@ -324,13 +330,17 @@ def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict
 def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
     """Yield the quantities that were not found, as remarks."""
     found = {guess.quantity for guess in guesses}
-    halves = {"elevator": "elevon_left", "aileron": "aileron_left" if "aileron_left" in found else "elevon_left"}
+    instead = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
+        "elevator": "elevon_left",
+        "aileron": "aileron_left" if "aileron_left" in found else "elevon_left",
+    }
     yield ""
     for purpose, quantities in _NEEDED.items():
-        missing = [name for name in quantities if name not in found and halves.get(name) not in found]
+        missing = [name for name in quantities if name not in found and instead.get(name) not in found]
         if missing:
             yield f"# Not found, and needed by planfly {purpose}: {', '.join(missing)}"
-    others = [name for name in QUANTITIES if name not in found and not any(name in need for need in _NEEDED.values())]
+    settled = found.union(*_NEEDED.values(), QUATERNION if found.issuperset(ANGLES) else ())
+    others = [name for name in QUANTITIES if name not in settled]
     if others:
         yield f"# Not found, and optional: {', '.join(others)}"
 

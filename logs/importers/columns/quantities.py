@@ -17,6 +17,7 @@ UNITS: dict[str, dict[str, float]] = {
     "pressure": {"Pa": 1.0, "hPa": 100.0, "mbar": 100.0, "kPa": 1000.0},
     "temperature": {"degC": 1.0, "K": 1.0},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "iso": 1.0},
+    "ratio": {"": 1.0},
     "mode": {"": 1.0},
 }
 # Value of a unit's zero in the base unit of its dimension; a throttle is idle at a pulse of 1000 us, full at 2000 us.
@@ -65,6 +66,13 @@ QUANTITIES: dict[str, Quantity] = {
     "yaw": Quantity(
         "angle", "heading clockwise from north (NED) or counterclockwise from east (ENU)", -_TURN, _TURN, _WORLD
     ),
+    "quaternion_w": Quantity(
+        "ratio", "real part of the attitude from body to earth, in place of roll, pitch and yaw", -1.01, 1.01, _WORLD
+    ),
+    **{
+        f"quaternion_{axis}": Quantity("ratio", f"imaginary part {number} of it", -1.01, 1.01)
+        for axis, number in zip("xyz", (1, 2, 3), strict=True)
+    },
     "roll_rate": Quantity("angular rate", "about the axis forward", -12, 12, _BODY),
     "pitch_rate": Quantity("angular rate", "about the axis right (FRD) or left (FLU)", -12, 12, _BODY),
     "yaw_rate": Quantity("angular rate", "about the axis down (FRD) or up (FLU)", -12, 12, _BODY),
@@ -96,6 +104,9 @@ QUANTITIES: dict[str, Quantity] = {
     "current": Quantity("current", "current from the battery", -50, 1000),
     "mode": Quantity("mode", "flight mode, a number or a text (`[modes]`)", -math.inf, math.inf),
 }
+# Angles of the attitude, and the parts of the quaternion that can take their place.
+ANGLES = ("roll", "pitch", "yaw")
+QUATERNION = ("quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
 # Quantities whose sign changes from the second frame to the first.
 _NEGATED_BY_FRAME = {
     **dict.fromkeys(("pitch_rate", "yaw_rate", "acceleration_right", "acceleration_down"), "FLU"),

@@ -116,7 +116,12 @@ def test_a_log_becomes_a_folder_that_flies(
         (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "near enough to aerosonde"),
         (["--identify", "a.BIN", "--mass", "99", "--span", "2.9", "--out", "./mine"], "allowed 0.3..50 kg"),
         (["--identify", "a.BIN", *ARGUMENTS, "--battery", "12", "--out", "./mine"], "volts and capacity"),
-        (["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"], "0.0 min of it are flight on the wing"),
+        (["--identify", "a.BIN", *ARGUMENTS, "--base", "c172x", "--out", "./mine"], "--base c172x: burns fuel"),
+        (
+            ["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"],
+            "0 s of it are flight on the wing that can be used: at least 180 s are needed to identify an aircraft, and"
+            " 30 s to check one",
+        ),
         (["aerosonde", "--check", "a.BIN"], "only with --identify"),
     ],
 )
@@ -148,6 +153,28 @@ def test_an_identified_aircraft_is_no_base(capsys: pytest.CaptureFixture[str]) -
     write_motion(Path("a.BIN"), short_motion())
     said = refused(["--identify", "a.BIN", *ARGUMENTS, "--base", "./known", "--out", "./mine"], capsys)
     assert "--base ./known: identified from flight logs itself: name its base" in said
+
+
+def test_only_the_rows_before_until_are_used(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The estimate sees no row after `--until`, in s of the log; too few rows before it are refused by its name."""
+    seen: list[FlightRecord] = []
+
+    def note(records: list[FlightRecord], _base: object, *, dynamics: bool) -> Estimate:
+        seen.extend(records)
+        raise LogError(f"noted with dynamics {dynamics}")
+
+    monkeypatch.setattr(identifying, "estimate_model", note)
+    log = start_of(flown_truth().log, 240.0)
+    write_motion(Path("a.BIN"), log)
+    end = float(log.inertial.time[0]) + 220.0
+    assert "noted" in refused(["--identify", "a.BIN", *ARGUMENTS, "--until", f"{end}", "--out", "./mine"], capsys)
+    last = max(float(record.time[-1]) for record in seen)
+    # Rows are 0.02 s apart.
+    assert end - 0.05 < last < end
+    message = refused(["--identify", "a.BIN", *ARGUMENTS, "--until", "100", "--out", "./mine"], capsys)
+    assert "s of it before 100 s are flight on the wing that can be used: at least 180 s" in message
 
 
 @pytest.mark.parametrize("again", [["--identify", "a.BIN", "b.BIN"], ["--identify", "a.BIN", "--check", "b.BIN"]])

@@ -131,6 +131,10 @@ def test_a_draw_is_a_set_of_properties(tmp_path: Path) -> None:
     base = straight(Fdm(BASE), 25.0, 500.0)
     assert base is not None
     assert weaker.throttle > base.throttle + 0.02
+    power = fdm.read().power
+    fdm.properties.set("ident/drive-power", 1.5)
+    fdm.balance(weaker.vector())
+    assert fdm.read().power == pytest.approx(1.5 * power, rel=1e-6)
 
 
 @pytest.mark.parametrize(

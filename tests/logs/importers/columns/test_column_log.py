@@ -72,6 +72,8 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
             '"ve", unit = "m/s", sign = -1',
             "velocity_east: ve runs against the change of",
         ),
+        ('"thr", unit = "%"', '"thr", unit = "%", sign = -1, offset = -100', "throttle: thr runs against the current"),
+        ('"thr", unit = "%"', '"thr", unit = "%", scale = 0', "throttle: thr stays at 0 .* current goes from 4"),
     ],
 )
 def test_a_table_that_is_wrong_is_refused_in_one_line(tmp_path: Path, before: str, after: str, expected: str) -> None:
@@ -79,6 +81,7 @@ def test_a_table_that_is_wrong_is_refused_in_one_line(tmp_path: Path, before: st
     waves = np.sin(0.5 * TIME)
     columns = {"volt": 11.1 + 0.1 * waves, "q": circle()["q"] + 0.0, "r": circle()["r"] + 2.0 * waves}
     columns["yaw"] = circle()["yaw"] - 4.0 * np.cos(0.5 * TIME)
+    columns["amp"] = 1.0 + 0.1 * circle()["thr"]
     assert re.search(expected, said(write_log(tmp_path, TABLE.replace(before, after, 1), **columns)))
 
 

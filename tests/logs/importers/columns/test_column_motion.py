@@ -4,10 +4,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.io import loadmat
+from scipy.spatial.transform import Rotation
 
 from logs.importers.columns.column_motion import read_column_motion
 from logs.importers.motion_log import read_motion
+from logs.importers.open_log import open_log
 from tests.logs.importers.columns.column_files import AIRSPEED, RATE, TABLE, WIND_EAST, circle, write_log
+from world.errors import LogError
 
 ROOT = Path(__file__).parents[4]
 THOR = ROOT / "examples" / "real" / "thor75"
@@ -67,6 +70,33 @@ def test_other_frames_signs_and_units_give_the_same_motion(tmp_path: Path) -> No
         assert getattr(second, name).values == pytest.approx(getattr(first, name).values)
     turned = second.attitude.values - first.attitude.values
     assert np.remainder(turned + 1.0, 2.0 * math.pi) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("frame", ["NED", "ENU"])
+def test_a_quaternion_is_roll_pitch_and_yaw(tmp_path: Path, frame: str) -> None:
+    """A topic of PX4 or ROS has no angles; SciPy's rotations are the reference."""
+    (tmp_path / "angles").mkdir()
+    (tmp_path / "quaternion").mkdir()
+    columns = circle()
+    angles = [columns[name] for name in ("yaw", "pitch", "roll")]
+    if frame == "ENU":
+        # From the body's axes forward, left, up to east, north, up.
+        angles = [90.0 - angles[0], -angles[1], angles[2]]
+    x, y, z, w = Rotation.from_euler("ZYX", np.column_stack(angles), degrees=True).as_quat().T
+    lines = [line for line in TABLE.splitlines() if not line.startswith(("roll =", "pitch =", "yaw ="))]
+    lines += [f'quaternion_{part} = {{ column = "q[{k}]" }}' for k, part in enumerate("wxyz")]
+    table = "\n".join(lines).replace('"q[0]"', f'"q[0]", frame = "{frame}"')
+    parts = {f"q[{k}]": part for k, part in enumerate((w, x, y, z))}
+    expected = read_motion(write_log(tmp_path / "angles"))
+    path = write_log(tmp_path / "quaternion", table, **parts)
+    found = read_motion(path)
+    turned = found.attitude.values - expected.attitude.values
+    assert np.remainder(turned + 1.0, 2.0 * math.pi) == pytest.approx(1.0, abs=1e-9)
+    assert found.wind.values == pytest.approx(expected.wind.values, abs=1e-9)
+    assert np.sin(open_log(path).series["attitude"].values) == pytest.approx(np.sin(found.attitude.values))
+    halved = {name: 0.5 * part for name, part in parts.items()}
+    with pytest.raises(LogError, match=r"columns.quaternion_w: q\[0\] and the other parts have a length of 0.5"):
+        read_motion(write_log(tmp_path / "quaternion", table, **halved))
 
 
 def test_left_and_right_halves_are_one_aileron(tmp_path: Path) -> None:

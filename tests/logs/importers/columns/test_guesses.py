@@ -55,6 +55,19 @@ def test_units_are_taken_from_names_and_from_a_row_below_the_header(tmp_path: Pa
     assert units == {"roll": "deg", "airspeed": "kt", "altitude": "ft", "roll_rate": "deg/s"}
 
 
+def test_a_quaternion_is_guessed_without_unit(tmp_path: Path) -> None:
+    """The names are those of a topic of PX4; with it, no angle is missing."""
+    time = np.arange(0.0, 20.0, 0.1)
+    columns = {f"q[{k}]": np.sin(time + k) for k in range(4)}
+    pd.DataFrame({"timestamp": 1e6 * time} | columns).to_csv(tmp_path / "a.csv", index=False)
+    text = guess_table([tmp_path / "a.csv"], tmp_path / "columns.toml")
+    table = toml_table(text)
+    assert table["clocks"]["main"] == {"column": "timestamp", "unit": "us"}
+    assert table["columns"]["quaternion_w"] == {"column": "q[0]", "frame": "NED"}
+    assert table["columns"]["quaternion_z"] == {"column": "q[3]"}
+    assert "needed by planfly aircraft --identify: roll_rate, pitch_rate" in text
+
+
 def test_each_guess_is_marked_and_what_is_missing_is_listed(tmp_path: Path) -> None:
     text = guess_table([REAL / "thor75" / "thor_flight75.mat"], tmp_path / "columns.toml")
     body = text[text.index("[columns]") :].splitlines()[1:]
