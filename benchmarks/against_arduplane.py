@@ -32,7 +32,7 @@ from flight.simulation.track import Track
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import make_setup
-from planner.evaluation.problem import TURBULENCE_SHARE
+from planner.evaluation.problem import SLOPE_FRACTION_BY_TURBULENCE
 from world.arrays import Floats
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
@@ -131,7 +131,7 @@ def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
     limits, parameters = airframe.limits, airframe.autopilot.parameters
     assert limits.tracking is not None
     assert isinstance(parameters, ArduPilotParameters)
-    rate = PLANNED_CLIMB * TURBULENCE_SHARE[scenario.wind.turbulence] * parameters.tecs_climb_max
+    rate = PLANNED_CLIMB * SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence] * parameters.tecs_climb_max
     return replace(airframe, limits=replace(limits, tracking=replace(limits.tracking, climb_rate=rate)))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.planning.lattice_search import lattice_ways
 from benchmarks.planning.smooth_search import Programme
 from benchmarks.task import Task, is_safe
-from planner.evaluation.problem import SEARCH_KILL_MARGIN
+from planner.evaluation.problem import SEARCH_KILL_MARGIN_M
 from planner.seeding.shortening import resample, shorten_path
 from world.arrays import Floats
 
@@ -65,7 +65,7 @@ def _with_least_margins(task: Task) -> Task:
     """Return the task with nearly the certificate's margins in its search, instead of the planner's larger ones."""
     problem = task.problem
     more, certified = SPARE, problem.certified
-    reserve = problem.search.kill_margin - SEARCH_KILL_MARGIN
+    reserve = problem.search.kill_margin - SEARCH_KILL_MARGIN_M
     tight = problem.search._replace(
         kill_margin=certified.kill_margin + reserve + more,
         buffer=min(problem.search.buffer, certified.buffer + more),

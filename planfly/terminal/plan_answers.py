@@ -101,9 +101,10 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
 
 def fewer_plans_line(front: "Front") -> str:
     """Return a line with the reason why a front has fewer plans than requested."""
-    from planner.search.plan_front import NOTICED, NOTICED_CLEARANCE, NOTICED_EXPOSURE
+    from planner.search.plan_front import NOTICEABLE_CLEARANCE_M, NOTICEABLE_EXPOSURE_FRACTION, NOTICEABLE_GAIN_FRACTION
 
-    min_fraction, min_exposure, min_height = f"{NOTICED:.1%}", f"{NOTICED_EXPOSURE:.0%}", f"{NOTICED_CLEARANCE:g} m"
+    min_fraction, min_exposure = f"{NOTICEABLE_GAIN_FRACTION:.1%}", f"{NOTICEABLE_EXPOSURE_FRACTION:.0%}"
+    min_height = f"{NOTICEABLE_CLEARANCE_M:g} m"
     refused_text = f"{front.refused} plans that were found are not safe when completed, and " if front.refused else ""
     return (
         f"{len(front.plans)} of the {front.asked} requested: {refused_text}no other plan that was "

@@ -12,7 +12,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.tolerances import ROUNDING_M, SUGGESTION_LENGTH_MARGIN_M
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import threat_text
-from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN
+from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN_M
 from world.scenario import Scenario, from_spec
 
 # Content of a scenario file.
@@ -177,7 +177,7 @@ def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Fin
     if not depths:
         return []
     scenario_margin = scenario.planner.zone_margin_m
-    current = CERTIFIED_ZONE_MARGIN if scenario_margin is None else scenario_margin
+    current = CERTIFIED_ZONE_MARGIN_M if scenario_margin is None else scenario_margin
     tightened = round(current + max(depths) + ZONE_BUFFER_M, 1)
     spec.setdefault("planner", {})["zone_margin_m"] = tightened
     return [Tightening("zone_margin_m", current, tightened)]

@@ -11,9 +11,9 @@ import math
 import numpy as np
 
 from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_excess
-from planner.evaluation.certify_kernels import ENDS, TRACKED_PIECE, required_buffer, tracked_pieces
+from planner.evaluation.certify_kernels import END_DISTANCE_M, TRACKED_PIECE, required_buffer, tracked_pieces
 from planner.evaluation.corners import ARC_STEP, blended_vertices, fly_by_radii, half_blend_length
-from planner.evaluation.paper_scores import POINTS
+from planner.evaluation.paper_scores import POINTS_PER_LEG
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_headroom
 from planner.evaluation.terrain_clearance import lag_at, segment_pixels, terrain_excess
 from world.arrays import Floats, Ints
@@ -126,7 +126,7 @@ def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
 # Where a leg is cut because its height lags, in lag lengths.
 _LAG_CUTS = (0.0, 1.0, 2.5)
 # Lines offset from a leg by more than this (m) are tested separately.
-_MIN_OFFSET = 0.5
+_MIN_OFFSET_M = 0.5
 
 
 @inner
@@ -155,8 +155,8 @@ def add_airspace_violations(
             violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
         max_offset = max(offset_before, offset_after)
         if has_zones and _leg_zone_penetration(data, path[i], path[i + 1], across + max_offset, below, above) > 0.0:
-            first_fraction = min(1.0, ENDS / max(legs[i].run, 1e-6)) if i == 0 else 0.0
-            last_fraction = max(first_fraction, 1.0 - ENDS / max(legs[i].run, 1e-6)) if i == last_leg else 1.0
+            first_fraction = min(1.0, END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == 0 else 0.0
+            last_fraction = max(first_fraction, 1.0 - END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == last_leg else 1.0
             for fraction, end_fraction, lateral in (
                 (0.0, first_fraction, 0.0),
                 (first_fraction, last_fraction, across),
@@ -245,7 +245,7 @@ def _swath_excess_height(
     east, north = lateral * (b[1] - a[1]) / horizontal_length, -lateral * (b[0] - a[0]) / horizontal_length
     largest_excess = 0.0
     for side in (0.0, -1.0, 1.0):
-        if side != 0.0 and lateral < _MIN_OFFSET:
+        if side != 0.0 and lateral < _MIN_OFFSET_M:
             break
         x, y, x2, y2 = a[0] + side * east, a[1] + side * north, b[0] + side * east, b[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
@@ -294,11 +294,11 @@ def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:
     a, b = np.empty(3), np.empty(3)
     for k in range(path_count):
         for i in range(waypoints - 1):
-            for piece in range(POINTS):
+            for piece in range(POINTS_PER_LEG):
                 for axis in range(3):
                     step = paths[k, i + 1, axis] - paths[k, i, axis]
-                    a[axis] = paths[k, i, axis] + step * piece / POINTS
-                    b[axis] = paths[k, i, axis] + step * (piece + 1) / POINTS
+                    a[axis] = paths[k, i, axis] + step * piece / POINTS_PER_LEG
+                    b[axis] = paths[k, i, axis] + step * (piece + 1) / POINTS_PER_LEG
                 if airspace_excess(data, a, b, 0.0, 0.0, math.inf) > 0.0:
                     counts[k] += 1
     return counts

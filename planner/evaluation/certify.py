@@ -21,8 +21,8 @@ from planner.evaluation.certify_kernels import (
     with_courses,
 )
 from planner.evaluation.corners import fly_by_radii, settling_length
-from planner.evaluation.leg_constraints import CERTIFIED_LEG, slope_limits
-from planner.evaluation.problem import ANGLE_MARGIN, Problem, ProblemArrays
+from planner.evaluation.leg_constraints import MIN_CERTIFIED_LEG_M, slope_limits
+from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, ProblemArrays
 from planner.plan import Certificate
 from world.arrays import Floats
 from world.geometry import leg_runs, leg_slopes, turning_angles
@@ -74,8 +74,8 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
 
 def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Return the smallest margin of a turn to its limit, rad, and append turns that are too sharp to `problems`."""
-    max_turn = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN
-    required_margin = 0.0 if data.legs_hold_turns else ANGLE_MARGIN
+    max_turn = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN_RAD
+    required_margin = 0.0 if data.legs_hold_turns else ANGLE_MARGIN_RAD
     margins = max_turn - turning_angles(with_courses(data, waypoints))
     max_turn_deg = math.degrees(max_turn - required_margin)
     problems += _summarise_faults(
@@ -99,9 +99,9 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
     """
     problems += _summarise_faults(
         [
-            (length, f"leg {i}", f"{length:.1f} m long, at least {CERTIFIED_LEG:g} m are required")
+            (length, f"leg {i}", f"{length:.1f} m long, at least {MIN_CERTIFIED_LEG_M:g} m are required")
             for i, length in enumerate(leg_runs(waypoints).tolist())
-            if length < CERTIFIED_LEG
+            if length < MIN_CERTIFIED_LEG_M
         ]
     )
     min_margin = math.inf

@@ -51,7 +51,7 @@ TRACKED_PIECE = np.dtype(
 # Cuts of a leg, in lengths of the height lag, which has all but decayed after four.
 _CUTS = (0.5, 1.0, 2.0, 4.0)
 # The tracking error grows from 0 at a fixed end to its full value at this distance, m.
-ENDS = 100.0
+END_DISTANCE_M = 100.0
 
 
 @inner
@@ -106,7 +106,7 @@ def _piece_ends(decay: float, horizontal_length: float) -> Floats:
     fractions = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
         fractions[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
-    end_zone = min(1.0, ENDS / max(1e-9, horizontal_length))
+    end_zone = min(1.0, END_DISTANCE_M / max(1e-9, horizontal_length))
     fractions[len(_CUTS)], fractions[len(_CUTS) + 1] = end_zone, 1.0 - end_zone
     sort_few(fractions)
     return fractions
@@ -134,7 +134,7 @@ def _lateral_deviation(data: ProblemArrays, position: Floats, across: float) -> 
         math.hypot(position[0] - data.start[0], position[1] - data.start[1]),
         math.hypot(position[0] - data.destination[0], position[1] - data.destination[1]),
     )
-    return across * min(1.0, end_distance / ENDS)
+    return across * min(1.0, end_distance / END_DISTANCE_M)
 
 
 # --- Certified quantities ---

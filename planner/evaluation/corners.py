@@ -40,7 +40,7 @@ CORNER = np.dtype([(name, np.float64) for name in ("tangent", "radius", "before"
 # Straight part of a leg between its two turns: fraction of the leg.
 SETTLING_FRACTION = 0.05
 # Upper limit on its additional length, which is the length of small turns, m.
-SETTLING_LENGTH = 20.0
+SETTLING_LENGTH_M = 20.0
 
 
 @inlined
@@ -121,7 +121,7 @@ def settling_length(turn_lengths: float, horizontal_length: float) -> float:
 
     turn_lengths: length of both turns, m.
     """
-    return SETTLING_FRACTION * horizontal_length + min(SETTLING_LENGTH, turn_lengths)
+    return SETTLING_FRACTION * horizontal_length + min(SETTLING_LENGTH_M, turn_lengths)
 
 
 @inlined

@@ -26,7 +26,7 @@ from world.by_reference import by_reference
 
 
 # A piece of a route shorter than this (m) takes the course of the piece before it.
-_MIN_PIECE_LENGTH = 1.0
+_MIN_PIECE_LENGTH_M = 1.0
 
 
 class WaypointFrames(NamedTuple):
@@ -76,10 +76,10 @@ def frames_along(route: Floats) -> WaypointFrames:
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     edges = np.concatenate([[0.0], np.cumsum(lengths)])
     angles = np.arctan2(steps[:, 1], steps[:, 0])
-    rows_with_course = np.flatnonzero(lengths >= _MIN_PIECE_LENGTH)
+    rows_with_course = np.flatnonzero(lengths >= _MIN_PIECE_LENGTH_M)
     if rows_with_course.size:
         source_rows = np.maximum.accumulate(
-            np.where(lengths >= _MIN_PIECE_LENGTH, np.arange(len(lengths)), rows_with_course[0])
+            np.where(lengths >= _MIN_PIECE_LENGTH_M, np.arange(len(lengths)), rows_with_course[0])
         )
         angles = angles[source_rows]
     cosine, sine = np.cos(angles), np.sin(angles)

@@ -23,7 +23,7 @@ from planner.evaluation.corners import (
     measure_legs,
 )
 from planner.evaluation.leg_constraints import PrecomputedLimits, add_leg_violations, precompute_limits
-from planner.evaluation.paper_scores import POINTS
+from planner.evaluation.paper_scores import POINTS_PER_LEG
 from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays, RequiredClearance, SlopeBounds, as_columns
 from planner.evaluation.terrain_clearance import (
     HEIGHT_LAG,
@@ -40,7 +40,7 @@ from world.frames import PolyMapRecord
 from world.kernels import Record, Records, compiled, inlined, inner
 
 # A flown corner that departs from the legs by more than this (m) is always evaluated.
-CORNER_TOLERANCE = 30.0
+CORNER_TOLERANCE_M = 30.0
 # Sagitta of an arc over its chord, as a fraction of its radius.
 CHORD_RISE = 1.0 - math.cos(0.5 * ARC_STEP)
 # Departure of a flown corner from the legs, m: radius of its arc, and largest departures downwards and sideways.
@@ -206,7 +206,7 @@ def score_missiles(
         min_height = min(terrain_legs[i - 1].height_at_end, terrain_legs[i].height_at_beginning)
         is_near_ground = min_height < vertical_drop + required.steepest_loss * lateral_offset
         is_near_missile = (
-            vertical_drop + lateral_offset > CORNER_TOLERANCE
+            vertical_drop + lateral_offset > CORNER_TOLERANCE_M
             or min(gaps[i - 1].at_end, gaps[i].at_beginning) < vertical_drop + lateral_offset
         )
         if vertical_drop + lateral_offset < 0.01 or not (is_near_ground or is_near_missile):
@@ -222,7 +222,7 @@ def score_missiles(
             violations.terrain += _corner_depth(heights, bounds, to_pixel, required, extra_height, vertices)
         if is_near_missile:
             kill_sum += _corner_exposure(missiles, missile_margin, vertices, below, above)
-    objectives.kill_exposure = kill_sum * POINTS * (count - 1) / length
+    objectives.kill_exposure = kill_sum * POINTS_PER_LEG * (count - 1) / length
 
 
 @inner
@@ -305,7 +305,7 @@ def _measure_arcs(
         )
         flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = radius, vertical_drop, lateral_offset
         flown[i].missile_distance = (
-            lateral_offset + vertical_drop if lateral_offset + vertical_drop <= CORNER_TOLERANCE else 0.0
+            lateral_offset + vertical_drop if lateral_offset + vertical_drop <= CORNER_TOLERANCE_M else 0.0
         )
         extents[i] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * blend
 
@@ -326,7 +326,7 @@ def _measure_tracked(corners: Records, flown: Records, extents: Floats) -> None:
     for i in range(1, corners.shape[0] - 1):
         excursion = corners[i].excursion
         flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, excursion
-        flown[i].missile_distance = excursion if excursion <= CORNER_TOLERANCE else 0.0
+        flown[i].missile_distance = excursion if excursion <= CORNER_TOLERANCE_M else 0.0
         extents[i] = max(corners[i].before, corners[i].after)
 
 

@@ -21,11 +21,11 @@ from world.kernels import Record, Records, compiled, inlined, inner
 
 
 # Paths per block: the scratch of a block fits the level 1 cache.
-BLOCK = 128
+PATHS_PER_BLOCK = 128
 
 
 def _block_rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
-    return [(name, kind, (BLOCK,)) for name in names]
+    return [(name, kind, (PATHS_PER_BLOCK,)) for name in names]
 
 
 # One point of each path: position (m) and pixel.
@@ -60,7 +60,7 @@ BLOCK_SCRATCH = np.dtype(
 @inlined
 def clear_sums(sums: Record) -> None:
     """Reset all sums to 0."""
-    for b in range(BLOCK):
+    for b in range(PATHS_PER_BLOCK):
         sums.below[b], sums.height[b], sums.kill[b], sums.detection[b] = 0.0, 0.0, 0.0, 0.0
         sums.turns[b], sums.slopes[b], sums.outside[b], sums.length[b] = 0.0, 0.0, 0.0, 0.0
 
@@ -131,11 +131,11 @@ def _horner(coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, i
 # --- Limits and violations of one path ---
 
 # Upper bound on the length of any roll between two turns, m: at 60 degrees of bank and 90 m/s over the ground.
-MAX_ROLL = 50.0
+MAX_ROLL_LENGTH_M = 50.0
 # Shortest leg without a violation in the graded scores, m.
-MIN_LEG = 10.0
+MIN_LEG_M = 10.0
 # Shortest leg without a violation in the certificate, m.
-CERTIFIED_LEG = 5.0
+MIN_CERTIFIED_LEG_M = 5.0
 
 
 class PrecomputedLimits(NamedTuple):
@@ -305,7 +305,7 @@ def add_leg_violations(
         _add_leg_length_violations(data, limits, path, legs, corners, by_amount, violations)
     for i in range(legs.shape[0]):
         # Coincident waypoints have no course between them, and would hide two sharp turns.
-        violations.turn += max(0.0, MIN_LEG - legs[i].run) / 100.0 if by_amount else 0.0
+        violations.turn += max(0.0, MIN_LEG_M - legs[i].run) / 100.0 if by_amount else 0.0
         altitude_change, horizontal_length = path[i + 1, 2] - path[i, 2], legs[i].run
         excess = max(
             0.0,
@@ -373,7 +373,7 @@ def _add_leg_length_violations(
             if needed_length > 0.0
             else 0.0
         )
-        if missing_length > -MAX_ROLL and not data.fly_over:
+        if missing_length > -MAX_ROLL_LENGTH_M and not data.fly_over:
             altitude = min(path[i, 2], path[i + 1, 2])
             missing_length += roll_length(data.aircraft, legs, corners, i, altitude, limits.wind)
         violations.turn += _violation(min(10.0, max(0.0, missing_length / 100.0)), by_amount)

@@ -15,8 +15,8 @@ import numpy as np
 
 from planner.evaluation.corners import CORNER, LEG, measure_corners, measure_legs
 from planner.evaluation.leg_constraints import (
-    BLOCK,
     BLOCK_SCRATCH,
+    PATHS_PER_BLOCK,
     PrecomputedLimits,
     add_leg_violations,
     clear_sums,
@@ -41,7 +41,7 @@ from world.kernels import Record, Records, compiled, inlined, inner
 from world.terrain import EDGE
 
 # Number of points per leg (eq. 6).
-POINTS = 6
+POINTS_PER_LEG = 6
 
 
 def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
@@ -74,8 +74,8 @@ def _score_paths(
     path_count, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
     has_fixed_limits = _are_limits_fixed(data, limits)
-    for first_path in range(0, path_count, BLOCK):
-        size = min(BLOCK, path_count - first_path)
+    for first_path in range(0, path_count, PATHS_PER_BLOCK):
+        size = min(PATHS_PER_BLOCK, path_count - first_path)
         _score_block(data, limits, paths, first_path, size, block)
         sums = block.sums
         for b in range(size):
@@ -92,7 +92,7 @@ def _score_paths(
             violation.terrain = sums.below[b]
             objective.length_ratio = sums.length[b] / limits.straight_distance
             objective.kill_exposure, objective.detection_exposure = sums.kill[b], sums.detection[b]
-            objective.height_sum = sums.height[b] / POINTS
+            objective.height_sum = sums.height[b] / POINTS_PER_LEG
 
 
 @inlined
@@ -122,10 +122,10 @@ def _score_block(
         _add_leg(limits, size, i == 0, block)
         # Departure from the paper: eq. 6 never reaches the destination, which is the seventh point of the last leg
         # here.
-        for j in range(POINTS + (i == leg_count - 1)):
-            divide_legs(block.begin, block.step, j * (1.0 / POINTS), size, block.point)
+        for j in range(POINTS_PER_LEG + (i == leg_count - 1)):
+            divide_legs(block.begin, block.step, j * (1.0 / POINTS_PER_LEG), size, block.point)
             _find_ground(data.heights, size, block)
-            _add_terrain(limits.required, size, j < POINTS, block)
+            _add_terrain(limits.required, size, j < POINTS_PER_LEG, block)
             _find_nearby_units(data.threat_cells, size, block)
             _add_exposures(data.spheres, data.threat_cells.units, size, block)
 

@@ -162,9 +162,9 @@ def as_columns(records: Records) -> Floats:
 # --- Required clearance ---
 
 # Growth of the clearance buffer away from an end without it, m per m.
-BUFFER_GROWTH = 0.05
+BUFFER_GROWTH_RATIO = 0.05
 # Upper limit of this growth as a fraction of the remaining slopes of an aircraft with a climb reserve.
-GROWTH_SHARE = 0.5
+MAX_GROWTH_FRACTION = 0.5
 
 
 class RequiredClearance(NamedTuple):
@@ -248,36 +248,36 @@ def clearance_at(required: RequiredClearance, east: float, north: float) -> floa
 # --- Margins ---
 
 # Margin of plans to turn and slope limits, rad.
-ANGLE_MARGIN = math.radians(0.5)
+ANGLE_MARGIN_RAD = math.radians(0.5)
 # Largest course change of a plan if no number limits it, rad.
-AIRCRAFT_TURN = math.radians(150.0)
+MAX_AIRCRAFT_TURN_RAD = math.radians(150.0)
 # Margins of the search are larger than the certificate's margins by the effect of its terrain samples and chords; the
 # certificate's margins cover the altitude error of a flight (1.3 m worst of 120 flights) and its cross-track error
 # (2 m).
 # Height above the required clearance in a search, m.
-SEARCH_BUFFER = 8.0
+SEARCH_BUFFER_M = 8.0
 # Height above the required clearance in the certificate, m.
-CERTIFIED_BUFFER = 5.0
+CERTIFIED_BUFFER_M = 5.0
 # Distance from kill spheres in a search, m.
-SEARCH_KILL_MARGIN = 15.0
+SEARCH_KILL_MARGIN_M = 15.0
 # Distance from kill spheres in the certificate, m.
-CERTIFIED_KILL_MARGIN = 10.0
+CERTIFIED_KILL_MARGIN_M = 10.0
 # Distance from zones, and below a maximum height above ground, in a search, m.
-SEARCH_ZONE_MARGIN = 15.0
+SEARCH_ZONE_MARGIN_M = 15.0
 # Distance from zones in the certificate, m.
-CERTIFIED_ZONE_MARGIN = 10.0
+CERTIFIED_ZONE_MARGIN_M = 10.0
 # Largest margin of a search on either side of a band, as a fraction of the band between the certificate's limits.
-BAND_SHARE = 0.25
+BAND_FRACTION = 0.25
 # Fraction of the buffer available at a fixed end that the certificate requires.
-CERTIFIED_END_SHARE = 0.75
+CERTIFIED_END_FRACTION = 0.75
 # Additional buffer per attempt after the first, m, because the samples of the previous search missed ground.
-ATTEMPT_BUFFER = 5.0
+ATTEMPT_BUFFER_M = 5.0
 # Fraction of the aircraft's steepest climb and dive that a plan uses; the rest is reserved for gusts.
-TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
+SLOPE_FRACTION_BY_TURBULENCE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
 # Margin of a search to the map's edges, m, if the fixed ends allow it.
-MAP_MARGIN = 10.0
+MAP_MARGIN_M = 10.0
 # Margin of a search to floor and ceiling, m, if the fixed ends allow it.
-HEIGHT_MARGIN = 4.0
+HEIGHT_MARGIN_M = 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,7 +308,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
         )
     for field in ("max_turn", "max_climb", "max_dive"):
         value = getattr(limits, field)
-        if value is not None and value <= ANGLE_MARGIN:
+        if value is not None and value <= ANGLE_MARGIN_RAD:
             allowed = 'a plan keeps 0.5 inside it; allowed: above 0.5, or "aircraft"'
             raise ScenarioError.at(
                 scenario.name,
@@ -321,7 +321,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.has_error else (0.0, 0.0)
     # Include the rise of the ground across the tracking error, where the certificate measures the ground.
     extra_buffer = limits.reserve_height + up + across * certified.slope_bounds.steepest
-    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + extra_buffer
+    buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + extra_buffer
     airspace = _search_airspace(scenario, certified, attempt, up, limits)
     if airspace.max_height < math.inf:
         buffer = min(buffer, _max_buffer(certified, certified.buffer))
@@ -329,12 +329,12 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
         certified._replace(
             buffer=buffer,
             airspace=airspace,
-            kill_margin=SEARCH_KILL_MARGIN + limits.reserve_threats + across,
+            kill_margin=SEARCH_KILL_MARGIN_M + limits.reserve_threats + across,
             start_buffer=_end_buffer(terrain, limits, scenario.start, buffer),
             destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer),
         ),
-        MAP_MARGIN,
-        HEIGHT_MARGIN,
+        MAP_MARGIN_M,
+        HEIGHT_MARGIN_M,
     )
     return Problem(scenario, limits, search, certified, _make_space(scenario, search))
 
@@ -344,7 +344,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     threats = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
     tracking = zero_tracking_error() if limits.tracking is None else limits.tracking.record
-    vertical, end_fraction = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
+    vertical, end_fraction = CERTIFIED_BUFFER_M + float(tracking.up), CERTIFIED_END_FRACTION
     buffer, vertical_zone_margin = vertical + limits.reserve_height, vertical + limits.reserve_threats
     aircraft = _reduced_performance(scenario, limits)
     arrays = ProblemArrays(
@@ -358,15 +358,15 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         destination=scenario.destination,
         floor=float(scenario.floor),
         ceiling=float(scenario.ceiling),
-        max_turn=AIRCRAFT_TURN if limits.max_turn is None else limits.max_turn - ANGLE_MARGIN,
+        max_turn=MAX_AIRCRAFT_TURN_RAD if limits.max_turn is None else limits.max_turn - ANGLE_MARGIN_RAD,
         legs_hold_turns=limits.max_turn is None,
         fly_over=scenario.flight.fly_over,
         max_climb=_or_nan(limits.max_climb),
         max_dive=_or_nan(limits.max_dive),
-        angle_margin=ANGLE_MARGIN,
+        angle_margin=ANGLE_MARGIN_RAD,
         clearance=float(limits.min_clearance),
         buffer=buffer,
-        kill_margin=CERTIFIED_KILL_MARGIN + limits.reserve_threats,
+        kill_margin=CERTIFIED_KILL_MARGIN_M + limits.reserve_threats,
         sample_pitch=min(50.0, max(15.0, 0.4 * terrain.spacing)),
         start_course=_or_nan(scenario.start_course),
         destination_course=_or_nan(scenario.destination_course),
@@ -379,7 +379,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         tracking=tracking,
         airspace=make_airspace(
             scenario,
-            _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, vertical_zone_margin, end_fraction),
+            _zone_margins(scenario, CERTIFIED_ZONE_MARGIN_M, vertical_zone_margin, end_fraction),
             vertical + limits.reserve_above,
         ),
         travel=LENGTH_COST,
@@ -391,8 +391,8 @@ def _search_airspace(
     scenario: Scenario, certified: ProblemArrays, attempt: int, up: float, limits: Limits
 ) -> PlannerAirspace:
     """Return the airspace with the margins of a search."""
-    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
-    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer + limits.reserve_threats, 1.0)
+    buffer = SEARCH_BUFFER_M + attempt * ATTEMPT_BUFFER_M + up
+    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN_M, buffer + limits.reserve_threats, 1.0)
     return make_airspace(
         scenario, margins, min(buffer + limits.reserve_above, _max_buffer(certified, certified.airspace.buffer))
     )
@@ -401,7 +401,7 @@ def _search_airspace(
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fraction: float) -> ZoneMargins:
     """Return the zone margins, m, changed by the scenario's `zone_margin_m`, which never reduces vertical margins."""
     requested_margin = scenario.planner.zone_margin_m
-    extra_margin = 0.0 if requested_margin is None else requested_margin - CERTIFIED_ZONE_MARGIN
+    extra_margin = 0.0 if requested_margin is None else requested_margin - CERTIFIED_ZONE_MARGIN_M
     return ZoneMargins(horizontal + extra_margin, vertical + max(0.0, extra_margin), end_fraction)
 
 
@@ -412,12 +412,12 @@ def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
     """
     space = certified.airspace
     band_height = space.max_height - certified.clearance - certified.buffer - space.buffer
-    return certified_margin + BAND_SHARE * max(0.0, band_height)
+    return certified_margin + BAND_FRACTION * max(0.0, band_height)
 
 
 def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     """Return the aircraft's performance, reduced for turbulence and within the rates that the autopilot demands."""
-    slope_fraction, tracking = TURBULENCE_SHARE[scenario.wind.turbulence], limits.tracking
+    slope_fraction, tracking = SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
     climb_fraction, sink_fraction = (
@@ -430,13 +430,13 @@ def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable
 def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTable) -> float:
     """Return the growth of the buffer with the distance from an end that the aircraft can follow, m per m."""
     if not (limits.reserve_height or limits.reserve_above):
-        return BUFFER_GROWTH
+        return BUFFER_GROWTH_RATIO
     slopes = [
         float(np.interp(point[2], aircraft.amsl, angles))
         for point in (scenario.start, scenario.destination)
         for angles in (aircraft.climb, aircraft.descent)
     ]
-    return min(BUFFER_GROWTH, GROWTH_SHARE * max(0.0, math.tan(min(slopes))))
+    return min(BUFFER_GROWTH_RATIO, MAX_GROWTH_FRACTION * max(0.0, math.tan(min(slopes))))
 
 
 def _map_edges(bounds: Floats) -> dict[str, float]:

@@ -95,9 +95,9 @@ def lag_at(lag: Record, fraction: float) -> float:
 Pixels = tuple[float, float, float, float]
 
 # Below this height above the required clearance (m) samples are spaced by the pitch; corners rely on it.
-NEAR_GROUND = 10.0
+NEAR_GROUND_HEIGHT_M = 10.0
 # Violation of a sample where the ground is unknown, m.
-UNKNOWN_GROUND_DEPTH = 1000.0
+UNKNOWN_GROUND_DEPTH_M = 1000.0
 # State of sampling a leg.
 TERRAIN_LEG = np.dtype(
     [
@@ -143,12 +143,12 @@ def _take_sample(
     pitch: minimum spacing of samples, as a fraction of the line.
     """
     ground = pixel_height(heights, column, row)
-    excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH
+    excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH_M
     i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m per length of the line.
     max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * horizontal_length + abs(altitude_change) + 1e-9
     next_step, tile_step = (
-        (excess_height - max_further_height - NEAR_GROUND) / max_fall,
+        (excess_height - max_further_height - NEAR_GROUND_HEIGHT_M) / max_fall,
         tile_side / (horizontal_length + 1e-9),
     )
     next_step = next_step if next_step < tile_step else tile_step
@@ -241,8 +241,8 @@ def sample_terrain(
     extents: (w,) distance within which a point is near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).
     unfinished: (w - 1,) scratch.
 
-    Smallest heights are exact up to `NEAR_GROUND`; above that they are lower bounds. Legs take turns, one sample each:
-    the next sample of a leg depends on the result of its last one.
+    Smallest heights are exact up to `NEAR_GROUND_HEIGHT_M`; above that they are lower bounds. Legs take turns, one
+    sample each: the next sample of a leg depends on the result of its last one.
     """
     count = legs.shape[0]
     _start_sampling(to_pixel, required.sample_pitch, path, legs, extents, terrain_legs)

@@ -23,13 +23,13 @@ Short = NDArray[np.int32]
 
 
 # Side of a cell, as a fraction of the median radius.
-CELL_SIDE = 0.2
+CELL_SIDE_FRACTION = 0.2
 # Maximum number of cells.
 MAX_THREAT_CELLS = 300_000
 # Largest height (m) that a cell stores.
 MAX_CELL_HEIGHT = 2_000_000_000
 # Extension of the grid beyond the map, as a fraction of the map's sides.
-GRID_EXTENSION = 0.1
+GRID_EXTENSION_FRACTION = 0.1
 # A cell: first entry and number of its units in the list, and the lowest and highest heights (m) that any of them
 # reaches.
 THREAT_CELL = np.dtype(
@@ -63,14 +63,14 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
     """
     min_corner, max_corner = bounds[:, 0], bounds[:, 1]
     min_corner, max_corner = (
-        min_corner - GRID_EXTENSION * (max_corner - min_corner),
-        max_corner + GRID_EXTENSION * (max_corner - min_corner),
+        min_corner - GRID_EXTENSION_FRACTION * (max_corner - min_corner),
+        max_corner + GRID_EXTENSION_FRACTION * (max_corner - min_corner),
     )
     size = max_corner - min_corner
     cell_size = math.sqrt(float(size[0] * size[1]) / MAX_THREAT_CELLS)
     positive_radii = radius[radius > 0.0]
     if positive_radii.size:
-        cell_size = min(max(cell_size, CELL_SIDE * float(np.median(positive_radii))), float(size.max()))
+        cell_size = min(max(cell_size, CELL_SIDE_FRACTION * float(np.median(positive_radii))), float(size.max()))
     columns, rows = max(1, math.ceil(size[0] / cell_size)), max(1, math.ceil(size[1] / cell_size))
     first, units = _lists(
         np.ascontiguousarray(position), radius, float(min_corner[0]), float(min_corner[1]), cell_size, columns, rows

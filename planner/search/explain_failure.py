@@ -218,9 +218,9 @@ POINTS_ACROSS = 400
 # Maximum number of zones that are named.
 MAX_NAMES = 4
 # Maximum number of missiles that are named.
-MAX_CLOSING = 12
+MAX_NAMED_MISSILES = 12
 # Spacing of points on a path that is tested against zones, m.
-ZONE_PITCH = 20.0
+ZONE_PITCH_M = 20.0
 
 
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
@@ -364,8 +364,8 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
                 return [f"no path exists: the {name} is at {end[2]:.0f} m, higher than {ceiling}"]
     if not missiles:
         return [f"no path exists: the ground blocks every path below {ceiling}"]
-    names = [problem.scenario.threats.names[k] for k in missiles[:MAX_CLOSING]]
-    others = f" and {len(missiles) - MAX_CLOSING} more" if len(missiles) > MAX_CLOSING else ""
+    names = [problem.scenario.threats.names[k] for k in missiles[:MAX_NAMED_MISSILES]]
+    others = f" and {len(missiles) - MAX_NAMED_MISSILES} more" if len(missiles) > MAX_NAMED_MISSILES else ""
     return [
         f"no path exists: {', '.join(names)}{others} block every path between ground, {ceiling} and the edges of the"
         " map;"
@@ -383,7 +383,7 @@ def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     if not scenario.zones:
         return []
     records = zone_records(scenario.zones)
-    counts = [max(2, math.ceil(math.dist(a, b) / ZONE_PITCH)) for a, b in itertools.pairwise(path)]
+    counts = [max(2, math.ceil(math.dist(a, b) / ZONE_PITCH_M)) for a, b in itertools.pairwise(path)]
     legs = zip(path[:-1], path[1:], counts, strict=True)
     points = np.concatenate([np.linspace(a, b, count) for a, b, count in legs])
     ground = np.full(len(points), math.nan)

@@ -7,7 +7,7 @@ import numpy as np
 from aircraft.path_limits import Limits
 from planner.evaluation.certify import certify
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem, make_problem
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, Problem, make_problem
 from planner.plan import Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from world.arrays import Floats
@@ -31,7 +31,7 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     """
     scenario = plan.scenario
     problem = make_problem(scenario, limits_for(find_algorithm(plan.algorithm, scenario.name), limits))
-    min_kill_distance = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN)
+    min_kill_distance = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN_M)
     while (shorter := _drop_one_waypoint(problem, plan.waypoints, min_kill_distance)) is not None:
         waypoints, certificate = shorter
         violations, objectives = paper_scores(problem.certified, waypoints[None])

@@ -36,11 +36,11 @@ from world.arrays import Floats, Ints
 STALLED_GENERATIONS = 10
 # Gain in these generations, as a fraction of the straight line, below which the search ends: from there the final
 # pattern search is more efficient.
-MIN_GAIN = 2e-4
+MIN_GAIN_FRACTION = 2e-4
 # Evaluations of a seeded search without a safe path, as a fraction of the paper's number.
-SEARCH_SHARE = 0.3
+UNSAFE_SEARCH_FRACTION = 0.3
 # Evaluations of a seeded search with a safe path, as a fraction of the paper's number.
-SAFE_SHARE = 0.1
+SAFE_SEARCH_FRACTION = 0.1
 
 
 def path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
@@ -61,7 +61,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
     for generation in range(generations):
         if search.must_end() or search.first_safe_found():
             break
-        max_fraction = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
+        max_fraction = SAFE_SEARCH_FRACTION if search.best_is_safe() else UNSAFE_SEARCH_FRACTION
         if algorithm.seeded and (
             _is_stagnant(best_scores) or search.evaluations >= previous_evaluations + max_fraction * full_evaluations
         ):
@@ -110,7 +110,7 @@ def _is_stagnant(best_scores: list[Floats]) -> bool:
         return False
     earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
     has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
-    return bool(has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN)
+    return bool(has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN_FRACTION)
 
 
 # --- Single waypoints ---
@@ -120,39 +120,39 @@ MAX_GENERATIONS = 10
 # Maximum number of generations with seeds, whose best path is tightened anyway.
 SEEDED_GENERATIONS = 6
 # Population with seeds, as a fraction of the usual population.
-SEEDED_SHARE = 0.4
+SEEDED_POPULATION_FRACTION = 0.4
 # Population of later generations, as a fraction of the first.
-LATER_SHARE = 0.2
+LATER_POPULATION_FRACTION = 0.2
 # Minimum population of later generations.
 MIN_POPULATION = 24
 # Maximum number of legs between the candidates of one generation: limits memory.
 MAX_LEGS = 6_000_000
 # Maximum number of legs that all attempts of a search evaluate if the scenario states no budget, relative to the legs
 # between all candidates of the first attempt.
-MAX_LEGS_SHARE = 2.0
+MAX_LEG_RATIO = 2.0
 # Remaining legs that another attempt requires, relative to the same number.
-RETRY_SHARE = 0.75
+RETRY_LEG_FRACTION = 0.75
 # Fraction of the remaining legs that one generation without a short path may take, as hardly any leg can be skipped.
-OPEN_SHARE = 0.5
+UNBOUNDED_LEG_FRACTION = 0.5
 # Initial sampling deviation around a selected waypoint along, as a fraction of the interval.
-FIRST_ALONG = 0.4
+FIRST_DEVIATION_ALONG_FRACTION = 0.4
 # Initial sampling deviation across, as a fraction of the interval.
-FIRST_ACROSS = 0.5
+FIRST_DEVIATION_ACROSS_FRACTION = 0.5
 # Initial sampling deviation up, m.
-FIRST_UP = 60.0
+FIRST_DEVIATION_UP_M = 60.0
 # Factor on these deviations per generation.
-SHRINK = 0.5
+DEVIATION_FACTOR = 0.5
 # Fraction of the height range by which samples extend above the ceiling before they are clipped, as spheres are
 # smallest there.
-ABOVE_CEILING = 0.3
+ABOVE_CEILING_FRACTION = 0.3
 # Maximum excess of a path through a selected waypoint over the best path in the first generation, as a fraction.
-FIRST_SLACK = 0.1
+FIRST_EXCESS_FRACTION = 0.1
 # The same in the last generation.
-LAST_SLACK = 0.003
+LAST_EXCESS_FRACTION = 0.003
 # The same in the first generation with seeds, whose best path is closer to the optimum.
-SEEDED_SLACK = 0.05
+SEEDED_EXCESS_FRACTION = 0.05
 # Bounds on the first path's cost relative to the straight line, tried in this order: lower bounds are faster.
-FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
+FIRST_COST_RATIO_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
 # Number of best candidates per interval whose paths are evaluated as a whole.
 BEST_PER_INTERVAL = 3
 # Every n-th interval is used for these paths.
@@ -176,16 +176,18 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     is_seeded, first_count = search.algorithm.seeded, _first_candidate_count(search, population)
     later_count = _later_candidate_count(first_count)
     interval = frame.length / inner_count
-    deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
-    rows = sampling.first(first_count, np.array([0.0, 0.0, ABOVE_CEILING]))
+    deviation = np.array(
+        [FIRST_DEVIATION_ALONG_FRACTION * interval, FIRST_DEVIATION_ACROSS_FRACTION * interval, FIRST_DEVIATION_UP_M]
+    )
+    rows = sampling.first(first_count, np.array([0.0, 0.0, ABOVE_CEILING_FRACTION]))
     if not len(search.archive.vectors):
         # The archive must contain a path whenever the search is stopped.
         search.evaluate(_as_vectors(rows[:, :1]))
     generation_count = _limit_generations(search, generations)
-    first_slack = SEEDED_SLACK if is_seeded else FIRST_SLACK
+    first_slack = SEEDED_EXCESS_FRACTION if is_seeded else FIRST_EXCESS_FRACTION
     for generation in range(generation_count):
         rows[:, 0] = search.archive.vectors[0].reshape(inner_count, 3)
-        slack = first_slack * (LAST_SLACK / first_slack) ** (generation / max(1, generation_count - 1))
+        slack = first_slack * (LAST_EXCESS_FRACTION / first_slack) ** (generation / max(1, generation_count - 1))
         chains = _join_candidates(search, encoding.decode(_as_vectors(rows)), slack)
         rows = rows[:, : chains.cost.shape[1]]
         search.legs += chains.legs
@@ -200,18 +202,18 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
             cost = chains.cost[1:-1]
             elite = search.archive.vectors[0].reshape(inner_count, 3)
             rows = sampling.next(rows, cost, later_count, deviation, float(cost.min()) * (1.0 + slack), elite)
-            deviation = SHRINK * deviation
+            deviation = DEVIATION_FACTOR * deviation
 
 
 def _first_candidate_count(search: Search, population: int) -> int:
     """Return the number of candidates per interval in the first generation of this population."""
     max_count = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
-    return max(2, min(int(population * (SEEDED_SHARE if search.algorithm.seeded else 1.0)), max_count))
+    return max(2, min(int(population * (SEEDED_POPULATION_FRACTION if search.algorithm.seeded else 1.0)), max_count))
 
 
 def _later_candidate_count(first_count: int) -> int:
     """Return the number of candidates per interval in later generations."""
-    return min(first_count, max(MIN_POPULATION, int(LATER_SHARE * first_count)))
+    return min(first_count, max(MIN_POPULATION, int(LATER_POPULATION_FRACTION * first_count)))
 
 
 def _limit_generations(search: Search, generations: int) -> int:
@@ -224,12 +226,12 @@ def count_remaining_legs(search: Search) -> int:
     settings = search.problem.scenario.planner
     if settings.budget is not None:
         return ALL_LEGS
-    return int(MAX_LEGS_SHARE * _count_attempt_legs(search)) - search.legs
+    return int(MAX_LEG_RATIO * _count_attempt_legs(search)) - search.legs
 
 
 def may_try_again(search: Search) -> bool:
     """Return True if enough legs are left for another attempt."""
-    return count_remaining_legs(search) >= RETRY_SHARE * _count_attempt_legs(search)
+    return count_remaining_legs(search) >= RETRY_LEG_FRACTION * _count_attempt_legs(search)
 
 
 def _count_attempt_legs(search: Search) -> int:
@@ -256,14 +258,14 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
     data, space = search.problem.search, search.problem.space
     straight_length = math.dist(space.start, space.destination)
     candidates = np.ascontiguousarray(paths.transpose(1, 0, 2))
-    bounds: tuple[float, ...] = FIRST_BOUNDS
+    bounds: tuple[float, ...] = FIRST_COST_RATIO_BOUNDS
     if len(search.archive.scores) and search.best_is_safe():
-        bounds = (float(search.archive.scores[0, LENGTH]) * (1.0 + slack), *FIRST_BOUNDS)
+        bounds = (float(search.archive.scores[0, LENGTH]) * (1.0 + slack), *FIRST_COST_RATIO_BOUNDS)
     legs, remaining_legs = 0, count_remaining_legs(search)
     for bound in bounds:
         if math.isinf(bound):
             max_candidates = max(
-                1, math.isqrt(int(OPEN_SHARE * max(0, remaining_legs - legs)) // (len(candidates) - 1))
+                1, math.isqrt(int(UNBOUNDED_LEG_FRACTION * max(0, remaining_legs - legs)) // (len(candidates) - 1))
             )
             candidates = np.ascontiguousarray(candidates[:, :max_candidates])
         chains = waypoint_chains(data, candidates, bound * straight_length, search.pause, max(1, remaining_legs - legs))

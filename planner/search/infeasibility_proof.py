@@ -23,16 +23,16 @@ from world.wind import mean_wind_speed
 # Number of columns along the map's longer side.
 COLUMN_COUNT = 500
 # Smallest side of a column, m.
-MIN_SIDE = 10.0
+MIN_SIDE_M = 10.0
 # Maximum number of closed altitude ranges of a column; further ranges stay open.
-MAX_RANGES = 6
+MAX_ALTITUDE_RANGES = 6
 # Added to the altitude of the highest level flight, m: more than the error of its interpolation.
-ROUNDING = 1e-6
+LEVEL_FLIGHT_ROUNDING_M = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
     """Return the side of the columns, m; closed areas narrower than about this may be treated as open."""
-    return max(MIN_SIDE, max(data.east - data.west, data.north - data.south) / COLUMN_COUNT)
+    return max(MIN_SIDE_M, max(data.east - data.west, data.north - data.south) / COLUMN_COUNT)
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
@@ -79,7 +79,9 @@ def highest_level_flight(data: ProblemArrays) -> float:
     max_altitude = -math.inf
     if last_row >= 0:
         fraction = climb[last_row] / (climb[last_row] - climb[last_row + 1])
-        max_altitude = float(amsl[last_row] + fraction * (amsl[last_row + 1] - amsl[last_row])) + ROUNDING
+        max_altitude = (
+            float(amsl[last_row] + fraction * (amsl[last_row + 1] - amsl[last_row])) + LEVEL_FLIGHT_ROUNDING_M
+        )
     max_slope = np.abs(np.concatenate([climb, table.descent[:count]])).max()
     min_speed = true_airspeed(table, max(max_altitude, data.floor)) * math.cos(max_slope)
     wind = table.wind_speed, table.wind_gradient, table.wind_reference_amsl
@@ -125,7 +127,10 @@ def _is_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin:
         max(1, math.ceil((data.north - data.south) / column_size)),
     )
     # Closed altitude ranges of each column, ascending and disjoint: lower ends, upper ends, and their number.
-    range_bottoms, range_tops = np.empty((columns, rows, MAX_RANGES)), np.empty((columns, rows, MAX_RANGES))
+    range_bottoms, range_tops = (
+        np.empty((columns, rows, MAX_ALTITUDE_RANGES)),
+        np.empty((columns, rows, MAX_ALTITUDE_RANGES)),
+    )
     range_counts = np.zeros((columns, rows), dtype=np.int64)
     for i in range(columns):
         for j in range(rows):

@@ -35,9 +35,9 @@ MAX_ROUTES = 2
 # Evaluations of a pattern search, and size of a set of objectives.
 SAMPLE_COUNT = 4
 # Offset of the path's middle point to the side, m.
-LATERAL_OFFSET = 300.0
+LATERAL_OFFSET_M = 300.0
 # Offset of the path's middle point upwards, m.
-VERTICAL_OFFSET = 20.0
+VERTICAL_OFFSET_M = 20.0
 
 
 class _Task(NamedTuple):
@@ -60,7 +60,7 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
     """
     problem = make_problem(scenario, limits)
     space = problem.space
-    middle = 0.5 * (space.start + space.destination) + [0.0, LATERAL_OFFSET, VERTICAL_OFFSET]
+    middle = 0.5 * (space.start + space.destination) + [0.0, LATERAL_OFFSET_M, VERTICAL_OFFSET_M]
     path = resample(np.array([space.start, middle, space.destination]), WAYPOINTS)
     _CALLS[part](_Task(problem, ENCODINGS["rotated"](space, WAYPOINTS), path))
 

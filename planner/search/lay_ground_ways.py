@@ -18,7 +18,7 @@ import numpy as np
 from aircraft.path_limits import Limits, aircraft_slopes
 from aircraft.tracking import SPEED_RATIOS
 from planner.evaluation.certify import certify
-from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
+from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, make_problem
 from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
@@ -178,10 +178,10 @@ class _Site:
             self.limits.slopes(course, amsl), certified, stated_limits, strict=True
         ):
             slope = min(
-                SLOPE_FRACTION * math.tan(aircraft_slope), math.tan(max(0.0, certified_slope - 1.1 * ANGLE_MARGIN))
+                SLOPE_FRACTION * math.tan(aircraft_slope), math.tan(max(0.0, certified_slope - 1.1 * ANGLE_MARGIN_RAD))
             )
             slopes.append(
-                slope if stated_limit is None else min(slope, math.tan(max(0.0, stated_limit - 1.1 * ANGLE_MARGIN)))
+                slope if stated_limit is None else min(slope, math.tan(max(0.0, stated_limit - 1.1 * ANGLE_MARGIN_RAD)))
             )
         return slopes[0], slopes[1]
 

@@ -38,53 +38,53 @@ from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
 
 # Clearance preferences of the seeds, as fractions of the additional height above ground that the fixed ends allow.
-CLEARANCE_SHARES = (0.0, 0.25, 0.5, 0.75, 0.95)
+CLEARANCE_FRACTIONS = (0.0, 0.25, 0.5, 0.75, 0.95)
 # Radar preferences of the seeds: fractions of the radars' radius that paths keep out of.
-RADAR_SHARES = (0.0, 0.35, 0.5, 0.65, 0.8, 1.0)
+RADAR_FRACTIONS = (0.0, 0.35, 0.5, 0.65, 0.8, 1.0)
 # Grid for routes past the obstacles, which are shortened for each preference in addition to the default plan; see
 # `planner.search.seeds`. Number of stages of the grid.
-STAGES = 50
+STAGE_COUNT = 50
 # Size of the area of highest ground, as a fraction of a step.
-SPREAD = 0.2
+GROUND_SPREAD_STEPS = 0.2
 # Spacing across, as a fraction of a step.
-RATIO = 1.0 / 3.0
+SPACING_ACROSS_STEPS = 1.0 / 3.0
 # Reduction of the spheres.
-SHRINK = 0.3
+SPHERE_REDUCTION_FACTOR = 0.3
 # Maximum number of routes.
 MAX_ROUTES = 3
 # Maximum cost of a route relative to the length of the default path.
-SLACK = 1.25
+MAX_COST_RATIO = 1.25
 # Fractions of the search margins beyond the certificate's margins, tried in this order.
-MARGINS = (0.5, 0.1, 0.0)
+MARGIN_FRACTIONS = (0.5, 0.1, 0.0)
 # Minimum number of solutions that the search keeps.
 MIN_ARCHIVE_SIZE = 100
 # Number of solutions that the search keeps per requested plan.
 SOLUTIONS_PER_PLAN = 2
 # Samples per generation.
-POPULATION = 120
+POPULATION_SIZE = 120
 # Number of generations.
-GENERATIONS = 400
+GENERATION_COUNT = 400
 # Largest deviation of the noise along, as a fraction of an interval.
-NOISE_ALONG = 0.3
+NOISE_ALONG_FRACTION = 0.3
 # Largest deviation of the noise across, as a fraction of the straight line.
-NOISE_ACROSS = 0.1
+NOISE_ACROSS_FRACTION = 0.1
 # Largest deviation of the noise up, as a fraction of the height range.
-NOISE_UP = 0.3
+NOISE_UP_FRACTION = 0.3
 # Reference point: length and time or energy relative to the default plan.
 MAX_LENGTH_RATIO = 1.5
 # Reference point: exposure relative to the default plan.
 MAX_EXPOSURE_RATIO = 1.5
 # Exposure used in place of the default plan's exposure if that is lower, s.
-MIN_EXPOSURE = 1.0
+MIN_EXPOSURE_S = 1.0
 # Noticeable gains: a plan that gains no more than these amounts over another plan in any objective is not a separate
 # choice. With these amounts fronts of 20 plans cover as much as without (`benchmarks.planning.fronts`); with twice the
 # amounts there were 17 plans for `jacksboro`.
 # Noticeable gain of length and of time or energy, as a fraction of the default plan.
-NOTICED = 0.001
+NOTICEABLE_GAIN_FRACTION = 0.001
 # Noticeable gain of exposure, as a fraction of the default plan.
-NOTICED_EXPOSURE = 0.01
+NOTICEABLE_EXPOSURE_FRACTION = 0.01
 # Noticeable gain of clearance, m.
-NOTICED_CLEARANCE = 1.0
+NOTICEABLE_CLEARANCE_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +141,7 @@ def plan_front(
     default: Plan | None = None,
     waypoints: int | None = None,
     finish: Callable[[Plan], Plan] = lambda plan: plan,
-    generations: int = GENERATIONS,
+    generations: int = GENERATION_COUNT,
 ) -> Front:
     """Compute up to `count` plans of a front.
 
@@ -241,7 +241,7 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     by_energy = energy is not None and scenario.planner.objective != "time"
     travel = energy if energy is not None and by_energy else make_time_cost(aircraft)
     frame = rotated_frame(problem.space.start, problem.space.destination)
-    scored = _with_margins(problem, MARGINS[0])
+    scored = _with_margins(problem, MARGIN_FRACTIONS[0])
     return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)
 
 
@@ -257,7 +257,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
     """Reduce the task's margins to the margins of the default path (w, 3), so that other paths may be equally tight."""
-    for fraction in MARGINS:
+    for fraction in MARGIN_FRACTIONS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():
             break
@@ -270,7 +270,7 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
     It is 1.5 times the default plan's length, exposure and time or energy, and the required clearance.
     """
     length, exposure, _, fourth = _objective_row(default, task.fourth)
-    max_exposure = max(MIN_EXPOSURE, MAX_EXPOSURE_RATIO * exposure)
+    max_exposure = max(MIN_EXPOSURE_S, MAX_EXPOSURE_RATIO * exposure)
     negated_clearance = -task.problem.certified.clearance
     return np.array([MAX_LENGTH_RATIO * length, max_exposure, negated_clearance, MAX_LENGTH_RATIO * fourth])
 
@@ -304,9 +304,17 @@ def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
     data, frame = task.problem.search, task.frame
     if is_limited(data.airspace):
         return []
-    half_width = 0.5 * SLACK * frame.length
-    grid = optimistic_grid(data, frame, (-half_width, half_width), STAGES, shrink=SHRINK, spread=SPREAD, ratio=RATIO)
-    bound = SLACK * float(np.sqrt((np.diff(default, axis=0) ** 2).sum(axis=1)).sum())
+    half_width = 0.5 * MAX_COST_RATIO * frame.length
+    grid = optimistic_grid(
+        data,
+        frame,
+        (-half_width, half_width),
+        STAGE_COUNT,
+        shrink=SPHERE_REDUCTION_FACTOR,
+        spread=GROUND_SPREAD_STEPS,
+        ratio=SPACING_ACROSS_STEPS,
+    )
+    bound = MAX_COST_RATIO * float(np.sqrt((np.diff(default, axis=0) ** 2).sum(axis=1)).sum())
     return [frame.restore(route.points) for route in side_routes(data, frame, grid, bound, MAX_ROUTES)]
 
 
@@ -315,12 +323,12 @@ def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
     data, scenario = task.problem.search, task.problem.scenario
     end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
     spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
-    radar_fractions = RADAR_SHARES if (scenario.threats.detection_radius > 0.0).any() else RADAR_SHARES[:1]
+    radar_fractions = RADAR_FRACTIONS if (scenario.threats.detection_radius > 0.0).any() else RADAR_FRACTIONS[:1]
     for radar_fraction in radar_fractions:
         threats = threat_records(scenario.threats).copy()
         threats["kill_radius"] = np.maximum(threats["kill_radius"], radar_fraction * threats["detection_radius"])
         missiles = make_missile_index(threats)
-        for clearance_fraction in CLEARANCE_SHARES:
+        for clearance_fraction in CLEARANCE_FRACTIONS:
             buffer = max(data.buffer, clearance_fraction * spare_height)
             stricter = data._replace(missiles=missiles, buffer=buffer)
             yield stricter
@@ -369,9 +377,9 @@ def make_sampling(
     max_corner = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
     scales = np.array(
         [
-            NOISE_ALONG * frame.length / (inner_count + 1),
-            NOISE_ACROSS * frame.length,
-            NOISE_UP * (max_corner[2] - min_corner[2]),
+            NOISE_ALONG_FRACTION * frame.length / (inner_count + 1),
+            NOISE_ACROSS_FRACTION * frame.length,
+            NOISE_UP_FRACTION * (max_corner[2] - min_corner[2]),
         ]
     )
     return FrontSampling(
@@ -381,7 +389,7 @@ def make_sampling(
         reference,
         3,
         size,
-        POPULATION,
+        POPULATION_SIZE,
         rng,
     )
 
@@ -408,8 +416,15 @@ def directions(inner_count: int, scales: Floats) -> Floats:
 def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
     """Return the noticeable gains (4,) of the objectives relative to a default plan."""
     length, exposure, _, fourth_value = _objective_row(default, fourth)
-    exposure_gain = NOTICED_EXPOSURE * max(MIN_EXPOSURE, exposure)
-    return np.array([NOTICED * length, exposure_gain, NOTICED_CLEARANCE, NOTICED * fourth_value])
+    exposure_gain = NOTICEABLE_EXPOSURE_FRACTION * max(MIN_EXPOSURE_S, exposure)
+    return np.array(
+        [
+            NOTICEABLE_GAIN_FRACTION * length,
+            exposure_gain,
+            NOTICEABLE_CLEARANCE_M,
+            NOTICEABLE_GAIN_FRACTION * fourth_value,
+        ]
+    )
 
 
 def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:

@@ -14,7 +14,7 @@ from planner.airspace.zone_limits import is_limited
 from planner.evaluation.certify import kill_distance
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, make_problem
 from planner.plan import Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
@@ -50,18 +50,18 @@ ATTEMPTS = (
     (((44, 3), (96, 3), (160, 2)), 3),
 )
 # Maximum number of attempts among zones, where grids take the longest and no second attempt has found a safe path yet;
-# see `planner.search.seeds.MAX_FOLLOWED_AGAIN`.
+# see `planner.search.seeds.MAX_FOLLOWED_RETRY_ROUTES`.
 MAX_ATTEMPTS_AMONG_ZONES = 2
 # Maximum evaluations of the final pattern search.
-LAST_SEARCH = 200
+FINAL_SEARCH_EVALUATIONS = 200
 # Scales of the moves that finally tighten the best path, relative to the moves that fit a seed.
-LAST_MOVES = (1.0, 0.5, 0.25, 0.12)
+FINAL_MOVE_SCALES = (1.0, 0.5, 0.25, 0.12)
 # Rounds of each of these moves.
-LAST_ROUNDS = 4
+FINAL_MOVE_ROUNDS = 4
 # Maximum wind speed as a fraction of the airspeed.
-MAX_WIND = 0.8
+MAX_WIND_FRACTION = 0.8
 # Maximum number of values in a population.
-MAX_NUMBERS = 30_000_000
+MAX_POPULATION_VALUES = 30_000_000
 
 
 def plan_path(
@@ -105,7 +105,7 @@ def plan_path(
     end_distance = min(
         kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination)
     )
-    required_distance = min(CERTIFIED_KILL_MARGIN, end_distance - 1e-6)
+    required_distance = min(CERTIFIED_KILL_MARGIN_M, end_distance - 1e-6)
     search = Search(
         problem,
         found_algorithm,
@@ -164,19 +164,19 @@ def _search_repeatedly(search: Search, previous: Floats | None) -> tuple[Floats,
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
-    if scenario.wind.speed > MAX_WIND * airspeed:
+    if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
         raise ScenarioError.at(
             scenario.name,
             "wind.speed_mps",
             scenario.wind.speed,
-            f"allowed at most {MAX_WIND:.0%} of the airspeed {airspeed:g}, so that every course can be flown",
+            f"allowed at most {MAX_WIND_FRACTION:.0%} of the airspeed {airspeed:g}, so that every course can be flown",
             shown=f"{scenario.wind.speed:g}",
         )
     settings = scenario.planner
-    if settings.population * 3 * settings.waypoints > MAX_NUMBERS:
+    if settings.population * 3 * settings.waypoints > MAX_POPULATION_VALUES:
         raise ScenarioError(
             f"{scenario.name}: planner.population: {settings.population} of {settings.waypoints} waypoints: "
-            f"too large; allowed: population x 3 x waypoints up to {MAX_NUMBERS:,}",
+            f"too large; allowed: population x 3 x waypoints up to {MAX_POPULATION_VALUES:,}",
             file=scenario.name,
             field="planner.population",
         )
@@ -248,10 +248,10 @@ def _finish_search(search: Search, last_vector: Floats | None) -> None:
     if search.shortest is None:
         # The result of the generations may take another route than the improved seed.
         if last_vector is not None:
-            search.tighten(last_vector, LAST_ROUNDS, 0.5, LAST_SEARCH)
-        for scale in LAST_MOVES:
+            search.tighten(last_vector, FINAL_MOVE_ROUNDS, 0.5, FINAL_SEARCH_EVALUATIONS)
+        for scale in FINAL_MOVE_SCALES:
             if search.must_end():
                 break
-            search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
+            search.tighten(search.archive.vectors[0], FINAL_MOVE_ROUNDS, scale, FINAL_SEARCH_EVALUATIONS)
     search.record_history()
     search.report_progress(0)

@@ -31,11 +31,11 @@ from world.scenario import Scenario
 # Grids for routes on other sides. Number of stages.
 GRID_STAGE_COUNT = 50
 # Size of the area of highest ground, as a fraction of a step.
-GRID_SPREAD = 0.2
+GROUND_SPREAD_STEPS = 0.2
 # Spacing across, as a fraction of a step.
 GRID_SPACING_RATIO = 1.0 / 3.0
 # Reductions of the spheres, one for each grid.
-SPHERE_REDUCTIONS = (0.2, 0.5)
+SPHERE_REDUCTION_FACTORS = (0.2, 0.5)
 # Maximum number of routes per grid.
 MAX_ROUTES = 8
 # Maximum length of a route relative to the shortest path.
@@ -43,7 +43,7 @@ MAX_LENGTH_RATIO = 1.2
 # Maximum repetitions from equidistant waypoints.
 MAX_REPEATS = 4
 # Minimum gain for another repetition, as a fraction of the cost.
-MIN_GAIN = 2e-5
+MIN_GAIN_FRACTION = 2e-5
 # Additional margins that are tried in turn until a path is certified: to spheres and ground, m, and of slopes, rad. The
 # steepest climb of a leg is at its strongest wind, which changes with the leg's altitudes.
 EXTRA_MARGINS = ((0.1, 0.0), (2.0, math.radians(0.2)), (2.0, math.radians(0.6)))
@@ -85,7 +85,7 @@ def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights:
             if search.must_end():
                 return cheapest_path
             cheapest_path = _choose_cheaper(search, evaluation_data, start, cheapest_path)
-        if _cost_or_inf(evaluation_data, cheapest_path[0]) > (1.0 - MIN_GAIN) * previous_cost:
+        if _cost_or_inf(evaluation_data, cheapest_path[0]) > (1.0 - MIN_GAIN_FRACTION) * previous_cost:
             break
     return cheapest_path
 
@@ -109,9 +109,15 @@ def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
     frame = rotated_frame(space.start, space.destination)
     span = (float(search.encoding.lower[1::3].min()), float(search.encoding.upper[1::3].max()))
     bound = MAX_LENGTH_RATIO * float(path_length(shortest_path))
-    for shrink in SPHERE_REDUCTIONS:
+    for shrink in SPHERE_REDUCTION_FACTORS:
         grid = optimistic_grid(
-            evaluation_data, frame, span, GRID_STAGE_COUNT, shrink=shrink, spread=GRID_SPREAD, ratio=GRID_SPACING_RATIO
+            evaluation_data,
+            frame,
+            span,
+            GRID_STAGE_COUNT,
+            shrink=shrink,
+            spread=GROUND_SPREAD_STEPS,
+            ratio=GRID_SPACING_RATIO,
         )
         for route in side_routes(evaluation_data, frame, grid, bound, MAX_ROUTES, search.pause):
             yield resample(frame.restore(route.points), count)

@@ -17,7 +17,7 @@ from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
+from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, Problem
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
@@ -74,30 +74,30 @@ Improved = Callable[[Floats], None]
 # Maximum number of paths in an archive.
 ARCHIVE_SIZE = 24
 # Additional margins to spheres and ground, m, with which a path is shortened until it is certified.
-EXTRA_MARGINS = (0.1, 2.0)
+EXTRA_MARGINS_M = (0.1, 2.0)
 # Additional margins, m, of further attempts from the first path, with corners as flown, if legs must hold their turns.
-CORNER_MARGINS = (2.0, 5.0)
+CORNER_MARGINS_M = (2.0, 5.0)
 # Additional margins of slopes, rad, of last attempts with a path that fails only by its slopes: if a leg climbs at the
 # limit, shortening ends some hundredths of a degree beyond it.
-SLOPE_MARGINS = (math.radians(0.2), math.radians(0.6))
+SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
 # Depth inside a missile's sphere, m, beyond which a shortened path is not tried with other margins.
-HOPELESS = 15.0
+MAX_SHORTENING_DEPTH_M = 15.0
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
-NARROW_RESERVE = 1.0
+NARROW_KILL_MARGIN_M = 1.0
 # Evaluations that `tighten` may take: with less budget left it is skipped.
 TIGHTENING_EVALUATIONS = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
-WAYPOINTS_AT_ONCE = 4000
+WAYPOINTS_PER_PAUSE = 4000
 # Number of pauses that a stopped search without a result may still take to find its first route: some 100 ms.
-GRACE = 10
+GRACE_PAUSES = 10
 # Certificates made before the stop condition is checked: some 10 ms if none passes.
-CERTIFICATES_AT_ONCE = 4
+CERTIFICATES_PER_PAUSE = 4
 
 
 def with_narrow_margins(problem: Problem) -> Problem:
     """Return a problem whose search passes missiles with little more than the certificate's margin."""
     data = problem.search
-    margin = data.tracking.across + CERTIFIED_KILL_MARGIN + NARROW_RESERVE
+    margin = data.tracking.across + CERTIFIED_KILL_MARGIN_M + NARROW_KILL_MARGIN_M
     return replace(problem, search=data._replace(kill_margin=min(data.kill_margin, margin)))
 
 
@@ -182,7 +182,7 @@ class Search:
     shortest: tuple[Floats, Certificate] | None = None
     budget_exhausted: bool = False
     is_closed: bool = False
-    grace: int = GRACE
+    grace: int = GRACE_PAUSES
 
     def __post_init__(self) -> None:
         """Create an empty archive."""
@@ -204,7 +204,7 @@ class Search:
 
         Raises SearchEnded if asked to stop.
         """
-        batch_size, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
+        batch_size, scores = max(1, WAYPOINTS_PER_PAUSE // self.encoding.waypoints), no_scores()
         for batch_start in range(0, len(vectors), batch_size):
             scores = np.concatenate([scores, self.score(vectors[batch_start : batch_start + batch_size])])
             if len(scores) < len(vectors) and self.should_stop():
@@ -282,10 +282,10 @@ class Search:
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
         data = self.problem.search
-        attempts = [(margin, False, 0.0) for margin in EXTRA_MARGINS]
+        attempts = [(margin, False, 0.0) for margin in EXTRA_MARGINS_M]
         if data.legs_hold_turns:
-            attempts += [(margin, True, 0.0) for margin in CORNER_MARGINS]
-        attempts += [(EXTRA_MARGINS[-1], False, slope_margin) for slope_margin in SLOPE_MARGINS]
+            attempts += [(margin, True, 0.0) for margin in CORNER_MARGINS_M]
+        attempts += [(EXTRA_MARGINS_M[-1], False, slope_margin) for slope_margin in SLOPE_MARGINS_RAD]
         first, certificate = path, None
         for extra_margin, corners_too, slope_margin in attempts:
             path = first if corners_too else path
@@ -308,7 +308,7 @@ class Search:
                 if self.improved is not None:
                     self.improved(path)
                 return True
-            if certificate.kill_distance < -HOPELESS:
+            if certificate.kill_distance < -MAX_SHORTENING_DEPTH_M:
                 return False
         return False
 
@@ -389,11 +389,11 @@ class Search:
         first_path: tuple[Floats, Certificate] | None = None
         furthest_path: tuple[Floats, Certificate] | None = None
         for index, vector in enumerate(self.archive.vectors):
-            if index >= CERTIFICATES_AT_ONCE and self.should_stop():
+            if index >= CERTIFICATES_PER_PAUSE and self.should_stop():
                 break
             path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
             certificate = self._certify_vector(vector, path)
-            if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN:
+            if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN_M:
                 return path, certificate
             first_path = first_path or (path, certificate)
             max_distance = -math.inf if furthest_path is None else furthest_path[1].kill_distance

@@ -34,16 +34,16 @@ from world.arrays import Floats
 from world.geometry import path_length
 
 # Maximum evaluations of the pattern search on a quickly fitted path.
-QUICK_SEARCH = 50
+QUICK_SEARCH_EVALUATIONS = 50
 # Maximum evaluations of the pattern search on a seed.
-SEED_SEARCH = 300
+SEED_SEARCH_EVALUATIONS = 300
 # Factor on both for seeds below a maximum height above ground, where few moves stay within the band.
-BAND_EFFORT = 3
+BAND_EFFORT_FACTOR = 3
 # Number of routes followed once a path is safe; after them other sides are tried.
-MAX_FOLLOWED = 2
+MAX_FOLLOWED_ROUTES = 2
 # Number of routes followed among zones, where other sides are not tried, in attempts after the first. Of 1,400 random
 # scenarios 16 needed such an attempt, and none found a safe path by it.
-MAX_FOLLOWED_AGAIN = 3
+MAX_FOLLOWED_RETRY_ROUTES = 3
 
 
 def try_straight_line(search: Search) -> bool:
@@ -74,22 +74,22 @@ def starting_vectors(
     frame, starts = rotated_frame(space.start, space.destination), list(search.archive.vectors[:1])
     previous_vectors = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
     starts += previous_vectors
-    improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
+    improved_scores = [search.improve(vector, SEED_SEARCH_EVALUATIONS) for vector in starts]
     airspace = search.problem.search.airspace
-    effort_factor = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
+    effort_factor = BAND_EFFORT_FACTOR if math.isfinite(airspace.max_height) else 1
     is_among_zones = is_limited(airspace)
     # Among zones `search_other_sides` does not apply: the first attempt follows all routes.
-    max_followed = math.inf if is_among_zones else MAX_FOLLOWED
+    max_followed = math.inf if is_among_zones else MAX_FOLLOWED_ROUTES
     if search.can_shorten and search.algorithm.optimiser == "waypoints":
         max_followed = 0
     for index, route in enumerate(_list_routes(search, grids, is_retry) if search.algorithm.seeded else ()):
         if search.must_end() or search.first_safe_found() or (index >= max_followed and search.best_is_safe()):
             break
-        if is_among_zones and is_retry and index >= MAX_FOLLOWED_AGAIN:
+        if is_among_zones and is_retry and index >= MAX_FOLLOWED_RETRY_ROUTES:
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
-        improved_scores.append(search.improve(starts[-1], SEED_SEARCH * effort_factor))
+        improved_scores.append(search.improve(starts[-1], SEED_SEARCH_EVALUATIONS * effort_factor))
     if not starts:
         return np.empty((0, encoding.lower.size))
     order = best_first(np.array(improved_scores))
@@ -125,7 +125,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
         vectors = rotated_vectors(space, encoding, path[None])
         scores.append(search.evaluate(vectors)[0])
         if not search.first_safe_found():
-            scores[-1] = search.improve(vectors[0], QUICK_SEARCH)
+            scores[-1] = search.improve(vectors[0], QUICK_SEARCH_EVALUATIONS)
         if search.must_end() or search.first_safe_found():
             break
     if not candidates:
@@ -136,7 +136,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
 # --- Other sides of the obstacles ---
 
 # Size of the area of highest ground, as a fraction of a step.
-SPREAD = 0.2
+GROUND_SPREAD_STEPS = 0.2
 # Grids: number of stages, reduction of the spheres, and spacing across as a fraction of a step. A route runs at up to
 # 63 degrees to the direct line on the first grid: a smaller angle would block paths near the ends.
 GRIDS = ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
@@ -144,26 +144,26 @@ GRIDS = ((50, 0.2, 2.0 / 3.0), (50, 0.5, 2.0 / 3.0))
 # gain.
 FINER_GRIDS = ((80, 0.3, 0.5), (80, 0.7, 1.0))
 # Excess over the straight line above which a path is long, as a fraction.
-LONG_PATH_EXCESS = 0.06
+LONG_PATH_EXCESS_FRACTION = 0.06
 # Steps of routes at the altitude of the ceiling, m; they are tried together with the finer grids, as they may turn
 # back.
 CEILING_STEPS = (250.0, 150.0, 100.0)
 # Depths to which routes at the ceiling may enter missiles' spheres, m.
-CEILING_DEPTHS = (15.0, 40.0)
+CEILING_DEPTHS_M = (15.0, 40.0)
 # Average distance from an earlier path below which a path is not tried again, m.
-SAME_PATH_DISTANCE = 20.0
+SAME_PATH_DISTANCE_M = 20.0
 # Maximum number of routes per grid.
 MAX_ROUTES = 8
 # Maximum cost of a route relative to the best path. With few courses, grid routes are some percent too long.
-SLACK = 1.08
+MAX_COST_RATIO = 1.08
 # Maximum cost of a route relative to the straight line if no path is safe.
-MAX_DETOUR = 1.8
+MAX_DETOUR_RATIO = 1.8
 # Excess over the straight line, as a fraction, below which no other side is tried.
-MIN_DETOUR = 0.004
+MIN_DETOUR_FRACTION = 0.004
 # Maximum repetitions of shortening from equidistant waypoints.
 MAX_REPEATS = 3
 # Minimum gain for another repetition, as a fraction of the length.
-MIN_GAIN = 2e-5
+MIN_GAIN_FRACTION = 2e-5
 
 
 def search_other_sides(search: Search) -> None:
@@ -173,11 +173,11 @@ def search_other_sides(search: Search) -> None:
         search.evaluate(search.straight_vectors())
     if search.can_shorten and search.has_safe():
         shorten_best(search)
-    length = search.length_ratio() if search.has_safe() else MAX_DETOUR
-    if is_limited(search.problem.search.airspace) or length < 1.0 + MIN_DETOUR:
+    length = search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO
+    if is_limited(search.problem.search.airspace) or length < 1.0 + MIN_DETOUR_FRACTION:
         return
     tried_paths = _try_grids(search, GRIDS)
-    if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS:
+    if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS_FRACTION:
         tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling(search)
     if not search.has_safe():
         _try_narrow_margins(search, tried_paths)
@@ -190,8 +190,8 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     tried_paths: list[Floats] = []
     for stages, shrink, ratio in grids:
-        grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=SPREAD, ratio=ratio)
-        bound = straight_length * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
+        grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=GROUND_SPREAD_STEPS, ratio=ratio)
+        bound = straight_length * (MAX_COST_RATIO * search.length_ratio() if search.has_safe() else MAX_DETOUR_RATIO)
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
             if search.must_end():
                 return tried_paths
@@ -205,7 +205,7 @@ def _try_ceiling(search: Search) -> list[Floats]:
     data, space = search.problem.search, search.problem.space
     frame = rotated_frame(space.start, space.destination)
     tried_paths: list[Floats] = []
-    for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS):
+    for step, depth in itertools.product(CEILING_STEPS, CEILING_DEPTHS_M):
         if search.must_end():
             break
         route = ceiling_route(data, frame, step, depth, search.pause)
@@ -213,7 +213,7 @@ def _try_ceiling(search: Search) -> list[Floats]:
             continue
         path = resample(route, search.encoding.waypoints)
         if all(
-            np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH_DISTANCE for tried_path in tried_paths
+            np.sqrt(((path - tried_path) ** 2).sum(axis=1)).mean() > SAME_PATH_DISTANCE_M for tried_path in tried_paths
         ):
             tried_paths.append(path)
             search.shorten(path)
@@ -243,30 +243,30 @@ def shorten_best(search: Search) -> None:
         previous_length = path_length(search.shortest[0])
         search.shorten(resample(search.shortest[0], search.encoding.waypoints))
         search.shorten(search.shortest[0])
-        if path_length(search.shortest[0]) > (1.0 - MIN_GAIN) * previous_length:
+        if path_length(search.shortest[0]) > (1.0 - MIN_GAIN_FRACTION) * previous_length:
             return
 
 
 # --- Routes that turn back ---
 
 # Length of a safe path relative to the straight line above which a path that turns back may be shorter.
-LONG_DETOUR = 1.25
+LONG_DETOUR_RATIO = 1.25
 # Lattice steps as fractions of the step that turns require, tried until a path is safe.
-STEPS = (1.0, 0.6)
+LATTICE_STEP_FRACTIONS = (1.0, 0.6)
 # Maximum length of a followed route as a fraction of the best safe path.
-MAX_ROUTE_SHARE = 0.99
+MAX_ROUTE_FRACTION = 0.99
 # Number of pattern searches that improve a path along a route before shortening.
-FIRST_SEARCHES = 4
+FIRST_SEARCH_COUNT = 4
 # Evaluations of each of these pattern searches.
-FIRST_SEARCH = 500
+FIRST_SEARCH_EVALUATIONS = 500
 # Evaluations of the pattern search after each move of all waypoints.
-LATER_SEARCH = 600
+LATER_SEARCH_EVALUATIONS = 600
 # Scales of the moves of all waypoints relative to the moves of fitting.
-MOVES = (1.0, 0.5, 0.25, 0.12)
+MOVE_SCALES = (1.0, 0.5, 0.25, 0.12)
 # Rounds of each move.
-ROUNDS = 4
+MOVE_ROUNDS = 4
 # Additional margins, m, with which a path is shortened and followed if no shortened path is certified.
-FOLLOWED_MARGINS = (2.0, 5.0, 2.0)
+FOLLOWED_MARGINS_M = (2.0, 5.0, 2.0)
 
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
@@ -275,7 +275,7 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
         return False
     if not search.meets_goal(certificate):
         return True
-    return search.length_ratio() > LONG_DETOUR
+    return search.length_ratio() > LONG_DETOUR_RATIO
 
 
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
@@ -283,10 +283,10 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices, remaining_states = (
-        [make_lattice(data, frame, step_fraction * step) for step_fraction in STEPS],
+        [make_lattice(data, frame, step_fraction * step) for step_fraction in LATTICE_STEP_FRACTIONS],
         MAX_EXPANDED,
     )
-    for index, step_fraction in enumerate(STEPS):
+    for index, step_fraction in enumerate(LATTICE_STEP_FRACTIONS):
         # If memory limits the step, a smaller step gives the same lattice again.
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
             break
@@ -298,7 +298,7 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         if not len(route):
             continue
         is_safe = search.meets_goal(best[1])
-        if is_safe and path_length(route) > MAX_ROUTE_SHARE * path_length(best[0]):
+        if is_safe and path_length(route) > MAX_ROUTE_FRACTION * path_length(best[0]):
             break
         path, certificate, is_shortened = _search_along(search, route)
         if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
@@ -312,7 +312,7 @@ def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple
     """Return the best path along the shortened, unsafe form of `best` if it is shorter; otherwise return `best`."""
     if not search.can_shorten:
         return best
-    for extra_margin in FOLLOWED_MARGINS:
+    for extra_margin in FOLLOWED_MARGINS_M:
         if search.must_end():
             break
         path = resample(best[0], search.encoding.waypoints)
@@ -352,14 +352,14 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, b
 def _improve_along(search: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
     """Improve the path of a vector (d,), then shorten the path and the routes (k, 3), which may be better."""
     search.evaluate(vector[None])
-    for _ in range(FIRST_SEARCHES):
+    for _ in range(FIRST_SEARCH_COUNT):
         if search.must_end() or search.first_safe_found():
             return
-        search.improve(search.archive.vectors[0], FIRST_SEARCH)
-    for scale in MOVES:
+        search.improve(search.archive.vectors[0], FIRST_SEARCH_EVALUATIONS)
+    for scale in MOVE_SCALES:
         if search.must_end() or search.first_safe_found():
             return
-        search.tighten(search.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
+        search.tighten(search.archive.vectors[0], MOVE_ROUNDS, scale, LATER_SEARCH_EVALUATIONS)
     if search.can_shorten:
         for route in routes:
             search.shorten(resample(route, search.encoding.waypoints))

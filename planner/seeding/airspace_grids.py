@@ -20,7 +20,7 @@ from planner.seeding.grids import (
     EXPECTED_COST_RATIO,
     KILL_COST,
     LAYERS_PER_STEP,
-    SIDEWAYS,
+    MAX_LATERAL_CELLS,
     GridRoute,
     distance_to_goal,
     find_obstacles,
@@ -36,7 +36,7 @@ EDGE_COST = 0.3
 # Cost of a change of course on a gentle grid, in grid steps per squared change of the lateral step.
 TURN_COST = 0.15
 # Fraction of the steepest slopes that a route on a gentle grid uses, because legs cut its corners.
-SLOPE_SHARE = 0.9
+GENTLE_SLOPE_FRACTION = 0.9
 # A grid column: its ground and the lowest and highest allowed height, m; lowest > highest for none.
 COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", np.float64)])
 
@@ -122,13 +122,16 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
     """Return the tangents of a fraction of the climb and dive limits of each step at a height (m), (sideways, 2)."""
-    slopes, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
+    slopes, a, b = np.zeros((2 * MAX_LATERAL_CELLS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
-    for side in range(-SIDEWAYS, SIDEWAYS + 1):
+    for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
         b[0], b[1] = position_of(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
-        slopes[side + SIDEWAYS, 0], slopes[side + SIDEWAYS, 1] = fraction * math.tan(climb), fraction * math.tan(dive)
+        slopes[side + MAX_LATERAL_CELLS, 0], slopes[side + MAX_LATERAL_CELLS, 1] = (
+            fraction * math.tan(climb),
+            fraction * math.tan(dive),
+        )
     return slopes
 
 
@@ -193,14 +196,14 @@ def _relax_stage(
     step, width, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
     # No tracking error at a fixed end.
     lateral = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
-    turn_cost, slope_fraction = (TURN_COST * step, SLOPE_SHARE) if grid.gentle else (0.0, 1.0)
+    turn_cost, slope_fraction = (TURN_COST * step, GENTLE_SLOPE_FRACTION) if grid.gentle else (0.0, 1.0)
     slopes = _step_slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), slope_fraction)
     for y in range(width):
         if not np.isfinite(cost[y]).any():
             continue
         east, north = position_of(frame, (stage - 1) * step, grid.across[y])
         first_height = previous_columns[y].lowest if grid.follows else grid.floor
-        for side in range(-SIDEWAYS, SIDEWAYS + 1):
+        for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
             target = y + side
             if not 0 <= target < width or columns[target].lowest > columns[target].highest:
                 continue
@@ -211,7 +214,10 @@ def _relax_stage(
             if zones.required.shape[0] > 0:
                 leg = segment_between(east, north, to_east, to_north)
                 closed_heights = _closed_heights(zones, leg, lateral, previous_columns[y].ground)
-            climb, dive = slopes[side + SIDEWAYS, 0] * horizontal_length, slopes[side + SIDEWAYS, 1] * horizontal_length
+            climb, dive = (
+                slopes[side + MAX_LATERAL_CELLS, 0] * horizontal_length,
+                slopes[side + MAX_LATERAL_CELLS, 1] * horizontal_length,
+            )
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
                     continue
@@ -254,7 +260,7 @@ class AirspaceSearch(NamedTuple):
 
 
 # Number of cells reached between two calls of `pause`: some 20 ms at most.
-CELLS_AT_ONCE = 100_000
+CELLS_PER_PAUSE = 100_000
 
 
 def cheapest_airspace_route(
@@ -269,9 +275,9 @@ def cheapest_airspace_route(
 
     Return (0, 3) points and inf if no route is found.
     extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost. pause: called after every
-    `CELLS_AT_ONCE` cells; an exception raised there stops the search.
+    `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
     """
-    stages = max(1, CELLS_AT_ONCE // (grid.across.size * grid.layers))
+    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers))
     search: AirspaceSearch = begin_airspace_route(data, frame, grid)
     while search.stage < grid.stages:
         search = continue_airspace_route(data, frame, grid, extra, bound, search, stages)
@@ -325,7 +331,7 @@ def continue_airspace_route(
             # No cell of the previous stage is reached, so the last stage cannot be reached either.
             last_stage = stages
             break
-        first, last = max(0, first - SIDEWAYS), min(width - 1, last + SIDEWAYS)
+        first, last = max(0, first - MAX_LATERAL_CELLS), min(width - 1, last + MAX_LATERAL_CELLS)
         for y in range(first, last + 1):
             _fill_column(data, frame, grid, along, grid.across[y], columns[stage, y])
         _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, price)
@@ -397,7 +403,7 @@ MIN_LAYERS = 8
 # Maximum number of layers of a band of heights above ground.
 MAX_LAYERS = 24
 # Minimum pitch of layers that do not follow the ground, as a fraction of the step along.
-MIN_PITCH = 0.05
+MIN_LAYER_PITCH_STEPS = 0.05
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
 
@@ -424,7 +430,7 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
             pitch = max(1.0, band_height) / (layers - 1)
             layers = max(layers, min(2 * MAX_LAYERS, math.ceil(max_band_height / pitch) + 1))
         else:
-            pitch = max(pitch, MIN_PITCH * step)
+            pitch = max(pitch, MIN_LAYER_PITCH_STEPS * step)
             layers = max(1, math.floor((data.ceiling - min_height) / pitch) + 1)
         if stages <= 8 or (stages + 1) * across.size * layers <= MAX_CELLS:
             return AirspaceGrid(

@@ -11,11 +11,11 @@ from planner.evaluation.encoding import Encoding, Space
 from world.arrays import Floats
 
 # Fraction of a seeded first population that is sampled around the seeds.
-AROUND_SEEDS = 1.0
+SEEDED_SAMPLE_FRACTION = 1.0
 # Smallest spread around a seed, as a fraction of the unseeded spread; sampled log-uniformly.
-MIN_SPREAD = 0.003
+MIN_SPREAD_FRACTION = 0.003
 # Largest spread around a seed, as a fraction of the unseeded spread.
-MAX_SPREAD = 0.3
+MAX_SPREAD_FRACTION = 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
@@ -67,9 +67,9 @@ def first_samples(
     out[..., 2] = heights[:, 0] + rng.uniform(0.0, 1.0, (population, 1)) * np.maximum(0.0, space.up[1] - heights[:, 0])
     out[..., 1:] += bridges(population)
     if len(starts):
-        around_count = min(population, max(len(starts), int(AROUND_SEEDS * population)))
+        around_count = min(population, max(len(starts), int(SEEDED_SAMPLE_FRACTION * population)))
         seeds = starts[np.arange(around_count) % len(starts)].reshape(around_count, inner_count, 3)
-        scale = np.exp(rng.uniform(np.log(MIN_SPREAD), np.log(MAX_SPREAD), (around_count, 1, 1)))
+        scale = np.exp(rng.uniform(np.log(MIN_SPREAD_FRACTION), np.log(MAX_SPREAD_FRACTION), (around_count, 1, 1)))
         scale[: len(starts)] = 0.0
         out[:around_count] = seeds
         out[:around_count, :, 1:] += scale * bridges(around_count)

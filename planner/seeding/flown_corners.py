@@ -23,25 +23,25 @@ from world.kernels import Records, inner
 from world.terrain import pixel_height
 
 # Number of samples along each of a corner's two legs and on each side, with tracking error.
-ON_LEG = 4
+SAMPLES_PER_LEG = 4
 # Number of samples of a corner.
-SAMPLES = 4 * ON_LEG
+SAMPLES_PER_CORNER = 4 * SAMPLES_PER_LEG
 # Smallest distance between a sampled corner and its legs, m.
-MIN_DEPARTURE = 2.0
+MIN_DEPARTURE_M = 2.0
 # Largest height of a sampled corner above the required height, m.
-NEAR_GROUND = 60.0
+NEAR_GROUND_HEIGHT_M = 60.0
 # Largest turn that is sampled, rad, because at half a turn the tangent is infinite.
-MAX_TURN = 3.0
+MAX_TURN_RAD = 3.0
 # Half-step of finite differences of the ground, m.
-GROUND_STEP = 8.0
+GROUND_STEP_M = 8.0
 # Half-step of finite differences of the place of a sample, m.
-CORNER_STEP = 0.5
+CORNER_STEP_M = 0.5
 # Slope of an arc, as a fraction of the slope limit, below which it is not constrained.
 STEEP_FRACTION = 0.8
 # Length of an arc in addition to the length for its climb or descent, m.
-ARC_MARGIN = 1.0
+ARC_MARGIN_M = 1.0
 # The same as a fraction of the additional margin.
-ARC_SHARE = 0.4
+ARC_FRACTION = 0.4
 
 
 class FlownCorners(NamedTuple):
@@ -66,7 +66,7 @@ def no_corners(count: int, margin: float) -> FlownCorners:
 
     margin: additional margin, m.
     """
-    slope_margin = ARC_MARGIN + ARC_SHARE * margin
+    slope_margin = ARC_MARGIN_M + ARC_FRACTION * margin
     return FlownCorners(
         np.zeros(count), np.full((count, 2), margin), np.zeros(count), np.zeros((count, 2)), slope_margin
     )
@@ -94,22 +94,22 @@ def corners_near_ground(
             continue
         length_in, length_out = _horizontal_length(path[i - 1], path[i]), _horizontal_length(path[i], path[i + 1])
         if data.tracking.has_error:
-            if corners[i].excursion < MIN_DEPARTURE:
+            if corners[i].excursion < MIN_DEPARTURE_M:
                 continue
             begin_fraction = 1.0 - min(1.0, corners[i].before / length_in)
             lowered[i, 0] += max(0.0, lag_at(lags[i - 1], begin_fraction), lag_at(lags[i - 1], 1.0))
             lowered[i, 1] += max(0.0, lag_at(lags[i], 0.0), lag_at(lags[i], min(1.0, corners[i].after / length_out)))
         else:
-            corner_point(data, path[i - 1], path[i], path[i + 1], radius, SAMPLES // 2, point)
-            if _horizontal_length(point, path[i]) < MIN_DEPARTURE:
+            corner_point(data, path[i - 1], path[i], path[i + 1], radius, SAMPLES_PER_CORNER // 2, point)
+            if _horizontal_length(point, path[i]) < MIN_DEPARTURE_M:
                 continue
             slope_change = abs((path[i, 2] - path[i - 1, 2]) / length_in - (path[i + 1, 2] - path[i, 2]) / length_out)
             lowering = 0.25 * slope_change * slope_change * half_blend_length(data.aircraft, path[i, 2])
             lowered[i, 0] += lowering
             lowered[i, 1] += lowering
-        for k in range(SAMPLES):
+        for k in range(SAMPLES_PER_CORNER):
             corner_point(data, path[i - 1], path[i], path[i + 1], radius, k, point)
-            if height_above_required(data, limits, point) < lowered[i, leg_of(k)] + NEAR_GROUND:
+            if height_above_required(data, limits, point) < lowered[i, leg_of(k)] + NEAR_GROUND_HEIGHT_M:
                 flown.radii[i] = radius
     return flown
 
@@ -129,7 +129,7 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
             climb, dive = min(climb, math.tan(climb_limit)), min(dive, math.tan(dive_limit))
         flown.slopes[i, 0], flown.slopes[i, 1] = climb, dive
         radius = corners[i].radius
-        arc = radius * min(MAX_TURN, 2.0 * math.atan(corners[i].tangent / radius))
+        arc = radius * min(MAX_TURN_RAD, 2.0 * math.atan(corners[i].tangent / radius))
         for sign, max_slope in ((1.0, climb), (-1.0, dive)):
             if arc_room(path[i - 1], path[i], path[i + 1], radius, sign, max_slope) < (1.0 - STEEP_FRACTION) * arc:
                 flown.steep_radii[i] = radius
@@ -150,7 +150,7 @@ def arc_room(
         next_waypoint[0] - waypoint[0],
         next_waypoint[1] - waypoint[1],
     )
-    turn = min(MAX_TURN, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
+    turn = min(MAX_TURN_RAD, math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy))
     altitude_change = (
         radius
         * math.tan(0.5 * turn)
@@ -162,7 +162,7 @@ def arc_room(
 @inner
 def leg_of(sample: int) -> int:
     """Return 0 for a sample on the leg before its corner, 1 for a sample on the leg after it."""
-    return 2 * sample // SAMPLES
+    return 2 * sample // SAMPLES_PER_CORNER
 
 
 @inner
@@ -197,13 +197,13 @@ def corner_point(
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_out, (next_waypoint[1] - waypoint[1]) / length_out
     slope_in, slope_out = (waypoint[2] - previous[2]) / length_in, (next_waypoint[2] - waypoint[2]) / length_out
     cross = ux * vy - uy * vx
-    turn = min(MAX_TURN, math.atan2(abs(cross), ux * vx + uy * vy))
+    turn = min(MAX_TURN_RAD, math.atan2(abs(cross), ux * vx + uy * vy))
     if data.tracking.has_error:
         speed = math.sqrt(radius * GRAVITY * data.aircraft.tan_max_bank)
         offset, length_before, length_after = corner_deviation(data.tracking, turn, speed)
         tangent = radius * math.tan(0.5 * turn)
         side = offset if sample % 2 == 0 else -offset
-        fraction = (sample // 2 % ON_LEG) / (ON_LEG - 1.0)
+        fraction = (sample // 2 % SAMPLES_PER_LEG) / (SAMPLES_PER_LEG - 1.0)
         if leg_of(sample) == 0:
             along = -fraction * min(length_in, max(tangent, length_before))
             out[0], out[1] = waypoint[0] + ux * along - uy * side, waypoint[1] + uy * along + ux * side
@@ -213,7 +213,7 @@ def corner_point(
             out[0], out[1] = waypoint[0] + vx * along - vy * side, waypoint[1] + vy * along + vx * side
             out[2] = waypoint[2] + along * slope_out
         return
-    fraction = (sample + 1.0) / (SAMPLES + 1.0)
+    fraction = (sample + 1.0) / (SAMPLES_PER_CORNER + 1.0)
     tangent, side = radius * math.tan(0.5 * turn), 1.0 if cross >= 0.0 else -1.0
     # The middles of the chords are this far from the centre; the arc is further.
     chord_radius = radius * math.cos(0.5 * ARC_STEP)
@@ -237,10 +237,10 @@ def corner_slopes(
         for axis in range(3):
             coordinate, slopes[row, axis] = corner[row, axis], 0.0
             for sign in (1.0, -1.0):
-                corner[row, axis] = coordinate + sign * CORNER_STEP
+                corner[row, axis] = coordinate + sign * CORNER_STEP_M
                 corner_point(data, corner[0], corner[1], corner[2], radius, sample, point)
                 for k in range(3):
-                    slopes[row, axis] += sign * gradient[k] * point[k] / (2.0 * CORNER_STEP)
+                    slopes[row, axis] += sign * gradient[k] * point[k] / (2.0 * CORNER_STEP_M)
             corner[row, axis] = coordinate
 
 
@@ -251,9 +251,9 @@ def arc_room_slopes(corner: Floats, radius: float, sign: float, max_slope: float
         for axis in range(3):
             coordinate, slopes[row, axis] = corner[row, axis], 0.0
             for direction in (1.0, -1.0):
-                corner[row, axis] = coordinate + direction * CORNER_STEP
+                corner[row, axis] = coordinate + direction * CORNER_STEP_M
                 value = arc_room(corner[0], corner[1], corner[2], radius, sign, max_slope)
-                slopes[row, axis] += direction * value / (2.0 * CORNER_STEP)
+                slopes[row, axis] += direction * value / (2.0 * CORNER_STEP_M)
             corner[row, axis] = coordinate
 
 
@@ -261,14 +261,14 @@ def arc_room_slopes(corner: Floats, radius: float, sign: float, max_slope: float
 def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
     """Fill the derivatives (3,) of the height above ground at a point; unknown horizontal derivatives are 0."""
     heights, to_pixel = data.heights, data.to_pixel
-    column, row = polymap(to_pixel, x + GROUND_STEP, y)
+    column, row = polymap(to_pixel, x + GROUND_STEP_M, y)
     ground_height = pixel_height(heights, column, row)
-    column, row = polymap(to_pixel, x - GROUND_STEP, y)
-    by_east = (ground_height - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
-    column, row = polymap(to_pixel, x, y + GROUND_STEP)
+    column, row = polymap(to_pixel, x - GROUND_STEP_M, y)
+    by_east = (ground_height - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP_M)
+    column, row = polymap(to_pixel, x, y + GROUND_STEP_M)
     ground_height = pixel_height(heights, column, row)
-    column, row = polymap(to_pixel, x, y - GROUND_STEP)
-    by_north = (ground_height - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
+    column, row = polymap(to_pixel, x, y - GROUND_STEP_M)
+    by_north = (ground_height - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP_M)
     out[0], out[1], out[2] = -by_east, -by_north, 1.0
     if math.isnan(by_east + by_north):
         out[0], out[1] = 0.0, 0.0

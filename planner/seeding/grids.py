@@ -31,11 +31,11 @@ from world.terrain import pixel_height
 KILL_COST = 40.0
 # Step of a grid above which kill spheres are enlarged, m, to cover the space between the cells. Finer grids use their
 # true size and find the narrow gaps.
-COARSE = 250.0
+COARSE_STEP_M = 250.0
 # Enlargement of the spheres, as a fraction of a step.
-COARSE_GROWTH = 0.15
+COARSE_GROWTH_STEPS = 0.15
 # Fraction of a step around a cell over which the highest ground is taken.
-GROUND_SPREAD = 0.4
+GROUND_SPREAD_STEPS = 0.4
 # A threat in the rotated frame, with the radius that routes avoid, m.
 OBSTACLE = np.dtype(
     [("along", np.float64), ("across", np.float64), ("up", np.float64), ("radius", np.float64)], align=True
@@ -56,7 +56,7 @@ class Grid(NamedTuple):
     across: Floats
     layers: Floats
     shrink: float = 0.0
-    spread: float = GROUND_SPREAD
+    spread: float = GROUND_SPREAD_STEPS
     ratio: float = 1.0
 
 
@@ -128,7 +128,7 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
 
     shrink: see `Grid`.
     """
-    growth = COARSE_GROWTH * step if step > COARSE else 0.0
+    growth = COARSE_GROWTH_STEPS * step if step > COARSE_STEP_M else 0.0
     if shrink > 0.0:
         growth = -shrink * step
     obstacles = np.zeros(data.threats.shape[0], dtype=OBSTACLE)
@@ -204,7 +204,7 @@ def set_cell_costs(
 
 
 # Maximum lateral step, in cells, per stage.
-SIDEWAYS = 3
+MAX_LATERAL_CELLS = 3
 # A cell of a route: its indices across and among the layers.
 ROUTE_CELL = np.dtype([("across", np.int64), ("layer", np.int64)], align=True)
 # Maximum climb and descent of a step, in layers.
@@ -217,9 +217,9 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
     """Return `STEP_LAYERS` records (sideways, layers) of the climb and descent of each step by course and height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
-    step_layers = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
+    step_layers = np.zeros((2 * MAX_LATERAL_CELLS + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
-    for side in range(-SIDEWAYS, SIDEWAYS + 1):
+    for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
         horizontal_length = step * math.sqrt(1.0 + (side * ratio) ** 2)
         b[0], b[1] = position_of(frame, step, side * ratio * step)
         a[0], a[1] = frame.east, frame.north
@@ -227,8 +227,12 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
             a[2] = layers[z]
             b[2] = layers[z]
             climb, dive = slope_limits(data, a, b)
-            step_layers[side + SIDEWAYS, z].climb = max(0, math.floor(math.tan(climb) * horizontal_length / pitch))
-            step_layers[side + SIDEWAYS, z].sink = max(0, math.floor(math.tan(dive) * horizontal_length / pitch))
+            step_layers[side + MAX_LATERAL_CELLS, z].climb = max(
+                0, math.floor(math.tan(climb) * horizontal_length / pitch)
+            )
+            step_layers[side + MAX_LATERAL_CELLS, z].sink = max(
+                0, math.floor(math.tan(dive) * horizontal_length / pitch)
+            )
     return step_layers
 
 
@@ -285,11 +289,11 @@ def relax_stage(
         first, last = spans[z].first, spans[z].last
         if first > last:
             continue
-        for side in range(-SIDEWAYS, SIDEWAYS + 1):
+        for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
             first_cell, end_cell = max(first, -side), min(last, width - 1 - side) + 1
             if first_cell >= end_cell:
                 continue
-            limit = step_layers[side + SIDEWAYS, z]
+            limit = step_layers[side + MAX_LATERAL_CELLS, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
@@ -312,7 +316,7 @@ def distance_to_goal(columns: int, home: int, remaining_stages: int, step: float
     """Fill the shortest horizontal distance from each position across to the destination, m."""
     for y in range(columns):
         offset = abs(y - home)
-        if offset > SIDEWAYS * remaining_stages:
+        if offset > MAX_LATERAL_CELLS * remaining_stages:
             out[y] = math.inf
             continue
         k = offset // remaining_stages if remaining_stages > 0 else 0
@@ -373,7 +377,7 @@ class GridSearch(NamedTuple):
 
 
 # Number of cells reached between two calls of `pause`: some 10 ms.
-CELLS_AT_ONCE = 150_000
+CELLS_PER_PAUSE = 150_000
 
 
 def cheapest_route(
@@ -388,9 +392,9 @@ def cheapest_route(
 
     Return no records if there is no route.
     extra: (stages + 1, across), added to the cost per m. bound: upper limit on the cost; more expensive routes are not
-    searched. pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
+    searched. pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
     """
-    stages = max(1, CELLS_AT_ONCE // (grid.across.size * grid.layers.size))
+    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
     search: GridSearch = begin_route(data, frame, grid)
     while search.stage < grid.stages:
         search = continue_route(data, frame, grid, extra, bound, search, stages)
@@ -448,7 +452,7 @@ def continue_route(
         first, last = width, -1
         for z in range(layer_count):
             first, last = min(first, spans[z].first), max(last, spans[z].last)
-        first, last = max(0, first - SIDEWAYS), min(width - 1, last + SIDEWAYS)
+        first, last = max(0, first - MAX_LATERAL_CELLS), min(width - 1, last + MAX_LATERAL_CELLS)
         if first > last:
             last_stage = stages
             break
@@ -500,7 +504,7 @@ MAX_CELLS = 1_200_000
 # Expected cost of the first route over the straight line; with few courses, grid routes are too long by about this.
 EXPECTED_COST_RATIO = 1.12
 # Distance from an earlier route within which a route costs up to twice as much, m.
-ROUTE_SPACING = 800.0
+ROUTE_SPACING_M = 800.0
 # The same in steps, if that is larger.
 ROUTE_SPACING_STEPS = 3.0
 
@@ -570,7 +574,7 @@ def grid_route(
 def proximity_cost(along: Floats, across: Floats, earlier_routes: tuple[GridRoute, ...]) -> Floats:
     """Return the additional cost per m near earlier routes, at positions along (s,) and across (y,), m, as (s, y)."""
     extra = np.zeros((along.size, across.size))
-    width = max(ROUTE_SPACING, ROUTE_SPACING_STEPS * along[-1] / (along.size - 1))
+    width = max(ROUTE_SPACING_M, ROUTE_SPACING_STEPS * along[-1] / (along.size - 1))
     for route in earlier_routes:
         stage_across = np.interp(along, route.points[:, 0], route.points[:, 1])
         extra += np.maximum(0.0, 1.0 - np.abs(across[None, :] - stage_across[:, None]) / width)

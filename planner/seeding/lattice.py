@@ -300,9 +300,9 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
 # --- Lattices and routes ---
 
 # Minimum step, m.
-MIN_STEP = 100.0
+MIN_STEP_M = 100.0
 # Upper limit on the step that two right-angled turns require, m.
-MAX_STEP = 2000.0
+MAX_STEP_M = 2000.0
 # Layers that the gentler slope limit climbs or descends in a step along.
 LAYERS_PER_STEP = 2
 # Maximum number of states of a lattice.
@@ -311,19 +311,19 @@ MAX_LATTICE_STATES = 4_000_000
 # lattice if the first had used them all.
 MAX_EXPANDED = 60_000
 # States expanded between two calls of `pause`: some 10 ms.
-STATES_AT_ONCE = 2000
+STATES_PER_PAUSE = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
     """Return the length of a leg between two right-angled turns to the same side, m, including settling."""
     if not data.legs_hold_turns:
-        return MIN_STEP
-    side = MAX_STEP
+        return MIN_STEP_M
+    side = MAX_STEP_M
     square = np.array([[0.0, 0.0], [side, 0.0], [side, side], [0.0, side]]) + data.start[:2]
     path = np.column_stack([square, np.full(4, data.start[2])])
     turns, rolls = turn_and_roll_lengths(data, path)
     turn_length = float(turns[1] + rolls[1])
-    return min(MAX_STEP, max(MIN_STEP, turn_length + settling_length(turn_length, 1.1 * turn_length)))
+    return min(MAX_STEP_M, max(MIN_STEP_M, turn_length + settling_length(turn_length, 1.1 * turn_length)))
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
@@ -367,7 +367,7 @@ def cheapest_lattice_route(
     search = begin_lattice_search(data, frame, lattice)
     while search.goal_state < 0 and len(search.states) and search.expanded_count < max_states:
         search = continue_lattice_search(
-            data, frame, lattice, max_turn, search, min(STATES_AT_ONCE, max_states - search.expanded_count)
+            data, frame, lattice, max_turn, search, min(STATES_PER_PAUSE, max_states - search.expanded_count)
         )
         pause()
     if search.goal_state < 0:
@@ -384,7 +384,7 @@ def lattice_route(
 ) -> tuple[Floats, int]:
     """Return world points (k, 3) of a route over a lattice of this step (m), and the number of expanded states.
 
-    Return (0, 3) points without a route. pause: called after every `STATES_AT_ONCE` states; an exception raised there
+    Return (0, 3) points without a route. pause: called after every `STATES_PER_PAUSE` states; an exception raised there
     stops the search. max_states: maximum number of expanded states.
     """
     lattice = make_lattice(data, frame, step)

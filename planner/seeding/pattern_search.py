@@ -40,17 +40,17 @@ EXPOSURE_PRICE = 5.0
 # Price of any exposure at all: a sphere that is barely entered has almost none.
 ANY_EXPOSURE_PRICE = 0.002
 # Initial step along, as a fraction of the interval between waypoints.
-FIRST_ALONG = 0.2
+FIRST_STEP_ALONG_FRACTION = 0.2
 # Initial step across, as a fraction of the interval between waypoints.
-FIRST_ACROSS = 0.15
+FIRST_STEP_ACROSS_FRACTION = 0.15
 # Initial step up, m.
-FIRST_UP = 25.0
+FIRST_STEP_UP_M = 25.0
 # Smallest step of a move, as a fraction of its initial step.
-MIN_STEP = 0.002
+MIN_STEP_FRACTION = 0.002
 
 
 # Number of evaluations between two calls of `must_end`: some 20 ms at most.
-EVALUATIONS_AT_ONCE = 150
+EVALUATIONS_PER_PAUSE = 150
 
 
 class _State(NamedTuple):
@@ -101,19 +101,21 @@ def search_patterns(
 
     Return vectors (k, d) and the number of evaluations. The vectors are the best feasible vector, if any, and the
     vector with the lowest merit, if that is another one.
-    vector: (d,). evaluations: maximum number. must_end: called after every `EVALUATIONS_AT_ONCE` evaluations; True
+    vector: (d,). evaluations: maximum number. must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; True
     ends the search with its present result.
     """
     frames = frames_of(encoding)
     inner_count = encoding.waypoints - 2
     interval = float(frames.edges[-1]) / inner_count
     moves, axes = _triangular_basis(inner_count)
-    steps = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])[axes]
+    steps = np.array([FIRST_STEP_ALONG_FRACTION * interval, FIRST_STEP_ACROSS_FRACTION * interval, FIRST_STEP_UP_M])[
+        axes
+    ]
     start = np.array(vector, dtype=np.float64)
     box, initial_steps = _Box(encoding.lower, encoding.upper), steps.copy()
     state: _State = _begin_search(data, frames, start, steps)
     while not state.is_done:
-        pause_count = min(evaluations, state.evaluations + EVALUATIONS_AT_ONCE)
+        pause_count = min(evaluations, state.evaluations + EVALUATIONS_PER_PAUSE)
         state = _continue_search(data, frames, box, moves, initial_steps, state, pause_count, evaluations)
         if not state.is_done and must_end():
             break
@@ -294,7 +296,9 @@ def _continue_search(
                     evaluations,
                     False,
                 )
-            if evaluations >= max_evaluations or (k < moves.shape[0] and abs(steps[k]) < MIN_STEP * initial_steps[k]):
+            if evaluations >= max_evaluations or (
+                k < moves.shape[0] and abs(steps[k]) < MIN_STEP_FRACTION * initial_steps[k]
+            ):
                 continue
             is_better = False
             for _ in range(2):

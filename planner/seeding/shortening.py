@@ -16,7 +16,7 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.problem import ProblemArrays
 from planner.optimisers.linear_algebra import band_cholesky, solve_band
 from planner.seeding.shortening_model import (
-    BAND,
+    HESSIAN_HALF_BANDWIDTH,
     ActiveConstraints,
     LagrangianModel,
     active_constraints,
@@ -31,21 +31,21 @@ from world.kernels import compiled, copy_into, inner
 
 
 # Added to the diagonal of the Hessian, 1 / m: along a straight line the position of a waypoint is undetermined.
-DAMPING = 2e-4
+HESSIAN_DAMPING_PER_M = 2e-4
 # Longest step of a waypoint along an axis, m.
-MAX_STEP = 80.0
+MAX_STEP_M = 80.0
 # Penalty of the first round, 1 / m.
-FIRST_PENALTY = 0.1
+FIRST_PENALTY_PER_M = 0.1
 # Penalty of the last round, 1 / m.
-LAST_PENALTY = 1.0
+LAST_PENALTY_PER_M = 1.0
 # Number of rounds.
-ROUNDS = 9
+ROUND_COUNT = 9
 # Number of steps per round.
-STEPS = 5
+STEPS_PER_ROUND = 5
 # Number of halvings per step.
-HALVINGS = 5
+HALVINGS_PER_STEP = 5
 # A round ends after a step that moves no waypoint further than this, m.
-MIN_MOVE = 0.05
+MIN_MOVE_M = 0.05
 
 
 @inner
@@ -55,13 +55,13 @@ def _newton_step(
     """Fill the Newton step (n,) from a path within its box, and return the largest component of the step, m."""
     size = step.size
     for row in range(size):
-        model.band[row, 0] += DAMPING
+        model.band[row, 0] += HESSIAN_DAMPING_PER_M
         coordinate, axis = path[1 + row // 3, row % 3], row % 3
         downhill = -model.gradient[row]
         if (coordinate <= min_corner[axis] and downhill < 0.0) or (coordinate >= max_corner[axis] and downhill > 0.0):
             # At an active bound of the box: remove the coordinate from the system.
             model.gradient[row] = 0.0
-            for k in range(1, BAND):
+            for k in range(1, HESSIAN_HALF_BANDWIDTH):
                 model.band[row, k] = 0.0
                 if row + k < size:
                     model.band[row + k, k] = 0.0
@@ -71,10 +71,10 @@ def _newton_step(
     for row in range(size):
         step[row] = -step[row]
         max_move = max(max_move, abs(step[row]))
-    if max_move > MAX_STEP:
+    if max_move > MAX_STEP_M:
         for row in range(size):
-            step[row] *= MAX_STEP / max_move
-    return min(max_move, MAX_STEP)
+            step[row] *= MAX_STEP_M / max_move
+    return min(max_move, MAX_STEP_M)
 
 
 class Shortening(NamedTuple):
@@ -122,18 +122,18 @@ def continue_shortening(
     descent = _Descent(
         np.array([data.west, data.south, data.floor]),
         np.array([data.east, data.north, data.ceiling]),
-        LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3))),
-        np.zeros((size, BAND)),
+        LagrangianModel(np.zeros(size), np.zeros((size, HESSIAN_HALF_BANDWIDTH)), np.zeros((4, 3))),
+        np.zeros((size, HESSIAN_HALF_BANDWIDTH)),
         np.zeros(size),
         path.copy(),
     )
-    last_round = min(ROUNDS, round_number + max_rounds)
+    last_round = min(ROUND_COUNT, round_number + max_rounds)
     while round_number < last_round:
         if round_number > 0:
             new_active = active_constraints(data, path, active.samples, extra_margin, corners_too)
             multipliers = carry_multipliers(active, multipliers, new_active)
             active = new_active
-        penalty = FIRST_PENALTY * (LAST_PENALTY / FIRST_PENALTY) ** (round_number / (ROUNDS - 1))
+        penalty = FIRST_PENALTY_PER_M * (LAST_PENALTY_PER_M / FIRST_PENALTY_PER_M) ** (round_number / (ROUND_COUNT - 1))
         values = np.zeros(multipliers.size)
         models += _descend(data, limits, active, path, multipliers, values, penalty, descent)
         for k in range(values.size):
@@ -156,13 +156,13 @@ def _descend(
     """Minimise the merit of a path (w, 3) in place, fill the final constraint values, and return the model count."""
     min_corner, max_corner, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
     merit, models = lagrangian(data, limits, active, path, multipliers, values, penalty, model), 1
-    for _ in range(STEPS):
+    for _ in range(STEPS_PER_ROUND):
         max_move, step_fraction, is_better = (
             _newton_step(path, min_corner, max_corner, model, descent.factor, step),
             1.0,
             False,
         )
-        for _ in range(HALVINGS):
+        for _ in range(HALVINGS_PER_STEP):
             for row in range(step.size):
                 axis = row % 3
                 coordinate = path[1 + row // 3, axis] + step_fraction * step[row]
@@ -178,7 +178,7 @@ def _descend(
         merit = trial_merit
         for row in range(path.shape[0]):
             copy_into(path[row], trial[row])
-        if step_fraction * max_move < MIN_MOVE:
+        if step_fraction * max_move < MIN_MOVE_M:
             break
     lagrangian(data, limits, active, path, multipliers, values, penalty, model)
     return models + 1
@@ -187,24 +187,24 @@ def _descend(
 # --- Shortening a path ---
 
 # Spacing of ground samples on the mean leg, m.
-SAMPLE_PITCH = 30.0
+SAMPLE_PITCH_M = 30.0
 # Minimum number of ground samples per leg.
 MIN_SAMPLES = 6
 # Maximum number of ground samples per leg.
 MAX_SAMPLES = 48
 # Additional margin to spheres and ground, m: the accuracy that the last steps reach.
-EXTRA_MARGIN = 0.1
+EXTRA_MARGIN_M = 0.1
 # Maximum number of models per shortening.
-MAX_MODELS = ROUNDS * (2 + STEPS * HALVINGS)
+MAX_MODELS = ROUND_COUNT * (2 + STEPS_PER_ROUND * HALVINGS_PER_STEP)
 # Pairs of leg and missile between two calls of `pause`: some 5 ms.
-PAIRS_AT_ONCE = 400_000
+PAIRS_PER_PAUSE = 400_000
 
 
 def shorten_path(
     data: ProblemArrays,
     path: Floats,
     *,
-    extra_margin: float = EXTRA_MARGIN,
+    extra_margin: float = EXTRA_MARGIN_M,
     corners_too: bool = False,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
@@ -225,14 +225,14 @@ def shorten_path(
     ((10, 3), True)
     """
     mean_length = math.dist(path[0], path[-1]) / (len(path) - 1)
-    samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean_length / SAMPLE_PITCH))))
-    rounds = max(1, PAIRS_AT_ONCE // (len(path) * max(1, len(data.missiles.missiles))))
+    samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean_length / SAMPLE_PITCH_M))))
+    rounds = max(1, PAIRS_PER_PAUSE // (len(path) * max(1, len(data.missiles.missiles))))
     start = np.array(path, dtype=np.float64)
     # A grid's route ends at the height of a layer.
     start[0], start[-1] = data.start, data.destination
     shortening: Shortening = begin_shortening(data, start, samples, extra_margin, corners_too)
-    while shortening.rounds < ROUNDS:
-        shortening = continue_shortening(data, shortening, extra_margin, min(ROUNDS, rounds))
+    while shortening.rounds < ROUND_COUNT:
+        shortening = continue_shortening(data, shortening, extra_margin, min(ROUND_COUNT, rounds))
         pause()
     return shortening.path, int(shortening.models)
 

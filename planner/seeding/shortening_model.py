@@ -18,7 +18,7 @@ from planner.evaluation.corners import (
     CORNER,
     LEG,
     SETTLING_FRACTION,
-    SETTLING_LENGTH,
+    SETTLING_LENGTH_M,
     courses_at,
     measure_corner,
     measure_corners,
@@ -31,8 +31,8 @@ from planner.evaluation.problem import ProblemArrays, clearance_at
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, measure_lags
 from planner.evaluation.travel_cost import LegModel, model_leg
 from planner.seeding.flown_corners import (
-    NEAR_GROUND,
-    SAMPLES,
+    NEAR_GROUND_HEIGHT_M,
+    SAMPLES_PER_CORNER,
     FlownCorners,
     arc_room,
     arc_room_slopes,
@@ -53,13 +53,13 @@ from world.terrain import pixel_height
 
 
 # A sphere constrains the legs that come within this distance of its surface, m.
-NEARBY_DISTANCE = 250.0
+NEARBY_DISTANCE_M = 250.0
 # Smallest turn, rad; smaller turns are measured at it.
-MIN_TURN = 0.2
+MIN_TURN_RAD = 0.2
 # Largest turn whose tangent of half the turn is taken, rad.
-MAX_TURN = 3.0
+MAX_TURN_RAD = 3.0
 # Upper limit on the length that a turn takes of a leg, m.
-MAX_TURN_LENGTH = 1e4
+MAX_TURN_LENGTH_M = 1e4
 
 
 class ActiveConstraints(NamedTuple):
@@ -117,10 +117,10 @@ def active_constraints(
         _fill_turn_lengths(data, limits, path, legs, before, after)
     pairs, distances = _find_near_missiles(data, path, corners, lags, extra_margin)
     flown = no_corners(path.shape[0], extra_margin)
-    turn_settings = data.legs_hold_turns, TURN_MARGIN
+    turn_settings = data.legs_hold_turns, TURN_MARGIN_M
     if corners_too:
         flown = corners_near_ground(data, limits, path, corners, lags, extra_margin)
-        turn_settings = data.legs_hold_turns, max(TURN_MARGIN, 2.0 * extra_margin)
+        turn_settings = data.legs_hold_turns, max(TURN_MARGIN_M, 2.0 * extra_margin)
     return ActiveConstraints(
         pairs, distances, samples, extra_heights, climb, dive, before, after, roll, *turn_settings, flown
     )
@@ -138,18 +138,18 @@ def _fill_turn_lengths(
         turn = math.atan2(abs(cross), dot)
         if i in (0, path.shape[0] - 1) and turn == 0.0:
             continue
-        if turn < MIN_TURN:
-            turn = MIN_TURN
+        if turn < MIN_TURN_RAD:
+            turn = MIN_TURN_RAD
             sine = math.sin(turn) if cross >= 0.0 else -math.sin(turn)
             vx, vy = ux * math.cos(turn) - uy * sine, uy * math.cos(turn) + ux * sine
         measure_corner(data.aircraft, data.tracking, limits.wind, True, ux, uy, vx, vy, path[i, 2], corners[0])
-        half_turn_tangent = math.tan(0.5 * min(turn, MAX_TURN))
+        half_turn_tangent = math.tan(0.5 * min(turn, MAX_TURN_RAD))
         before[i], after[i] = (
-            min(MAX_TURN_LENGTH, corners[0].before) / half_turn_tangent,
-            min(MAX_TURN_LENGTH, corners[0].after) / half_turn_tangent,
+            min(MAX_TURN_LENGTH_M, corners[0].before) / half_turn_tangent,
+            min(MAX_TURN_LENGTH_M, corners[0].after) / half_turn_tangent,
         )
         if data.fly_over:
-            before[i], after[i] = 0.0, min(MAX_TURN_LENGTH, turn_length(True, corners, 0)) / half_turn_tangent
+            before[i], after[i] = 0.0, min(MAX_TURN_LENGTH_M, turn_length(True, corners, 0)) / half_turn_tangent
 
 
 @inner
@@ -167,7 +167,7 @@ def _find_near_missiles(
             length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
             fraction = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
             distance = math.sqrt((ax + fraction * dx) ** 2 + (ay + fraction * dy) ** 2 + (az + fraction * dz) ** 2)
-            if distance > missile.radius + data.kill_margin + NEARBY_DISTANCE:
+            if distance > missile.radius + data.kill_margin + NEARBY_DISTANCE_M:
                 continue
             length = math.sqrt(length2)
             excursion = 0.0
@@ -189,7 +189,7 @@ def _find_near_missiles(
 def constraint_count(active: ActiveConstraints) -> int:
     """Return the number of constraints of `lagrangian`."""
     legs = active.low.size
-    return active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES)
+    return active.pairs.shape[0] + legs * (active.samples + 4) + (legs + 1) * (3 + SAMPLES_PER_CORNER)
 
 
 @inner
@@ -226,19 +226,22 @@ def carry_multipliers(
 # --- The model ---
 
 # Half bandwidth of the Hessian: three coordinates of each of the four waypoints that a constraint couples.
-BAND = 12
+HESSIAN_HALF_BANDWIDTH = 12
 # Scale of turn constraints, m per rad.
-TURN_LENGTH = 200.0
+TURN_SCALE_M_PER_RAD = 200.0
 # Shortest leg, m: slightly more than the scores require.
-SHORTEST_LEG = 15.0
+MIN_LEG_M = 15.0
 # Additional margin of slopes, m of height: the accuracy that the last steps reach.
 SLOPE_MARGIN = 0.2
 # Additional margin of leg lengths between turns, m: the accuracy that the last steps reach.
-TURN_MARGIN = 1.0
+TURN_MARGIN_M = 1.0
 
 
 class LagrangianModel(NamedTuple):
-    """Gradient (n,) and Hessian band (n, BAND) over the inner waypoints, and derivatives (4, 3) of one constraint."""
+    """Gradient (n,), Hessian band (n, `HESSIAN_HALF_BANDWIDTH`) and derivatives (4, 3) of one constraint.
+
+    n: number of coordinates of the inner waypoints.
+    """
 
     gradient: Floats
     band: Floats
@@ -401,9 +404,9 @@ def _add_corners(
         radius = flown.radii[i]
         for k in range(3):
             copy_into(corner[k], path[i - 1 + k])
-        for k in range(SAMPLES):
-            number = first_number + i * SAMPLES + k
-            values[number] = NEAR_GROUND
+        for k in range(SAMPLES_PER_CORNER):
+            number = first_number + i * SAMPLES_PER_CORNER + k
+            values[number] = NEAR_GROUND_HEIGHT_M
             if radius <= 0.0:
                 continue
             corner_point(data, corner[0], corner[1], corner[2], radius, k, point)
@@ -414,8 +417,8 @@ def _add_corners(
                 corner_slopes(data, corner, radius, k, ground_gradient, point, model.slopes)
             merit += _add_constraint(value, i - 1, 3, multipliers[number], penalty, model)
         for k in range(2):
-            number, radius = first_number + path.shape[0] * SAMPLES + 2 * i + k, flown.steep_radii[i]
-            values[number] = NEAR_GROUND
+            number, radius = first_number + path.shape[0] * SAMPLES_PER_CORNER + 2 * i + k, flown.steep_radii[i]
+            values[number] = NEAR_GROUND_HEIGHT_M
             if radius <= 0.0:
                 continue
             sign, max_slope = 1.0 - 2.0 * k, flown.slopes[i, k]
@@ -455,7 +458,7 @@ def _add_slopes(
                 slopes[0, axis] = -slopes[1, axis]
             number = first_number + 3 * i + kind
             values[number] = (
-                tangent * horizontal_length + sign * altitude_change - (SHORTEST_LEG if kind == 2 else SLOPE_MARGIN)
+                tangent * horizontal_length + sign * altitude_change - (MIN_LEG_M if kind == 2 else SLOPE_MARGIN)
             )
             merit += _add_constraint(values[number], i, 2, multipliers[number], penalty, model)
     return merit
@@ -491,8 +494,8 @@ def _add_turns(
         before_derivatives[i, 0], before_derivatives[i, 1] = side * uy / u2, -side * ux / u2
         after_derivatives[i, 0], after_derivatives[i, 1] = -side * vy / v2, side * vx / v2
         slopes[:] = 0.0
-        _add_turn_derivatives(before_derivatives[i], after_derivatives[i], -TURN_LENGTH, slopes[:3])
-        values[first_number + i] = TURN_LENGTH * (data.max_turn - turn[i])
+        _add_turn_derivatives(before_derivatives[i], after_derivatives[i], -TURN_SCALE_M_PER_RAD, slopes[:3])
+        values[first_number + i] = TURN_SCALE_M_PER_RAD * (data.max_turn - turn[i])
         merit += _add_constraint(values[first_number + i], i - 1, 3, multipliers[first_number + i], penalty, model)
     if not active.turns_in_legs:
         return merit
@@ -500,7 +503,10 @@ def _add_turns(
         number = first_number + count + 1 + i
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
         horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
-        begin_tangent, end_tangent = math.tan(0.5 * min(MAX_TURN, turn[i])), math.tan(0.5 * min(MAX_TURN, turn[i + 1]))
+        begin_tangent, end_tangent = (
+            math.tan(0.5 * min(MAX_TURN_RAD, turn[i])),
+            math.tan(0.5 * min(MAX_TURN_RAD, turn[i + 1])),
+        )
         needed_length = active.after[i] * begin_tangent + active.before[i + 1] * end_tangent + active.roll[i]
         slopes[:] = 0.0
         for axis, component in ((0, dx / horizontal_length), (1, dy / horizontal_length)):
@@ -519,7 +525,7 @@ def _add_turns(
             slopes[1:],
         )
         remaining_length = (1.0 - SETTLING_FRACTION) * horizontal_length - needed_length
-        values[number] = remaining_length - min(SETTLING_LENGTH, needed_length) - active.turn_margin
+        values[number] = remaining_length - min(SETTLING_LENGTH_M, needed_length) - active.turn_margin
         merit += _add_constraint(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
 

@@ -14,8 +14,8 @@ import numpy as np
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.problem import ProblemArrays, required_clearance
 from planner.seeding.grids import (
+    MAX_LATERAL_CELLS,
     ROUTE_CELL,
-    SIDEWAYS,
     SPAN,
     Grid,
     GridRoute,
@@ -87,11 +87,11 @@ def _relax_stage_back(
         first, last = spans[z].first, spans[z].last
         if first > last:
             continue
-        for side in range(-SIDEWAYS, SIDEWAYS + 1):
+        for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
             first_cell, end_cell = max(first, -side), min(last, width - 1 - side) + 1
             if first_cell >= end_cell:
                 continue
-            limit = step_layers[side + SIDEWAYS, z]
+            limit = step_layers[side + MAX_LATERAL_CELLS, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
@@ -136,7 +136,7 @@ class SideSearch(NamedTuple):
 
 
 # Number of cells reached between two calls of `pause`: some 10 ms.
-CELLS_AT_ONCE = 100_000
+CELLS_PER_PAUSE = 100_000
 
 
 def grid_costs(
@@ -144,9 +144,9 @@ def grid_costs(
 ) -> GridCosts:
     """Return the costs of the cheapest partial routes over a grid, from start and to destination, up to a bound.
 
-    pause: called after every `CELLS_AT_ONCE` cells; an exception raised there stops the search.
+    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
     """
-    stages = max(1, CELLS_AT_ONCE // (grid.across.size * grid.layers.size))
+    stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
     search: SideSearch = begin_grid_costs(data, frame, grid)
     while search.done < 2 * grid.stages:
         search = continue_grid_costs(data, frame, grid, bound, search, stages)
@@ -196,7 +196,7 @@ def continue_grid_costs(
             first, last = width, -1
             for z in range(layer_count):
                 first, last = min(first, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
-            first, last = max(0, first - SIDEWAYS), min(width - 1, last + SIDEWAYS)
+            first, last = max(0, first - MAX_LATERAL_CELLS), min(width - 1, last + MAX_LATERAL_CELLS)
             if first > last:
                 end = 2 * stages
                 break
@@ -269,7 +269,7 @@ def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Reco
 # --- Routes of different sides ---
 
 # Routes with a mean lateral distance below this are the same route, m.
-SAME_ROUTE_DISTANCE = 100.0
+SAME_ROUTE_DISTANCE_M = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
@@ -325,7 +325,7 @@ def side_routes(
         if sides in known_sides:
             continue
         known_sides.add(sides)
-        if any(np.abs(points[:, 1] - route.points[:, 1]).mean() < SAME_ROUTE_DISTANCE for route in routes):
+        if any(np.abs(points[:, 1] - route.points[:, 1]).mean() < SAME_ROUTE_DISTANCE_M for route in routes):
             continue
         routes.append(GridRoute(points, float(passing["cost"])))
         if len(routes) == max_routes:

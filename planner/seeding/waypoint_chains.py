@@ -16,7 +16,7 @@ from planner.evaluation.corners import CORNER, measure_corner
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance
 from planner.evaluation.threat_index import kill_density
-from planner.seeding.waypoint_fitting import ROUNDING, leg_cost
+from planner.seeding.waypoint_fitting import COST_ROUNDING_M, leg_cost
 from world.arrays import Flags, Floats, Ints
 from world.frames import polymap
 from world.kernels import Records, compiled, inlined, inner
@@ -25,9 +25,9 @@ from world.terrain import pixel_height
 # Cost, in m of path, per rad above the turn limit, or per 100 m by which a leg is too short for its turn.
 TURN_COST = 2e4
 # Fraction of a leg that each of its two turns may take.
-TURN_SHARE = 0.475
+TURN_LENGTH_FRACTION = 0.475
 # Legs evaluated between two calls of `pause`: at most some 20 ms on a slow processor.
-LEGS_AT_ONCE = 2_500
+LEGS_PER_PAUSE = 2_500
 # Larger than any number of legs.
 ALL_LEGS = 2**62
 # Progress: direction, next waypoint and candidate, and number of legs evaluated.
@@ -76,7 +76,7 @@ def waypoint_chains(
 ) -> WaypointChains:
     """Return the best paths through candidates (w, k, 3) world m; only the first candidate of each end is used.
 
-    bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_AT_ONCE`
+    bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_PER_PAUSE`
     legs; an exception raised there stops the work. max_legs: if more legs have to be evaluated, no path is returned.
     """
     count, width, _ = candidates.shape
@@ -87,7 +87,7 @@ def waypoint_chains(
     sweeps, cursor = _Sweeps(forward, before, backward, after), np.zeros(1, dtype=_CURSOR)
     cursor["step"], cursor["waypoint"] = 1, 1
     evaluated_legs = 0
-    while not _advance(data, candidates, legs, bound, sweeps, cursor, min(LEGS_AT_ONCE, max_legs - evaluated_legs)):
+    while not _advance(data, candidates, legs, bound, sweeps, cursor, min(LEGS_PER_PAUSE, max_legs - evaluated_legs)):
         pause()
         evaluated_legs = int(cursor["legs"][0])
         if evaluated_legs >= max_legs:
@@ -206,7 +206,7 @@ def _extend_paths(
             evaluated += 1 if leg == 0.0 else 0
             if not cost[previous, j] - leg + turn_cost < min(cost[i, k], max_cost):
                 continue
-            max_leg_cost = min(cost[i, k], max_cost) - cost[previous, j] - turn_cost + ROUNDING
+            max_leg_cost = min(cost[i, k], max_cost) - cost[previous, j] - turn_cost + COST_ROUNDING_M
             leg = leg_cost(
                 data,
                 limits,
@@ -262,8 +262,8 @@ def _corner_cost(
             b[2],
             corner,
         )
-        missing_length = max(0.0, corner.before - TURN_SHARE * first_length) + max(
-            0.0, corner.after - TURN_SHARE * second_length
+        missing_length = max(0.0, corner.before - TURN_LENGTH_FRACTION * first_length) + max(
+            0.0, corner.after - TURN_LENGTH_FRACTION * second_length
         )
         excess += min(10.0, missing_length / 100.0)
     return TURN_COST * excess

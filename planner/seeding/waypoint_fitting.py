@@ -26,7 +26,7 @@ DEPTH_COST = 2e4
 # Cost of slope excess, in m of path per unit of slope.
 SLOPE_COST = 1e6
 # Added to the upper limit of a leg's cost, m: more than the rounding error of a difference of costs.
-ROUNDING = 1e-3
+COST_ROUNDING_M = 1e-3
 
 
 @inner
@@ -59,7 +59,7 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
         b[0],
         b[1],
         b[2],
-        (max_cost - total + ROUNDING) / DEPTH_COST,
+        (max_cost - total + COST_ROUNDING_M) / DEPTH_COST,
     )
     if total > max_cost:
         return total
@@ -83,7 +83,7 @@ def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Float
     if total > max_cost:
         return total
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
-        max_depth = (max_cost - total + ROUNDING) / DEPTH_COST
+        max_depth = (max_cost - total + COST_ROUNDING_M) / DEPTH_COST
         total += DEPTH_COST * airspace_excess(data, a, b, max(0.0, depth_below), max(0.0, -depth_below), max_depth)
     return total
 
@@ -136,7 +136,7 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
                     break
                 lower_bounds[j] = np.inf
                 evaluated += 1
-                max_cost = next_cost[k] - cost[j] + ROUNDING
+                max_cost = next_cost[k] - cost[j] + COST_ROUNDING_M
                 total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b, max_cost)
                 if total < next_cost[k]:
                     next_cost[k] = total
@@ -167,9 +167,9 @@ class WaypointFit:
 # Initial moves of a waypoint: fractions of the interval along and across, and m up.
 FIRST_MOVES = (0.25, 0.2, 40.0)
 # Reduction of the moves per round.
-SHRINK = 0.7
+MOVE_FACTOR = 0.7
 # Reduction of the moves in the last rounds.
-LAST_SHRINK = 0.6
+LAST_MOVE_FACTOR = 0.6
 CLOSE_FIT = WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True)
 QUICK_FIT = WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False)
 # Steps to the 26 neighbours and to the point itself, along, across and up.
@@ -197,7 +197,7 @@ def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit:
     candidates[1:-1, :, 2] += np.repeat(fit.lifts, width)
     chosen, _ = _pick_candidates(data, frames, candidates)
     steps = _NEIGHBOURS if fit.diagonal else _AXIS_NEIGHBOURS
-    moved, _ = _move_waypoints(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)
+    moved, _ = _move_waypoints(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), MOVE_FACTOR)
     return _restore_world(frames, moved[:, None])[:, 0]
 
 
@@ -210,7 +210,9 @@ def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int
     frames = frames_of(encoding)
     path = np.zeros((encoding.waypoints, 3))
     path[1:-1] = frames.rotate(encoding.decode(vector[None])[0, 1:-1])
-    chosen, legs = _move_waypoints(data, frames, path, _NEIGHBOURS, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
+    chosen, legs = _move_waypoints(
+        data, frames, path, _NEIGHBOURS, rounds, scale * np.array(FIRST_MOVES), LAST_MOVE_FACTOR
+    )
     return np.clip(chosen[1:-1].ravel(), encoding.lower, encoding.upper), math.ceil(legs / (encoding.waypoints - 1))
 
 

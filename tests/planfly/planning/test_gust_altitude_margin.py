@@ -18,7 +18,7 @@ from planfly.planning.gust_altitude_margin import (
 from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import finish_plan, make_plan
 from planner.evaluation.certify import certify
-from planner.evaluation.problem import CERTIFIED_BUFFER, make_problem
+from planner.evaluation.problem import CERTIFIED_BUFFER_M, make_problem
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from planner.search.shared_budget import SharedBudget
@@ -135,7 +135,7 @@ def test_near_a_low_end_half_is_kept() -> None:
     assert asked[0].reserve_climb == pytest.approx(reserve, rel=5e-3)
     assert asked[0].reserve_height == pytest.approx(12.0 * (2.33 * GUST - reserve), rel=5e-3)
     middle = np.interp(4000.0, plan.waypoints[:, 0], plan.waypoints[:, 2]) - GROUND - 50.0
-    assert middle >= asked[0].reserve_height + CERTIFIED_BUFFER
+    assert middle >= asked[0].reserve_height + CERTIFIED_BUFFER_M
 
 
 @pytest.mark.parametrize("over", [0.5, -0.5])

@@ -12,10 +12,10 @@ from planner.evaluation.airspace_scores import airspace_counts, airspace_excess,
 from planner.evaluation.certify import certify
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.problem import (
-    CERTIFIED_BUFFER,
-    CERTIFIED_ZONE_MARGIN,
-    SEARCH_BUFFER,
-    SEARCH_ZONE_MARGIN,
+    CERTIFIED_BUFFER_M,
+    CERTIFIED_ZONE_MARGIN_M,
+    SEARCH_BUFFER_M,
+    SEARCH_ZONE_MARGIN_M,
     Problem,
     ProblemArrays,
     make_problem,
@@ -51,12 +51,12 @@ def certificate(problem: Problem, path: np.ndarray) -> Certificate:
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False), (-40.0, False)])
 def test_a_zone_beside_the_way(made: Made, more: float, ok: bool) -> None:
-    result = certificate(made(zones=tower(CERTIFIED_ZONE_MARGIN + more)), STRAIGHT)
+    result = certificate(made(zones=tower(CERTIFIED_ZONE_MARGIN_M + more)), STRAIGHT)
     assert result.ok == ok
-    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN + more, abs=1e-6)
-    result = certificate(made({"across": 12.0}, zones=tower(CERTIFIED_ZONE_MARGIN + 12.0 + more)), STRAIGHT)
+    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN_M + more, abs=1e-6)
+    result = certificate(made({"across": 12.0}, zones=tower(CERTIFIED_ZONE_MARGIN_M + 12.0 + more)), STRAIGHT)
     assert result.ok == ok
-    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN + more, abs=1e-6)
+    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN_M + more, abs=1e-6)
 
 
 def test_what_fails_names_the_zone_and_the_leg(made: Made) -> None:
@@ -93,18 +93,18 @@ def test_a_zone_inside_a_turn_is_what_the_arc_comes_near(made: Made) -> None:
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
 def test_a_floor_over_the_way(made: Made, more: float, ok: bool) -> None:
-    result = certificate(made(zones=tower(-200.0, floor_amsl_m=150.0 + CERTIFIED_BUFFER + more)), STRAIGHT)
+    result = certificate(made(zones=tower(-200.0, floor_amsl_m=150.0 + CERTIFIED_BUFFER_M + more)), STRAIGHT)
     assert result.ok == ok
-    assert result.zone_distance == pytest.approx(CERTIFIED_BUFFER + more)
+    assert result.zone_distance == pytest.approx(CERTIFIED_BUFFER_M + more)
 
 
 @pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
 def test_a_greatest_height(made: Made, more: float, ok: bool) -> None:
     path = STRAIGHT + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 30.0], [0.0, 0.0, 0.0]])
-    limits = {"max_height_m": 180.0 + CERTIFIED_BUFFER + more, "min_clearance_m": 30}
+    limits = {"max_height_m": 180.0 + CERTIFIED_BUFFER_M + more, "min_clearance_m": 30}
     result = certificate(made(limits=limits), path)
     assert result.ok == ok
-    assert result.headroom == pytest.approx(CERTIFIED_BUFFER + more, abs=1e-3)
+    assert result.headroom == pytest.approx(CERTIFIED_BUFFER_M + more, abs=1e-3)
     assert ok or "m above ground at its highest" in result.problems[0]
 
 
@@ -167,9 +167,9 @@ def north_tower(off: float, radius: float = 200.0, **levels: float) -> list[dict
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
 def test_a_zone_beside_the_way_is_scored(make_arrays: MakeArrays, more: float, violated: bool) -> None:
-    data = make_arrays(zones=north_tower(SEARCH_ZONE_MARGIN + more))
+    data = make_arrays(zones=north_tower(SEARCH_ZONE_MARGIN_M + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
-    data = make_arrays({"across": 12.0}, zones=north_tower(SEARCH_ZONE_MARGIN + 12.0 + more))
+    data = make_arrays({"across": 12.0}, zones=north_tower(SEARCH_ZONE_MARGIN_M + 12.0 + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
 
 
@@ -182,7 +182,7 @@ def test_a_zone_outside_a_corner_is_kept_by_what_is_strayed_there(
     ends = {"destination": {"east_m": 5400, "north_m": 1800, "amsl_m": 150}}
     strayed = 40.0 * 36.8699 / 90.0
     zone = {"name": "it", "kind": "exclusion", "east_m": 2990.0, "radius_m": 50.0}
-    zone["north_m"] = -(50.0 + SEARCH_ZONE_MARGIN + strayed + more)
+    zone["north_m"] = -(50.0 + SEARCH_ZONE_MARGIN_M + strayed + more)
     numbers = {"excursion": 40.0, "before": 200.0, "after": 200.0}
     data = make_arrays(numbers, zones=[zone], **ends)
     assert (found(data, path, Violation.BOUNDS) > 0.0) == violated
@@ -193,17 +193,17 @@ def test_a_zone_outside_a_corner_is_kept_by_what_is_strayed_there(
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
 def test_a_floor_over_the_way_is_scored(make_arrays: MakeArrays, more: float, violated: bool) -> None:
-    data = make_arrays(zones=north_tower(-200.0, floor_amsl_m=150.0 + SEARCH_BUFFER + more))
+    data = make_arrays(zones=north_tower(-200.0, floor_amsl_m=150.0 + SEARCH_BUFFER_M + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
 def test_a_greatest_height_above_ground(make_arrays: MakeArrays, more: float, violated: bool) -> None:
-    data = make_arrays(limits={"max_height_m": 158.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
+    data = make_arrays(limits={"max_height_m": 158.0 + SEARCH_BUFFER_M + more, "min_clearance_m": 30})
     path = STRAIGHT + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 0.0]])
     assert (found(data, path, Violation.TERRAIN) > 0.0) == violated
     # Where the autopilot is 5 m off in height.
-    data = make_arrays({"up": 5.0}, limits={"max_height_m": 163.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
+    data = make_arrays({"up": 5.0}, limits={"max_height_m": 163.0 + SEARCH_BUFFER_M + more, "min_clearance_m": 30})
     assert (found(data, path, Violation.TERRAIN) > 0.0) == violated
 
 
@@ -246,7 +246,7 @@ def test_pieces_that_touch_a_zone_are_counted(
     small: Callable[..., Scenario],
     make_limits: Callable[[Scenario], Limits],
 ) -> None:
-    scenario = small(**GROUND, zones=mast(east, 300.0 + SEARCH_ZONE_MARGIN + more))
+    scenario = small(**GROUND, zones=mast(east, 300.0 + SEARCH_ZONE_MARGIN_M + more))
     data = make_problem(scenario, make_limits(scenario)).search
     assert airspace_counts(data, ONE_LEG[None]).tolist() == [inside * pieces]
 
@@ -257,7 +257,7 @@ def test_pieces_above_the_greatest_height_are_counted(
 ) -> None:
     scenario = small(**GROUND, limits={"max_height_m": 200.0})
     data = make_problem(scenario, make_limits(scenario)).search
-    path = ONE_LEG + np.array([0.0, 0.0, 50.0 - SEARCH_BUFFER + more])
+    path = ONE_LEG + np.array([0.0, 0.0, 50.0 - SEARCH_BUFFER_M + more])
     assert airspace_counts(data, np.stack([ONE_LEG, path])).tolist() == [0, pieces]
 
 

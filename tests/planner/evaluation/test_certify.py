@@ -8,7 +8,7 @@ import pytest
 from aircraft.path_limits import Limits, turn_tangents
 from flight.guidance.path import fly_by_path
 from flight.mission.route import Route
-from planner.evaluation.problem import ANGLE_MARGIN, CERTIFIED_KILL_MARGIN
+from planner.evaluation.problem import ANGLE_MARGIN_RAD, CERTIFIED_KILL_MARGIN_M
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from tests.sampled_paths import sample_path
@@ -25,8 +25,8 @@ def embedded(request: pytest.FixtureRequest, make_limits: Callable[[Scenario], L
 
 def test_embedded_scenarios_are_planned_safely(embedded: Plan) -> None:
     assert embedded.safe
-    assert embedded.certificate.kill_distance >= CERTIFIED_KILL_MARGIN
-    assert embedded.certificate.slope >= ANGLE_MARGIN - 1e-9
+    assert embedded.certificate.kill_distance >= CERTIFIED_KILL_MARGIN_M
+    assert embedded.certificate.slope >= ANGLE_MARGIN_RAD - 1e-9
     assert embedded.certificate.clearance >= 5.0 - 1e-9
 
 

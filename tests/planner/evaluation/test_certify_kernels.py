@@ -17,7 +17,7 @@ from planner.evaluation.certify_kernels import (
     turn_and_roll_lengths,
     with_courses,
 )
-from planner.evaluation.problem import ANGLE_MARGIN, BUFFER_GROWTH, ProblemArrays, make_problem
+from planner.evaluation.problem import ANGLE_MARGIN_RAD, BUFFER_GROWTH_RATIO, ProblemArrays, make_problem
 from tests.planner.tracking_limits import with_tracking_error
 from world.scenario import Scenario
 
@@ -186,8 +186,8 @@ def test_slopes_are_the_numbers_of_the_scenario_less_their_margin(
 ) -> None:
     data = make_certified(limits={"max_climb_deg": 5, "max_dive_deg": 7})
     climbs, dives = leg_slope_limits(data, CORNER)
-    assert climbs.tolist() == pytest.approx([math.radians(5.0) - ANGLE_MARGIN] * 2)
-    assert dives.tolist() == pytest.approx([math.radians(7.0) - ANGLE_MARGIN] * 2)
+    assert climbs.tolist() == pytest.approx([math.radians(5.0) - ANGLE_MARGIN_RAD] * 2)
+    assert dives.tolist() == pytest.approx([math.radians(7.0) - ANGLE_MARGIN_RAD] * 2)
 
 
 def test_heights_stand_above_the_ground_for_legs_and_arcs(
@@ -213,9 +213,9 @@ def test_off_the_terrain_there_is_no_height(make_certified: Callable[..., Proble
 
 def test_the_buffer_grows_from_an_end_that_leaves_none(make_certified: Callable[..., ProblemArrays]) -> None:
     data = make_certified()._replace(buffer=5.0, start_buffer=1.0)
-    for away, wanted in ((0.0, 1.0), (40.0, 1.0 + 0.5 * BUFFER_GROWTH * 40.0), (1000.0, 5.0)):
+    for away, wanted in ((0.0, 1.0), (40.0, 1.0 + 0.5 * BUFFER_GROWTH_RATIO * 40.0), (1000.0, 5.0)):
         leg = np.array([[away, 0.0, 150.0], [3000.0, 0.0, 150.0]])
         assert heights_above_ground(data, leg)["buffer"][0] == pytest.approx(wanted), away
     far = data._replace(start_buffer=5.0, destination_buffer=2.0)
     leg = np.array([[3000.0, 0.0, 150.0], [5980.0, 0.0, 150.0]])
-    assert heights_above_ground(far, leg)["buffer"][0] == pytest.approx(2.0 + 0.5 * BUFFER_GROWTH * 20.0)
+    assert heights_above_ground(far, leg)["buffer"][0] == pytest.approx(2.0 + 0.5 * BUFFER_GROWTH_RATIO * 20.0)

@@ -10,7 +10,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.evaluation.graded_scores import _score_paths, graded_scores
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_KILL_MARGIN, Problem, ProblemArrays, make_problem
+from planner.evaluation.problem import SEARCH_BUFFER_M, SEARCH_KILL_MARGIN_M, Problem, ProblemArrays, make_problem
 from planner.plan import Objective, Violation
 from tests.planner.tracking_limits import with_tracking_error
 from world.frames import polymap
@@ -84,11 +84,11 @@ def test_a_missile_outside_a_corner_is_kept_by_what_is_strayed_there(
     strayed: Callable[..., ProblemArrays], excursion: float, hit: bool
 ) -> None:
     """South-east of the right angle, 40 m and the margin outside: within the excursion or beyond it."""
-    away = (500.0 + SEARCH_KILL_MARGIN + 40.0) / math.sqrt(2.0)
+    away = (500.0 + SEARCH_KILL_MARGIN_M + 40.0) / math.sqrt(2.0)
     data = strayed({"excursion": excursion}, 3000.0 + away, -away, 200.0, 500.0)
     assert (kill_of(data, CORNER) > 0.0) == hit
     # Beside the middle of a straight leg, as far away, an excursion at the corner does not matter.
-    beside = strayed({"excursion": excursion}, 1200.0, -(500.0 + SEARCH_KILL_MARGIN + 1.0), 200.0, 500.0)
+    beside = strayed({"excursion": excursion}, 1200.0, -(500.0 + SEARCH_KILL_MARGIN_M + 1.0), 200.0, 500.0)
     assert kill_of(beside, CORNER) == 0.0
 
 
@@ -96,14 +96,14 @@ def test_a_missile_outside_a_corner_is_kept_by_what_is_strayed_there(
 def test_a_missile_beside_a_leg_is_kept_by_what_is_strayed_everywhere(
     strayed: Callable[..., ProblemArrays], across: float, hit: bool
 ) -> None:
-    data = strayed({"across": across}, 1200.0, -(500.0 + SEARCH_KILL_MARGIN + 5.0), 200.0, 500.0)
+    data = strayed({"across": across}, 1200.0, -(500.0 + SEARCH_KILL_MARGIN_M + 5.0), 200.0, 500.0)
     assert (kill_of(data, CORNER) > 0.0) == hit
 
 
 @pytest.mark.parametrize(("lag", "low"), [(2.9, False), (3.6, True)])
 def test_ground_under_a_climb_is_kept_by_the_lag(strayed: Callable[..., ProblemArrays], lag: float, low: bool) -> None:
     """A climb at 0.1 that ends 8 m above what is wanted, after 3 s of 25.3 m/s: 7.6 m low at its end, and 9.1 m."""
-    top = 60.0 + SEARCH_BUFFER + 8.0
+    top = 60.0 + SEARCH_BUFFER_M + 8.0
     path = np.array(
         [[0.0, 0.0, top + 40.0], [2000.0, 0.0, top + 40.0], [3400.0, 0.0, top + 180.0], [6000.0, 0.0, top + 180.0]]
     )

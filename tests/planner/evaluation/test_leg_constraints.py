@@ -10,8 +10,8 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.evaluation.corners import fly_by_radii
 from planner.evaluation.leg_constraints import (
-    BLOCK,
     BLOCK_SCRATCH,
+    PATHS_PER_BLOCK,
     clear_sums,
     copy_point,
     divide_legs,
@@ -19,7 +19,7 @@ from planner.evaluation.leg_constraints import (
     subtract_points,
 )
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import ANGLE_MARGIN, Problem, make_problem
+from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, make_problem
 from planner.plan import Violation
 from tests.planner.evaluation.violations import violations_of
 from world.frames import fit_polymap
@@ -36,14 +36,14 @@ def block() -> Any:
     rng = np.random.default_rng(4)
     for place in ("begin", "end", "step", "point"):
         for name in PLACE:
-            scratch[place][name][0] = rng.uniform(-9.0, 9.0, BLOCK)
+            scratch[place][name][0] = rng.uniform(-9.0, 9.0, PATHS_PER_BLOCK)
     for name in BLOCK_SCRATCH["sums"].names or ():
-        scratch["sums"][name][0] = rng.uniform(1.0, 9.0, BLOCK)
+        scratch["sums"][name][0] = rng.uniform(1.0, 9.0, PATHS_PER_BLOCK)
     return scratch.view(np.recarray)[0]
 
 
 def columns(place: Any) -> np.ndarray:
-    """(5, BLOCK) copy of a place's numbers."""
+    """(5, PATHS_PER_BLOCK) copy of a place's numbers."""
     return np.array([place[name] for name in PLACE])
 
 
@@ -122,12 +122,12 @@ def test_an_arc_is_steeper_than_its_legs(scenario: Scenario, limits: Limits, dir
     arc, tangents = RADIUS * turn, 2.0 * RADIUS * math.tan(turn / 2.0)
     for share, steep in ((0.75, False), (0.95, True)):
         # Of what the legs may do; 0.95 of it is 1.21 along the arc.
-        level = limits.slopes(0.0, 300.0)[0 if direction > 0.0 else 1] - ANGLE_MARGIN
+        level = limits.slopes(0.0, 300.0)[0 if direction > 0.0 else 1] - ANGLE_MARGIN_RAD
         path = bent(90.0, 450.0, 450.0, direction * share * math.tan(level))
         path[:, 2] += at - 150.0
         count, excess = violations_of(data, path, Violation.SLOPE)
         assert count == int(steep)
-        allowed = limits.slopes(0.0, path[1, 2])[0 if direction > 0.0 else 1] - ANGLE_MARGIN
+        allowed = limits.slopes(0.0, path[1, 2])[0 if direction > 0.0 else 1] - ANGLE_MARGIN_RAD
         flown = abs(path[2, 2] - path[1, 2]) / 450.0 * tangents / arc
         assert excess == pytest.approx(max(0.0, flown - math.tan(allowed)), abs=1e-9)
         # A gentle turn has next to no such arc, and a fly-over has none.

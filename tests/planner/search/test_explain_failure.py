@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planner.evaluation.problem import CERTIFIED_BUFFER, make_problem
+from planner.evaluation.problem import CERTIFIED_BUFFER_M, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.explain_failure import closed_bands, explain_failure, max_altitude, separating_zones, violated_zones
 from planner.search.plan_path import plan_path
@@ -97,7 +97,7 @@ Small = Callable[..., Scenario]
 
 @pytest.mark.parametrize(("more", "said"), [(0.5, []), (-0.5, ["0.5 m more than available"])])
 def test_a_band_of_the_limits(more: float, said: list[str], small: Small, make_limits: MakeLimits) -> None:
-    limits = {"min_clearance_m": 145.0, "max_height_m": 145.0 + 2.0 * CERTIFIED_BUFFER + more}
+    limits = {"min_clearance_m": 145.0, "max_height_m": 145.0 + 2.0 * CERTIFIED_BUFFER_M + more}
     scenario = small(**GROUND, limits=limits)
     lines = closed_bands(make_problem(scenario, make_limits(scenario)))
     assert [line[-len(end) :] for line, end in zip(lines, said, strict=True)] == said
@@ -119,7 +119,7 @@ def test_the_lowest_ceiling_is_named(small: Small, make_limits: MakeLimits) -> N
     zone = {"name": "shelf", "kind": "inclusion", "east_m": 3000, "north_m": 0, "radius_m": 8000}
     scenario = small(**GROUND, zones=[zone | {"ceiling_amsl_m": 300.0}])
     assert max_altitude(make_problem(scenario, make_limits(scenario))) == (
-        300.0 - CERTIFIED_BUFFER,
+        300.0 - CERTIFIED_BUFFER_M,
         "the ceiling of shelf",
     )
 

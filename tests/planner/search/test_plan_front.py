@@ -59,8 +59,9 @@ def test_of_paths_that_hardly_differ_one_is_a_choice(
     scenario: Scenario, limits: Limits, front: Front, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where half the length, a hundred times the exposure or 500 m go unnoticed, the shortest is all there is."""
-    for name, value in (("NOTICED", 0.5), ("NOTICED_EXPOSURE", 100.0), ("NOTICED_CLEARANCE", 500.0)):
-        monkeypatch.setattr(fronts, name, value)
+    monkeypatch.setattr(fronts, "NOTICEABLE_GAIN_FRACTION", 0.5)
+    monkeypatch.setattr(fronts, "NOTICEABLE_EXPOSURE_FRACTION", 100.0)
+    monkeypatch.setattr(fronts, "NOTICEABLE_CLEARANCE_M", 500.0)
     found = plan_front(scenario, limits, 6, seed=3, generations=GENERATIONS)
     assert [one.length for one in found.plans] == [min(one.length for one in front.plans)]
     assert found.asked == 6

@@ -218,7 +218,7 @@ def test_a_search_without_a_result_goes_on_for_some_pauses(
     problem = make_problem(scenario, make_limits(scenario))
     encoding = ENCODINGS["rotated"](problem.space, scenario.planner.waypoints)
     search = Search(problem, ALGORITHMS[DEFAULT], encoding, stream(1, PLANNER), None, lambda: "over", False, 10.0)
-    for _ in range(search_state.GRACE - 1):
+    for _ in range(search_state.GRACE_PAUSES - 1):
         search.pause()
     with pytest.raises(SearchEnded):
         search.pause()
@@ -246,7 +246,7 @@ def test_among_zones_a_stop_ends_a_search_whenever_it_comes() -> None:
         plan = plan_path(scenario, limits, seed=1, stop=lambda after=after: end(after))  # type: ignore[misc]
         assert plan.ended == "interrupted"
         assert len(plan.waypoints) == scenario.planner.waypoints
-        assert len(asked) <= after + search_state.GRACE + 4
+        assert len(asked) <= after + search_state.GRACE_PAUSES + 4
 
 
 def test_few_paths_are_certified_once_a_search_is_to_end(

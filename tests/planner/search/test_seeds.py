@@ -19,7 +19,7 @@ from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
 from planner.search.seeds import (
-    MIN_DETOUR,
+    MIN_DETOUR_FRACTION,
     search_other_sides,
     search_turning_back,
     starting_vectors,
@@ -185,7 +185,7 @@ def test_where_the_way_is_nearly_straight_no_other_side_is_looked_for(
         before = search.evaluations
         search_other_sides(search)
         seen.append(search.evaluations - before)
-        assert search.archive.scores[0][4] >= 1.0 + MIN_DETOUR or seen[-1] == 0
+        assert search.archive.scores[0][4] >= 1.0 + MIN_DETOUR_FRACTION or seen[-1] == 0
 
     monkeypatch.setattr(plan_path_module, "search_other_sides", counted)
     assert plan_path(scenario, make_limits(scenario), seed=1).safe

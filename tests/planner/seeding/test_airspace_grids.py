@@ -9,12 +9,12 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
-from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_ZONE_MARGIN, ProblemArrays, make_problem
+from planner.evaluation.problem import SEARCH_BUFFER_M, SEARCH_ZONE_MARGIN_M, ProblemArrays, make_problem
 from planner.seeding import airspace_grids
 from planner.seeding.airspace_grids import (
+    GENTLE_SLOPE_FRACTION,
     MAX_CELLS,
     MIN_LAYERS,
-    SLOPE_SHARE,
     STAGE_FACTOR,
     AirspaceGrid,
     airspace_grid,
@@ -49,7 +49,7 @@ def route(data: ProblemArrays, grid: AirspaceGrid) -> tuple[np.ndarray, float]:
 
 
 def test_a_wall_thinner_than_a_step_is_passed_through_its_gap(made: Made) -> None:
-    gap = 2.0 * SEARCH_ZONE_MARGIN
+    gap = 2.0 * SEARCH_ZONE_MARGIN_M
     grid = AirspaceGrid(60, ACROSS, 3, 20.0, False, 130.0)
     open_wall = [wall(-2900.0, 700.0 - 0.51 * gap), wall(700.0 + 0.51 * gap, 2900.0)]
     points, cost = route(made(zones=open_wall), grid)
@@ -64,7 +64,7 @@ def test_a_wall_thinner_than_a_step_is_passed_through_its_gap(made: Made) -> Non
 @pytest.mark.parametrize(("more", "passes"), [(0.5, True), (-0.5, False)])
 def test_a_wall_is_passed_below_its_floor(made: Made, more: float, passes: bool) -> None:
     grid = AirspaceGrid(60, ACROSS, 3, 20.0, False, 130.0)
-    over = wall(-2950.0, 2950.0, floor_amsl_m=150.0 + SEARCH_BUFFER + more)
+    over = wall(-2950.0, 2950.0, floor_amsl_m=150.0 + SEARCH_BUFFER_M + more)
     points, _ = route(made(zones=[over]), grid)
     assert (len(points) > 0) == (True if passes else len(points) > 0 and points[30, 2] < 150.0)
     if passes:
@@ -89,7 +89,7 @@ def test_an_inclusion_is_stayed_within(made: Made) -> None:
     assert np.abs(straight[:, 1]).max() == 0.0
     around, _ = route(made(zones=[{"name": "it", "kind": "inclusion", "polygon_m": notch}]), grid)
     beside = around[(around[:, 0] >= 2500.0) & (around[:, 0] <= 3500.0)]
-    assert beside[:, 1].min() >= 600.0 + SEARCH_ZONE_MARGIN
+    assert beside[:, 1].min() >= 600.0 + SEARCH_ZONE_MARGIN_M
 
 
 def test_layers_that_follow_the_ground_stay_in_the_band(made: Made) -> None:
@@ -148,7 +148,7 @@ def test_a_gentle_grid_turns_less_and_leaves_a_tenth_of_the_slopes(made: Made) -
         found.append((float((np.diff(steps[:, 1] / 100.0) ** 2).sum()), steepest))
     (turns, steepest), (gentle_turns, gentlest) = found
     assert gentle_turns < turns
-    assert gentlest <= SLOPE_SHARE * np.tan(np.radians(15.0)) < steepest
+    assert gentlest <= GENTLE_SLOPE_FRACTION * np.tan(np.radians(15.0)) < steepest
 
 
 # ----------------------------------------------------------------------
@@ -215,7 +215,7 @@ def test_a_search_in_slices_finds_the_same_route_and_asks_after_each(
     assert len(whole) == 61
     assert len(asked) == 1
     # Two stages of 41 x 3 cells at once: each of thirty slices.
-    monkeypatch.setattr(airspace_grids, "CELLS_AT_ONCE", 2 * 41 * 3)
+    monkeypatch.setattr(airspace_grids, "CELLS_PER_PAUSE", 2 * 41 * 3)
     sliced, same = cheapest_airspace_route(data, frame, grid, extra, np.inf, lambda: asked.append(0))
     assert len(asked) == 1 + 30
     np.testing.assert_array_equal(whole, sliced)
@@ -239,7 +239,7 @@ def test_a_search_that_comes_no_further_ends(made: Made, monkeypatch: pytest.Mon
     data = made(zones=[wall(-2900.0, 2900.0)])
     frame = rotated_frame(data.start, data.destination)
     grid, asked = AirspaceGrid(60, ACROSS, 3, 20.0, False, 130.0), list[int]()
-    monkeypatch.setattr(airspace_grids, "CELLS_AT_ONCE", 1)
+    monkeypatch.setattr(airspace_grids, "CELLS_PER_PAUSE", 1)
     points, cost = cheapest_airspace_route(
         data, frame, grid, np.zeros((61, ACROSS.size)), np.inf, lambda: asked.append(0)
     )

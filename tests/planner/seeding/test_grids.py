@@ -11,12 +11,12 @@ from aircraft.path_limits import Limits
 from planner.evaluation.encoding import RotatedFrame, rotated_frame
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem, required_clearance
 from planner.seeding.grids import (
-    COARSE,
-    COARSE_GROWTH,
+    COARSE_GROWTH_STEPS,
+    COARSE_STEP_M,
     KILL_COST,
+    MAX_LATERAL_CELLS,
     OBSTACLE,
     ROUTE_CELL,
-    SIDEWAYS,
     Grid,
     Records,
     cheapest_route,
@@ -66,12 +66,12 @@ def test_places_in_the_rotated_frame_come_back_to_the_map() -> None:
     assert frame.rotate(np.array([[east, north, 5.0]]))[0] == pytest.approx([300.0, -70.0, 5.0])
 
 
-@pytest.mark.parametrize("step", [COARSE, COARSE + 1.0])
+@pytest.mark.parametrize("step", [COARSE_STEP_M, COARSE_STEP_M + 1.0])
 def test_obstacles_are_the_missiles_with_their_margin(data: ProblemArrays, step: float) -> None:
     frame = RotatedFrame(4000.0, 0.0, 0.0, 1.0, 6000.0)  # along to the north, across to the west
     obstacles = find_obstacles(data, frame, step)
     assert len(obstacles) == 1
-    growth = 0.0 if step <= COARSE else COARSE_GROWTH * step
+    growth = 0.0 if step <= COARSE_STEP_M else COARSE_GROWTH_STEPS * step
     assert obstacles[0].tolist() == pytest.approx((-200.0, -200.0, 0.0, 700.0 + data.kill_margin + growth))
 
 
@@ -200,7 +200,7 @@ def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
     out = np.empty(columns)
     distance_to_goal(columns, home, left, step, 1.0, out)
     for y in range(columns):
-        ways = itertools.product(range(-SIDEWAYS, SIDEWAYS + 1), repeat=left)
+        ways = itertools.product(range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1), repeat=left)
         lengths = [sum(step * math.hypot(1.0, side) for side in way) for way in ways if y + sum(way) == home]
         assert out[y] == pytest.approx(min(lengths, default=math.inf)), y
 
@@ -255,13 +255,13 @@ def way_cost(problem: Problem, points: Floats, floor: float) -> float:
     total = 0.0
     for before, after in itertools.pairwise(points):
         run = math.hypot(*(after - before)[:2])
-        if abs(after[1] - before[1]) > (SIDEWAYS + 1e-9) * step or abs(after[2] - before[2]) > most * run:
+        if abs(after[1] - before[1]) > (MAX_LATERAL_CELLS + 1e-9) * step or abs(after[2] - before[2]) > most * run:
             return math.inf
         if after[2] < floor and after is not points[-1]:
             return math.inf
         dear = 1.0
         for place, radius in zip(places, problem.scenario.threats.kill_radius, strict=True):
-            grown = radius + data.kill_margin + (COARSE_GROWTH * step if step > COARSE else 0.0)
+            grown = radius + data.kill_margin + (COARSE_GROWTH_STEPS * step if step > COARSE_STEP_M else 0.0)
             away = float(np.linalg.norm(after - place))
             if radius > 0.0 and away < grown:
                 dear += KILL_COST * (3.0 - 2.0 * away / grown)
@@ -284,7 +284,7 @@ def test_route_is_the_cheapest_of_all(plain: Problem, stages: int, aside: int) -
     for inner in itertools.product(cells, repeat=stages - 1):
         ends = [(0.0, data.start[2])], [(0.0, data.destination[2])]
         points = np.column_stack([along, np.array([*ends[0], *inner, *ends[1]])])
-        if np.abs(np.diff(points[:, 1])).max() <= 1.01 * SIDEWAYS * step:
+        if np.abs(np.diff(points[:, 1])).max() <= 1.01 * MAX_LATERAL_CELLS * step:
             costs.append(way_cost(plain, points, floor))
     assert way_cost(plain, route.points, floor) == pytest.approx(route.cost, rel=1e-9)
     assert route.cost == pytest.approx(min(costs), rel=1e-9)

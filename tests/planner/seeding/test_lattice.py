@@ -14,7 +14,7 @@ from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding import lattice as lattice_module
 from planner.seeding.lattice import (
     MAX_LATTICE_STATES,
-    MIN_STEP,
+    MIN_STEP_M,
     Lattice,
     ceiling_route,
     cheapest_lattice_route,
@@ -174,7 +174,7 @@ def test_a_step_holds_two_right_angles(pocket: Problem) -> None:
     data = pocket.search
     step = turning_step(data)
     if not data.legs_hold_turns:
-        assert step == MIN_STEP
+        assert step == MIN_STEP_M
         return
     square = np.array([[0.0, 0.0, 0.0], [step, 0.0, 0.0], [step, step, 0.0], [0.0, step, 0.0]]) + data.start
     turns, rolls = turn_and_roll_lengths(data, square)
@@ -201,7 +201,7 @@ def test_a_search_in_slices_finds_the_same_route(pocket: Problem, monkeypatch: p
     made = make_lattice(data, frame, 500.0)
     whole, seen = cheapest_lattice_route(data, frame, made, 2, 1_000_000)
     asked: list[int] = []
-    monkeypatch.setattr(lattice_module, "STATES_AT_ONCE", 7)
+    monkeypatch.setattr(lattice_module, "STATES_PER_PAUSE", 7)
     sliced, same = cheapest_lattice_route(data, frame, made, 2, 1_000_000, lambda: asked.append(0))
     assert len(whole) > 0
     assert len(asked) > 10

@@ -14,9 +14,9 @@ from planner.search.plan_path import plan_path
 from planner.seeding import shortening
 from planner.seeding.shortening import (
     MAX_MODELS,
-    MAX_STEP,
-    ROUNDS,
-    STEPS,
+    MAX_STEP_M,
+    ROUND_COUNT,
+    STEPS_PER_ROUND,
     begin_shortening,
     continue_shortening,
     resample,
@@ -30,7 +30,7 @@ from world.scenario import Scenario
 def test_waypoints_stay_on_the_map_and_between_floor_and_ceiling() -> None:
     data = make_task("hard-60").problem.search._replace(ceiling=520.0, east=9700.0)
     start = resample(np.array([data.start, [9650.0, 3000.0, 515.0], data.destination]), 14)
-    path = continue_shortening(data, begin_shortening(data, start, 10, 0.0, False), 0.0, ROUNDS).path
+    path = continue_shortening(data, begin_shortening(data, start, 10, 0.0, False), 0.0, ROUND_COUNT).path
     assert path[:, 2].max() <= 520.0
     assert path[:, 0].max() <= 9700.0
     np.testing.assert_array_equal(path[[0, -1]], start[[0, -1]])
@@ -41,15 +41,15 @@ def test_no_round_moves_a_waypoint_further_than_its_steps() -> None:
     start = resample(np.array([data.start, [2000.0, 8000.0, 590.0], data.destination]), 20)
     under_way = begin_shortening(data, start, 10, 0.0, False)
     before = under_way.path.copy()
-    for _ in range(ROUNDS):
+    for _ in range(ROUND_COUNT):
         under_way = continue_shortening(data, under_way, 0.0, 1)
         moved = float(np.abs(under_way.path - before).max())
-        assert moved <= STEPS * MAX_STEP + 1e-9
+        assert moved <= STEPS_PER_ROUND * MAX_STEP_M + 1e-9
         assert moved > 1.0 or under_way.rounds > 1
         before = under_way.path.copy()
-    assert under_way.rounds == ROUNDS
+    assert under_way.rounds == ROUND_COUNT
     # Nothing is left to do.
-    np.testing.assert_array_equal(continue_shortening(data, under_way, 0.0, ROUNDS).path, before)
+    np.testing.assert_array_equal(continue_shortening(data, under_way, 0.0, ROUND_COUNT).path, before)
 
 
 # ----------------------------------------------------------------------
@@ -107,9 +107,9 @@ def test_many_missiles_are_looked_at_in_slices_with_the_same_result(monkeypatch:
     asked: list[int] = []
     whole, models = shorten_path(data, start, pause=lambda: asked.append(0))
     assert len(asked) == 1
-    monkeypatch.setattr(shortening, "PAIRS_AT_ONCE", 1)
+    monkeypatch.setattr(shortening, "PAIRS_PER_PAUSE", 1)
     sliced, again = shorten_path(data, start, pause=lambda: asked.append(0))
-    assert len(asked) == 1 + shortening.ROUNDS
+    assert len(asked) == 1 + shortening.ROUND_COUNT
     np.testing.assert_array_equal(whole, sliced)
     assert models == again
 

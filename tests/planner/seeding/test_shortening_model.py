@@ -10,11 +10,11 @@ from benchmarks.task import make_task
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.evaluation.travel_cost import make_travel_cost, path_cost
-from planner.seeding.flown_corners import SAMPLES
+from planner.seeding.flown_corners import SAMPLES_PER_CORNER
 from planner.seeding.shortening import resample
 from planner.seeding.shortening_model import (
-    BAND,
-    NEARBY_DISTANCE,
+    HESSIAN_HALF_BANDWIDTH,
+    NEARBY_DISTANCE_M,
     ActiveConstraints,
     LagrangianModel,
     active_constraints,
@@ -43,7 +43,7 @@ def test_the_missiles_near_each_leg_are_those_within_reach_of_it() -> None:
             away = np.sqrt(((path[i] + shares * (path[i + 1] - path[i]) - place) ** 2).sum(axis=1)).min()
             room = away - missile["radius"] - data.kill_margin
             # Within what the points on a leg lie apart it may be either.
-            assert abs(room - NEARBY_DISTANCE) < 1.0 or ((i, k) in pairs) == (room < NEARBY_DISTANCE)
+            assert abs(room - NEARBY_DISTANCE_M) < 1.0 or ((i, k) in pairs) == (room < NEARBY_DISTANCE_M)
     assert len(pairs) > 10
 
 
@@ -54,7 +54,7 @@ def test_limits_of_slopes_and_what_is_wanted_are_the_problems_own() -> None:
     np.testing.assert_allclose(active.dive, np.tan(np.radians(24.5)))
     np.testing.assert_allclose(active.distances, data.missiles.missiles["radius"][active.pairs[:, 1]] + 15.0)
     assert not active.turns_in_legs
-    assert constraint_count(active) == len(active.pairs) + 7 * (5 + 4) + 8 * (3 + SAMPLES)
+    assert constraint_count(active) == len(active.pairs) + 7 * (5 + 4) + 8 * (3 + SAMPLES_PER_CORNER)
 
 
 def test_turns_take_of_the_legs_what_a_corner_of_that_turn_takes() -> None:
@@ -111,7 +111,10 @@ def test_the_gradient_is_that_of_the_augmented_length(name: str, corners: str) -
     active = active._replace(before=40.0 * active.before, after=40.0 * active.after)
     count, size = constraint_count(active), 3 * (len(path) - 2)
     multipliers = np.random.default_rng(6).uniform(0.0, 1.0, count)
-    values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))
+    values, model = (
+        np.zeros(count),
+        LagrangianModel(np.zeros(size), np.zeros((size, HESSIAN_HALF_BANDWIDTH)), np.zeros((4, 3))),
+    )
 
     def value(change: np.ndarray) -> float:
         moved = path.copy()
@@ -131,7 +134,7 @@ def test_the_gradient_is_that_of_the_augmented_length(name: str, corners: str) -
     # Every kind of constraint is broken somewhere.
     pairs, legs = len(active.pairs), len(path) - 1
     ends = np.cumsum([pairs, legs * 8, 3 * legs, legs + 1, legs])
-    *kinds, heights, arcs = np.split(values, [*ends, ends[-1] + len(path) * SAMPLES])
+    *kinds, heights, arcs = np.split(values, [*ends, ends[-1] + len(path) * SAMPLES_PER_CORNER])
     broken = [bool(kind.size > 0 and kind.min() < 0.0) for kind in kinds]
     assert [kind.min() < 0.0 for kind in (heights, arcs)] == [bool(corners)] * 2
     # A number limits turns, or what legs have room for.
@@ -147,7 +150,10 @@ def test_the_hessian_of_the_length_is_that_of_its_gradient() -> None:
     path[:, 2] += 5000.0
     active = active_constraints(data, path, 4, 0.5, False)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
     count, size = constraint_count(active), 3 * (len(path) - 2)
-    values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))
+    values, model = (
+        np.zeros(count),
+        LagrangianModel(np.zeros(size), np.zeros((size, HESSIAN_HALF_BANDWIDTH)), np.zeros((4, 3))),
+    )
 
     def gradient(change: np.ndarray) -> np.ndarray:
         moved = path.copy()
@@ -158,7 +164,10 @@ def test_the_hessian_of_the_length_is_that_of_its_gradient() -> None:
     columns = [(gradient(0.01 * row) - gradient(-0.01 * row)) / 0.02 for row in np.eye(size)]
     gradient(np.zeros(size))
     whole = np.array(
-        [[model.band[max(i, j), abs(i - j)] if abs(i - j) < BAND else 0.0 for j in range(size)] for i in range(size)]
+        [
+            [model.band[max(i, j), abs(i - j)] if abs(i - j) < HESSIAN_HALF_BANDWIDTH else 0.0 for j in range(size)]
+            for i in range(size)
+        ]
     )
     np.testing.assert_allclose(whole, np.array(columns).T, atol=1e-6)
 
@@ -177,7 +186,10 @@ def test_the_gradient_of_time_and_energy_is_that_of_their_values(objective: Lite
     active = active_constraints(data, path, 4, 0.5, False)._replace(climb=np.full(5, 1e3), dive=np.full(5, 1e3))
     active = active._replace(distances=np.zeros_like(active.distances))
     count, size = constraint_count(active), 3 * (len(path) - 2)
-    values, model = np.zeros(count), LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3)))
+    values, model = (
+        np.zeros(count),
+        LagrangianModel(np.zeros(size), np.zeros((size, HESSIAN_HALF_BANDWIDTH)), np.zeros((4, 3))),
+    )
 
     def value(change: np.ndarray) -> float:
         moved = path.copy()
@@ -191,6 +203,6 @@ def test_the_gradient_of_time_and_energy_is_that_of_their_values(objective: Lite
     # No direction that the curvature takes for a way down without end.
     whole = np.zeros((size, size))
     for row in range(size):
-        for back in range(min(BAND, row + 1)):
+        for back in range(min(HESSIAN_HALF_BANDWIDTH, row + 1)):
             whole[row, row - back] = whole[row - back, row] = model.band[row, back]
     assert np.linalg.eigvalsh(whole).min() > -1e-9

@@ -11,7 +11,15 @@ from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding import side_routes as side_routes_module
-from planner.seeding.grids import KILL_COST, SIDEWAYS, Grid, cheapest_route, find_obstacles, grid_route, make_grid
+from planner.seeding.grids import (
+    KILL_COST,
+    MAX_LATERAL_CELLS,
+    Grid,
+    cheapest_route,
+    find_obstacles,
+    grid_route,
+    make_grid,
+)
 from planner.seeding.side_routes import (
     LEFT,
     OVER,
@@ -65,7 +73,7 @@ def all_ways(data: ProblemArrays) -> list[tuple[float, tuple[tuple[int, int], ..
             (total + dear[to] * math.hypot(step, step * (to[0] - way[-1][0]), 300.0 * (to[1] - way[-1][1])), (*way, to))
             for total, way in ways
             for to in (places if stage < GRID.stages else [end])
-            if abs(to[0] - way[-1][0]) <= SIDEWAYS
+            if abs(to[0] - way[-1][0]) <= MAX_LATERAL_CELLS
         ]
     return ways
 
@@ -120,7 +128,7 @@ def test_costs_in_slices_are_the_same_and_it_asks_after_each(
     whole = grid_costs(data, frame, GRID, 9000.0, lambda: asked.append(0))
     assert len(asked) == 1
     # One stage of ten cells at once: there and back over six.
-    monkeypatch.setattr(side_routes_module, "CELLS_AT_ONCE", 10)
+    monkeypatch.setattr(side_routes_module, "CELLS_PER_PAUSE", 10)
     sliced = grid_costs(data, frame, GRID, 9000.0, lambda: asked.append(0))
     assert len(asked) == 1 + 12
     for one, other in zip(whole, sliced, strict=True):
