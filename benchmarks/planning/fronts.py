@@ -48,7 +48,7 @@ POPULATION = 120
 # Partitions of the reference directions of MOEA/D.
 PARTITIONS = 7
 # Neighbours of MOEA/D.
-NEIGHBOURS = 15
+NEIGHBOUR_COUNT = 15
 # Weight of violations in MOEA/D's objectives, which are fractions of the reference box.
 PENALTY = 100.0
 
@@ -207,7 +207,7 @@ def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int)
     first[: min(POPULATION, len(seeds))] = seeds[:POPULATION]
     if algorithm == "MOEA/D":
         towards = get_reference_directions("uniform", 4, n_partitions=PARTITIONS)
-        return MOEAD(towards, n_neighbors=NEIGHBOURS, sampling=first)
+        return MOEAD(towards, n_neighbors=NEIGHBOUR_COUNT, sampling=first)
     return NSGA2(pop_size=POPULATION, sampling=first)
 
 

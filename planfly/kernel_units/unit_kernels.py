@@ -79,8 +79,8 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "fronts": (
         *_PROBLEM_KERNELS,
         "planner.evaluation.front_scores._fill",
-        "planner.optimisers.hypervolume._covered",
-        "planner.optimisers.hypervolume._greedy",
+        "planner.optimisers.hypervolume._mark_covered_probes",
+        "planner.optimisers.hypervolume._choose_rows_greedily",
     ),
     "paper": (*_PROBLEM_KERNELS, "planner.evaluation.paper_scores._score_paths"),
     "flight": (
