@@ -107,7 +107,7 @@ def _scenario(name: str) -> Scenario:
 def make_contest(scenario: Scenario, front: Front) -> Contest:
     """Make the contest of a problem, with the box of its default plan."""
     default = front.default
-    task = fit_margins(front_task(scenario, load_airframe(scenario).limits.surely()), default.plan.waypoints)
+    task = fit_margins(front_task(scenario, load_airframe(scenario).limits.with_margin()), default.plan.waypoints)
     space = task.problem.space
     straight = float(np.sqrt(((space.destination - space.start) ** 2).sum()))
     ends = np.stack([[end, end] for end in (space.start, space.destination)])
@@ -121,7 +121,7 @@ def make_contest(scenario: Scenario, front: Front) -> Contest:
 def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
     """Plan planfly's front of a problem; return it with its contest and its row."""
     scenario = _scenario(name)
-    limits = load_airframe(scenario).limits.surely()
+    limits = load_airframe(scenario).limits.with_margin()
     began = time.process_time()
     front = plan_front(scenario, limits, COUNT, seed=seed)
     seconds = time.process_time() - began

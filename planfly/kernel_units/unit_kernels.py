@@ -122,7 +122,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "flight.autopilots.arduplane.rtl_point_mass.fly_stages",
         _GLIDES_MODULE + "glide_map._fill_slopes",
         _GLIDES_MODULE + "glide_map._settle_cells",
-        _GLIDES_MODULE + "glide_reach._fill_reach",
+        _GLIDES_MODULE + "glide_reach._fill_altitudes_left",
         "world.highest_ground._fill_cells",
     ),
 }

@@ -53,7 +53,7 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
     """Return up to `count` rows of points (n, m) below a reference (m,), in the order of a greedy choice.
 
     The best point of each objective comes first. Each further point adds most to the covered volume, counted at random
-    probes between the points' best values and the reference. Points that add nothing come last, in their original order.
+    probes between the points' best values and the reference. Points that add nothing come last, in their order.
 
     rng: draws the probes; None for the same probes in every call.
 

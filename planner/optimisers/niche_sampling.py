@@ -29,7 +29,7 @@ class NicheSampling:
     """Sampling of groups of variables (g, n, d), from the whole box to the niches of the best samples.
 
     lower, upper: (g, d) boxes.
-    are_allowed: function of samples (n, d) and their groups (n,) that returns if each sample is feasible, (n,).
+    allowed: function of samples (n, d) and their groups (n,) that returns if each sample is feasible, (n,).
     rng: random generator of all samples.
 
     >>> lower, upper = np.full((3, 2), -2.0), np.full((3, 2), 6.0)
@@ -46,11 +46,11 @@ class NicheSampling:
         self,
         lower: Floats,
         upper: Floats,
-        are_allowed: Callable[[Floats, Ints], Flags],
+        allowed: Callable[[Floats, Ints], Flags],
         rng: np.random.Generator,
     ) -> None:
         self._lower, self._upper = lower, upper
-        self._are_allowed = are_allowed
+        self._allowed = allowed
         self._rng = rng
 
     def first(self, count: int, extension: Floats | float = 0.0) -> Floats:
@@ -100,13 +100,13 @@ class NicheSampling:
         """Draw samples of this shape with a function of the group numbers, and redraw infeasible samples."""
         groups = np.repeat(np.arange(size[0]), size[1])
         samples = draw(groups)
-        infeasible_rows = np.flatnonzero(~self._are_allowed(samples, groups))
+        infeasible_rows = np.flatnonzero(~self._allowed(samples, groups))
         for _ in range(max_redraws):
             if not infeasible_rows.size:
                 break
             redrawn_samples = draw(groups[infeasible_rows])
             samples[infeasible_rows] = redrawn_samples
-            infeasible_rows = infeasible_rows[~self._are_allowed(redrawn_samples, groups[infeasible_rows])]
+            infeasible_rows = infeasible_rows[~self._allowed(redrawn_samples, groups[infeasible_rows])]
         return samples.reshape(size)
 
 

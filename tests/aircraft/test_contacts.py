@@ -5,7 +5,14 @@ import math
 import pytest
 
 from aircraft.catalog import load_aircraft
-from aircraft.contacts import Gear, _center_of_gravity, _own_contacts, contacts_of, usual_contacts, with_contacts
+from aircraft.contacts import (
+    Gear,
+    _center_of_gravity,
+    _own_contacts,
+    aircraft_contacts,
+    default_contacts,
+    with_contacts,
+)
 from flight.dynamics.fdm import Fdm
 
 START = (46.0, 8.0)
@@ -13,7 +20,7 @@ START = (46.0, 8.0)
 
 @pytest.mark.parametrize("gear", ["belly", "wheels"])
 def test_contacts_are_the_same_on_both_sides_and_carry_on_three_points(gear: Gear) -> None:
-    made = usual_contacts(load_aircraft("x8"), gear)
+    made = default_contacts(load_aircraft("x8"), gear)
     assert sum(one.stands for one in made) == 3
     assert sum(one.right for one in made) == pytest.approx(0.0)
     # The centre of gravity is within what carries.
@@ -82,7 +89,7 @@ def test_a_model_with_skids_of_its_own_stands_on_its_lowest_points_and_one_with_
 def test_an_aircraft_at_rest_stays_where_it_is(name: str, gear: Gear, slope: float) -> None:
     """On level ground, and on ground that is as high as a slope of 8 % makes it below the aircraft."""
     aircraft = load_aircraft(name)
-    stands = max(one.down for one in contacts_of(aircraft, gear) if one.stands)
+    stands = max(one.down for one in aircraft_contacts(aircraft, gear) if one.stands)
     fdm = Fdm(aircraft, gear=gear)
     fdm.release((*START, 300.0 + stands), (0.0, 0.0, 0.5), (0.0, 0.0, 0.0), terrain_amsl=300.0)
     terrain = fdm.properties.setter("position/terrain-elevation-asl-ft")
