@@ -8,7 +8,7 @@ from functools import partial
 from typing import NamedTuple
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import aircraft_contacts
+from aircraft.contacts import contacts_of
 from flight.autopilots.autopilot import Autopilot
 from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
@@ -262,7 +262,7 @@ class Flight(Airborne):
         self._ground_phases, gear = setup.ground_phases, None
         if self._ground_phases:
             gear = default_gear(self._ground_phases)
-            contacts = aircraft_contacts(aircraft, gear)
+            contacts = contacts_of(aircraft, gear)
             self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts)
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ground_phases:

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import Gear, aircraft_contacts
+from aircraft.contacts import Gear, contacts_of
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import Trim
 from flight.mission.ground_ways import GroundPhases, TakeOff
@@ -133,7 +133,7 @@ def find_release(
     launch = take_off.launch
     position, velocity = take_off.release()
     if launch.method == "runway":
-        stand_heights = [contact.down for contact in aircraft_contacts(aircraft, "wheels") if contact.stands]
+        stand_heights = [contact.down for contact in contacts_of(aircraft, "wheels") if contact.stands]
         position[2] += max(stand_heights, default=0.0)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
     convergence = local_map.convergence(lat, lon)

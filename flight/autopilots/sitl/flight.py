@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import aircraft_contacts
+from aircraft.contacts import contacts_of
 from flight.autopilots.autopilot import Autopilot, Tick
 from flight.autopilots.program import ProgramFlight
 from flight.autopilots.sitl.conversation import Talk
@@ -208,7 +208,7 @@ class SitlFlight(ProgramFlight):
         if self._ground_phases:
             gear = default_gear(self._ground_phases)
             self._from_ground = setup.autopilot.from_ground(
-                self._ground_phases, aircraft, aircraft_contacts(aircraft, gear)
+                self._ground_phases, aircraft, contacts_of(aircraft, gear)
             )
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
