@@ -21,9 +21,9 @@ from world.arrays import Floats
 
 # Landing gear of an aircraft whose model has no contacts.
 Gear = Literal["belly", "wheels"]
-# Meters in each unit of a model.
+# Metres in each unit of length of a model.
 _METRES_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
-# Kilograms in each unit of a model.
+# Kilograms in each unit of mass of a model.
 _KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
 # Minimum depth of the points on which a model without wheels stands, as a ratio to the deepest point.
 _MIN_SKID_DEPTH_RATIO = 0.75
@@ -31,9 +31,9 @@ _MIN_SKID_DEPTH_RATIO = 0.75
 # Positions relative to the centre of gravity, forward, right and down, in spans. Points to the right have a twin to the
 # left, so that belly and wheels have three points each.
 _BELLY_POINTS = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
-# Wheels.
+# Positions of wheels.
 _WHEEL_POINTS = {"nose wheel": (0.20, 0.0, 0.085), "main wheel": (-0.04, 0.10, 0.085)}
-# Other points of the structure.
+# Positions of other points of the structure.
 _STRUCTURE_POINTS = {"nose": (0.25, 0.0, 0.02), "tail": (-0.35, 0.0, 0.0), "wing tip": (0.0, 0.5, -0.02)}
 # Static compression of skids or wheels under the aircraft's weight, in spans.
 _SAG_SPANS = 0.0062
@@ -63,11 +63,11 @@ class Contact:
     wheel: bool = False
 
 
-def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
+def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
     """Return default contacts for a model without contacts, scaled by the span of the aircraft.
 
     >>> from aircraft.catalog import load_aircraft
-    >>> made = usual_contacts(load_aircraft("aerosonde"), "belly")
+    >>> made = default_contacts(load_aircraft("aerosonde"), "belly")
     >>> len(made), made[0].name, round(made[0].down, 2), made[-1].stands
     (7, 'belly front left', 0.2, False)
     """
@@ -83,7 +83,7 @@ def usual_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return the contacts of an aircraft: those of its model, or default contacts if the model has none.
+    """Return the contacts of an aircraft's model, or default contacts if the model has none.
 
     Contacts on which the aircraft stands come first.
 
@@ -93,15 +93,15 @@ def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
     >>> [contact.name for contact in contacts_of(load_aircraft("c172x"), "belly") if contact.wheel]
     ['Nose Gear', 'Left Main Gear', 'Right Main Gear']
     """
-    model_contacts = _own_contacts(aircraft.model_file.read_bytes())
-    return model_contacts or usual_contacts(aircraft, gear)
+    model_contacts = _model_contacts(aircraft.model_file.read_bytes())
+    return model_contacts or default_contacts(aircraft, gear)
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
     """Return a model's XML with default contacts; a model with contacts is unchanged."""
-    if _own_contacts(model):
+    if _model_contacts(model):
         return model
-    contacts = usual_contacts(aircraft, gear)
+    contacts = default_contacts(aircraft, gear)
     text = "\n".join(_contact_xml(contact, aircraft, contacts, _center_of_gravity(model)) for contact in contacts)
     section = f"<ground_reactions>\n{text}\n</ground_reactions>".encode()
     changed_model, count = re.subn(
@@ -111,14 +111,14 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
 
 
 def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
-    """Return one contact as JSBSim reads it: meters aft, right and up from the model's reference point."""
+    """Return the XML of one contact, in metres aft, right and up from the model's reference point."""
     standing_count = sum(other.stands for other in contacts)
     stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / standing_count)
     aft, right, up = centre + np.array([-contact.forward, contact.right, -contact.down])
     static, dynamic, rolling = _WHEEL_FRICTION if contact.wheel else _SKID_FRICTION
-    kind, name = "BOGEY" if contact.wheel else "STRUCTURE", contact.name.upper().replace(" ", "_")
-    return f"""  <contact type="{kind}" name="{name}">
+    contact_type, name = "BOGEY" if contact.wheel else "STRUCTURE", contact.name.upper().replace(" ", "_")
+    return f"""  <contact type="{contact_type}" name="{name}">
     <location unit="M"> <x> {aft:.6f} </x> <y> {right:.6f} </y> <z> {up:.6f} </z> </location>
     <static_friction> {static} </static_friction>
     <dynamic_friction> {dynamic} </dynamic_friction>
@@ -131,8 +131,8 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
   </contact>"""
 
 
-def _own_contacts(model: bytes) -> tuple[Contact, ...]:
-    """Return the contacts that a model states.
+def _model_contacts(model: bytes) -> tuple[Contact, ...]:
+    """Return the contacts in a model's XML.
 
     The aircraft stands on its wheels, or without wheels on its lowest points.
     """
@@ -150,7 +150,7 @@ def _read_contacts(model: bytes) -> list[Contact]:
     section = ElementTree.fromstring(model).find("ground_reactions")
     contacts, centre = [], _center_of_gravity(model)
     for element in [] if section is None else section.findall("contact"):
-        position = _location(element.find("location"))
+        position = _read_location(element.find("location"))
         if position is None:
             continue
         is_wheel = element.get("type", "BOGEY") == "BOGEY"
@@ -162,35 +162,35 @@ def _read_contacts(model: bytes) -> list[Contact]:
 def _center_of_gravity(model: bytes) -> Floats:
     """Return the centre of gravity of the loaded aircraft, (3,) m aft, right, up of the reference point.
 
-    It includes the empty aircraft, its point masses and the initial
-    contents of its tanks, as JSBSim sums them up.
+    It includes the empty aircraft, its point masses and the initial contents of its tanks, as JSBSim does.
     """
     root = ElementTree.fromstring(model)
     cg_elements = [element for element in root.findall("mass_balance/location") if element.get("name") == "CG"]
-    loads = [(root.find("mass_balance/emptywt"), _location(cg_elements[0]) if cg_elements else None)]
+    loads = [(root.find("mass_balance/emptywt"), _read_location(cg_elements[0]) if cg_elements else None)]
     loads += [
-        (element.find("weight"), _location(element.find("location")))
+        (element.find("weight"), _read_location(element.find("location")))
         for element in root.findall("mass_balance/pointmass")
     ]
     loads += [
-        (element.find("contents"), _location(element.find("location"))) for element in root.findall("propulsion/tank")
+        (element.find("contents"), _read_location(element.find("location")))
+        for element in root.findall("propulsion/tank")
     ]
-    masses = [(_mass(weight), position) for weight, position in loads if position is not None]
+    masses = [(_read_mass(weight), position) for weight, position in loads if position is not None]
     total = sum(mass for mass, _ in masses)
     if not total > 0.0:
         return masses[0][1] if masses else np.zeros(3)
     return np.asarray(sum(mass * position for mass, position in masses) / total)
 
 
-def _mass(weight: ElementTree.Element | None) -> float:
-    """Return a weight of a model, kg."""
+def _read_mass(weight: ElementTree.Element | None) -> float:
+    """Return the mass in a weight element of a model, kg; 0 without one."""
     if weight is None:
         return 0.0
     return _KILOGRAMS_PER_UNIT.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0")
 
 
-def _location(location: ElementTree.Element | None) -> Floats | None:
-    """Return a location of a model, m, (3,), or None if it has none."""
+def _read_location(location: ElementTree.Element | None) -> Floats | None:
+    """Return the position in a location element of a model, m, (3,), or None without one."""
     if location is None:
         return None
     unit = _METRES_PER_UNIT.get(location.get("unit", "IN"), 1.0)

@@ -30,14 +30,14 @@ SHEET_DENSITY = 1.1673
 
 @dataclass(frozen=True, slots=True)
 class DataSheet:
-    """Known values of an aircraft, 0 for unknown ones, in SI units and radians.
+    """Known values of an aircraft in SI units and radians; 0 for unknown values.
 
     mass: kg.
     span: m.
     area: wing area, m^2.
     cruise, stall, top: airspeeds in level flight, m/s.
-    bank: steepest bank in turns.
-    climb: steepest climb angle at cruise.
+    bank: bank limit in turns.
+    climb: maximum climb angle at cruise.
     sink: sink rate at cruise without power, m/s.
     trim_throttle: throttle in level flight at cruise, 0..1.
     volts: battery voltage.
@@ -66,7 +66,7 @@ class DataSheet:
 
     @property
     def fuelled(self) -> bool:
-        """True if it burns fuel."""
+        """True if the aircraft burns fuel."""
         return self.fuel > 0.0
 
 
@@ -83,13 +83,13 @@ RANGES = {
     "motor": ("motor", "rpm a volt", 20.0, 5000.0, 1.0),
     "fuel": ("fuel", "kg", 0.05, 12.0, 1.0),
 }
-# Rounding of a conversion of units, as a ratio.
+# Rounding tolerance for a conversion of units, as a ratio.
 _EDGE_ROUNDING = 1e-12
 # Range of the ratio of stall speed to cruise speed.
 STALL_RATIO_RANGE = (0.35, 0.87)
 # Range of the ratio of top speed to cruise speed.
 TOP_RATIO_RANGE = (1.05, 2.5)
-# Range of the lift coefficient at the stall.
+# Range of the lift coefficient at the stall without flaps.
 LIFT_RANGE = (0.5, 2.4)
 # Range of the aspect ratio, span^2 / area.
 ASPECT_RANGE = (2.5, 25.0)
@@ -199,41 +199,41 @@ WING = AircraftClass(
 CLASSES: dict[Layout, AircraftClass] = {"tail": TAIL, "vtail": TAIL, "wing": WING}
 
 # Climb angle if the sheet states none, rad.
-USUAL_CLIMB = math.radians(12.0)
+DEFAULT_CLIMB = math.radians(12.0)
 # Ratio of top speed to cruise speed if the sheet states no top speed.
-USUAL_TOP = 1.65
+DEFAULT_TOP_RATIO = 1.65
 # Guesses of that ratio, the nearest first, if no propeller gives the usual one with the climb of the sheet.
-_TOP_GUESSES = (USUAL_TOP, 1.5, 1.8, 1.35, 2.0, 1.2, 2.3, 1.1)
+_TOP_GUESSES = (DEFAULT_TOP_RATIO, 1.5, 1.8, 1.35, 2.0, 1.2, 2.3, 1.1)
 # Guesses of the climb, degrees, if a top speed alone leads to a climb that is too flat, or in reverse too steep.
 _CLIMB_GUESSES_DEG = (2.0, 4.0, 6.0, 9.0, 12.0, 16.0, 20.0, 25.0, 30.0, 35.0)
 # Number of values that are tried to find an allowed range.
-_RANGE_STEPS = 34
-# Steepest climb angle of a model, rad.
-STEEPEST_CLIMB = math.radians(35.0)
+_RANGE_STEP_COUNT = 34
+# Maximum climb angle of a model, rad.
+MAX_CLIMB = math.radians(35.0)
 # Bank limit if the sheet states none, rad.
-USUAL_BANK = math.radians(35.0)
+DEFAULT_BANK = math.radians(35.0)
 # Battery energy per aircraft mass if the sheet states none, J/kg: 30 % of the mass at 150 Wh/kg.
 BATTERY_PER_MASS = 45.0 * 3600.0
 # Battery voltage if the sheet states none, by the upper limit of the mass, kg.
-_USUAL_VOLTS = ((1.5, 11.1), (5.0, 14.8), (10.0, 22.2), (math.inf, 44.4))
+_DEFAULT_VOLTS = ((1.5, 11.1), (5.0, 14.8), (10.0, 22.2), (math.inf, 44.4))
 # Heat of the fuel, J/kg.
 FUEL_HEAT = 43.5e6
 # Angle of attack at cruise, rad.
 CRUISE_ALPHA = 0.05
-# Least angle of attack at cruise, rad: a wing of low aspect ratio is set such that its stall is within
+# Minimum angle of attack at cruise, rad: a wing of low aspect ratio is set such that its stall is within
 # `MAX_STALL_ALPHA`.
 MIN_CRUISE_ALPHA = -0.05
-# Largest angle of attack at the stall, rad. Trims are searched up to 0.4, and with thrust flight is possible below the
+# Maximum angle of attack at the stall, rad. Trims are searched up to 0.4, and with thrust flight is possible below the
 # stall speed.
 MAX_STALL_ALPHA = 0.33
-# Elevator at zero lift, which no level flight reaches, as a ratio to its stop, at most.
+# Maximum elevator at zero lift, which no level flight reaches, as a ratio to its stop.
 MAX_ZERO_LIFT_ELEVATOR = 0.9
 # Elevator at cruise, rad.
 CRUISE_ELEVATOR = -0.035
 # Sharpness of the stall, the M of Beard and McLain.
 STALL_SHARPNESS = 80.0
 # Fraction of a rigid propeller's braking that an idle propeller has.
-WINDMILL = 0.5
+WINDMILL_FRACTION = 0.5
 # Resistance of the Aerosonde's motor at full throttle in cruise, R P / V^2.
 _RESISTANCE_RATIO = 0.026
 # Idle current of the Aerosonde's motor at full throttle in cruise, i0 V / P.
@@ -295,7 +295,7 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         raise _out_of_range("stall", sheet.stall, allowed, "m/s")
     aspect = sheet.span**2 / area
     if not _is_within(aspect, *ASPECT_RANGE):
-        min_span, max_span = (math.sqrt(lift_limit * area) for lift_limit in ASPECT_RANGE)
+        min_span, max_span = (math.sqrt(aspect_limit * area) for aspect_limit in ASPECT_RANGE)
         allowed = f"allowed {min_span:.2f}..{max_span:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
         raise _out_of_range("span", sheet.span, allowed, "m")
     if sheet.fuelled and (sheet.motor or sheet.volts):
@@ -322,10 +322,7 @@ def _weight(sheet: DataSheet) -> float:
 
 
 def _wing_area(sheet: DataSheet) -> float:
-    """Return the wing area, m^2.
-
-    It is the stated area, or the area for the stall speed at the class's largest lift.
-    """
+    """Return the wing area, m^2: the stated area, or the area for the stall speed at the class's maximum lift."""
     if sheet.area:
         return sheet.area
     return _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * CLASSES[sheet.layout].lift_max)
@@ -350,11 +347,11 @@ class SizedAircraft:
 
 
 def size_aircraft(
-    sheet: DataSheet, title: str = "", kind: AircraftClass | None = None, prior: PowerPrior = POWER_PRIOR
+    sheet: DataSheet, title: str = "", aircraft_class: AircraftClass | None = None, prior: PowerPrior = POWER_PRIOR
 ) -> SizedAircraft:
     """Build the model of a data sheet.
 
-    kind: class of the aircraft; None takes the layout's class.
+    aircraft_class: class of the aircraft; None takes the layout's class.
     prior: drag, efficiency and avionics power by size.
 
     Raises FlightError if no propeller gives the stated climb and top speed.
@@ -363,35 +360,35 @@ def size_aircraft(
     >>> round(made.numbers.area, 3), made.guessed
     (0.269, ('area', 'top', 'bank', 'climb', 'volts', 'energy'))
     """
-    kind = CLASSES[sheet.layout] if kind is None else kind
-    filled, guessed = _fill_sheet(sheet)
-    aero = _aerodynamics(filled, kind, prior)
-    drag = _drag_function(filled, aero)
+    aircraft_class = CLASSES[sheet.layout] if aircraft_class is None else aircraft_class
+    full_sheet, guessed_fields = _fill_sheet(sheet)
+    aero = _aerodynamics(full_sheet, aircraft_class, prior)
+    drag = _drag_function(full_sheet, aero)
     if sheet.sink:
-        aero, drag = _match_sink(filled, aero, sheet.sink)
-    propulsion, filled = _size_propulsion(sheet, filled, drag)
+        aero, drag = _match_sink(full_sheet, aero, sheet.sink)
+    propulsion, full_sheet = _size_propulsion(sheet, full_sheet, drag)
     if isinstance(propulsion, ElectricMotor):
-        propulsion = _with_battery_power(propulsion, filled, drag, prior)
-    chord = filled.area / filled.span
-    jx, jy, jz = (filled.mass * (ratio * filled.span) ** 2 for ratio in kind.gyration)
+        propulsion = _with_battery_power(propulsion, full_sheet, drag, prior)
+    chord = full_sheet.area / full_sheet.span
+    jx, jy, jz = (full_sheet.mass * (ratio * full_sheet.span) ** 2 for ratio in aircraft_class.gyration)
     numbers = ModelNumbers(
         title=title or f"{_LAYOUT_TEXTS[sheet.layout]} of {sheet.mass:g} kg, {sheet.span:g} m",
         source="From a data sheet, scaled from published aircraft of its class: README.md beside this file.",
-        mass=filled.mass,
-        area=filled.area,
-        span=filled.span,
+        mass=full_sheet.mass,
+        area=full_sheet.area,
+        span=full_sheet.span,
         chord=chord,
-        inertia=(jx, jy, jz, kind.product_share * jz),
+        inertia=(jx, jy, jz, aircraft_class.product_share * jz),
         aero=aero,
         propulsion=propulsion,
         layout=sheet.layout,
-        throw=kind.throw,
+        throw=aircraft_class.throw,
         rate=math.radians(300.0),
         lag=(0.05, 0.1 if not sheet.fuelled else 0.3),
         # A fuel engine drives its own generator.
         factors=(*FACTORS, *(name for name in POWER_FACTORS if name != "avionics-power" or not sheet.fuelled)),
     )
-    return SizedAircraft(numbers, filled, guessed)
+    return SizedAircraft(numbers, full_sheet, guessed_fields)
 
 
 # Words for each layout.
@@ -402,19 +399,19 @@ def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
     """Return the sheet with missing values filled in, and the names of those values."""
     defaults: dict[str, Any] = {
         "area": _wing_area(sheet),
-        "top": USUAL_TOP * sheet.cruise,
-        "bank": USUAL_BANK,
-        "climb": USUAL_CLIMB,
+        "top": DEFAULT_TOP_RATIO * sheet.cruise,
+        "bank": DEFAULT_BANK,
+        "climb": DEFAULT_CLIMB,
     }
     if sheet.fuelled:
         sheet = replace(sheet, energy=sheet.fuel * FUEL_HEAT)
     else:
-        defaults["volts"] = next(volts for mass, volts in _USUAL_VOLTS if sheet.mass < mass)
+        defaults["volts"] = next(volts for mass, volts in _DEFAULT_VOLTS if sheet.mass < mass)
         defaults["energy"] = BATTERY_PER_MASS * sheet.mass
-    guessed = tuple(name for name in defaults if not getattr(sheet, name))
+    guessed_fields = tuple(name for name in defaults if not getattr(sheet, name))
     values = {name: getattr(sheet, name) or defaults[name] for name in defaults}
-    filled: DataSheet = replace(sheet, **values)
-    return filled, guessed
+    full_sheet: DataSheet = replace(sheet, **values)
+    return full_sheet, guessed_fields
 
 
 def elliptic_slope(aspect: float) -> float:
@@ -431,13 +428,13 @@ def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerP
     aspect = sheet.span / chord
     slope = aircraft_class.lift_slope * elliptic_slope(aspect)
     aspect_factor = aspect if aircraft_class.by_aspect else 1.0
-    stiffness = aircraft_class.pitch_alpha * aspect_factor
+    pitch_stiffness = aircraft_class.pitch_alpha * aspect_factor
     weight = _weight(sheet)
     cruise_lift = weight / (0.5 * SHEET_DENSITY * sheet.cruise**2 * area)
     lift_max = weight / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
     # The elevator reaches its stop at the sheet's stall speed.
-    travel = aircraft_class.elevator_stall - CRUISE_ELEVATOR
-    alpha_range = (lift_max - cruise_lift - aircraft_class.lift_elevator * travel) / slope
+    elevator_travel = aircraft_class.elevator_stall - CRUISE_ELEVATOR
+    alpha_range = (lift_max - cruise_lift - aircraft_class.lift_elevator * elevator_travel) / slope
     cruise_alpha = min(CRUISE_ALPHA, MAX_STALL_ALPHA - alpha_range)
     if cruise_alpha < MIN_CRUISE_ALPHA:
         lift_limit = lift_max - slope * (MIN_CRUISE_ALPHA - cruise_alpha)
@@ -448,23 +445,23 @@ def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerP
         )
         raise _out_of_range("stall", sheet.stall, allowed, "m/s")
     # An elevator that is enough for the stall only may be too weak for the fastest level flight.
-    fast_travel = MAX_ZERO_LIFT_ELEVATOR * aircraft_class.throw[0] - CRUISE_ELEVATOR
-    elevator = stiffness * max(alpha_range / -travel, cruise_lift / slope / fast_travel)
+    max_elevator_travel = MAX_ZERO_LIFT_ELEVATOR * aircraft_class.throw[0] - CRUISE_ELEVATOR
+    elevator_moment = pitch_stiffness * max(alpha_range / -elevator_travel, cruise_lift / slope / max_elevator_travel)
     lift_0 = cruise_lift - slope * cruise_alpha - aircraft_class.lift_elevator * CRUISE_ELEVATOR
     # Lift holds up to the elevator's stop, so that the slowest level flight has a trim.
-    stall_alpha = cruise_alpha - travel * elevator / stiffness
+    stall_alpha = cruise_alpha - elevator_travel * elevator_moment / pitch_stiffness
     reynolds = sheet.cruise * chord / VISCOSITY
     return AeroCoefficients(
         lift_0=lift_0,
         lift_alpha=slope,
         lift_q=aircraft_class.lift_q,
         lift_elevator=aircraft_class.lift_elevator,
-        drag_min=prior.least_drag(sheet.layout, aspect, reynolds),
+        drag_min=prior.min_drag_coefficient(sheet.layout, aspect, reynolds),
         drag_lift=1.0 / (math.pi * aircraft_class.oswald * aspect),
-        pitch_0=-stiffness * cruise_alpha - elevator * CRUISE_ELEVATOR,
-        pitch_alpha=stiffness,
+        pitch_0=-pitch_stiffness * cruise_alpha - elevator_moment * CRUISE_ELEVATOR,
+        pitch_alpha=pitch_stiffness,
         pitch_q=aircraft_class.pitch_q * aspect_factor,
-        pitch_elevator=elevator,
+        pitch_elevator=elevator_moment,
         side_beta=aircraft_class.side_beta,
         side_rudder=aircraft_class.side_rudder,
         roll_beta=aircraft_class.roll_beta,
@@ -519,7 +516,7 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
 
 
 # ----------------------------------------------------------------------
-# Motor and propeller that give the stated climb at cruise and the stated top speed.
+# Motor and propeller with the stated climb at cruise and the stated top speed.
 
 
 class _NoPropellerError(Exception):
@@ -538,8 +535,8 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
 
 
 def _size_drive(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Drive, DataSheet]:
-    size = _size_engine if sheet.fuelled else _size_motor
-    return size(stated_sheet, sheet, drag)
+    size_function = _size_engine if sheet.fuelled else _size_motor
+    return size_function(stated_sheet, sheet, drag)
 
 
 def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
@@ -552,10 +549,10 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
     if stated_sheet.motor and stated_sheet.propeller[0]:
         target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)]
         motor, result = _solve_motor(stated_sheet, sheet, drag, target_fields)
-        if result.climb <= STEEPEST_CLIMB:
+        if result.climb <= MAX_CLIMB:
             return motor, result
         # Limit the climb of an aircraft with more thrust than that.
-        return _solve_motor(stated_sheet, replace(sheet, climb=STEEPEST_CLIMB), drag, ["climb"])
+        return _solve_motor(stated_sheet, replace(sheet, climb=MAX_CLIMB), drag, ["climb"])
     if stated_sheet.climb and stated_sheet.trim_throttle and not stated_sheet.top:
         # The climb that an autopilot is configured with is often less than the motor gives.
         with contextlib.suppress(_NoPropellerError):
@@ -571,7 +568,7 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
     target_fields = ["top"] if stated_sheet.top else ["trim_throttle"]
     sized_sheet = replace(stated_sheet, propeller=propeller)
     free_sheet = replace(stated_sheet, trim_throttle=0.0)
-    return _limit_climb(
+    return _solve_with_climb_limit(
         lambda: _solve_motor(sized_sheet, sheet, drag, target_fields),
         lambda climb: _solve_motor(free_sheet, replace(sheet, climb=climb), drag, ["climb", "top"]),
     )
@@ -580,17 +577,17 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
 _D = TypeVar("_D", ElectricMotor, FuelEngine)
 
 
-def _limit_climb(
+def _solve_with_climb_limit(
     solve: Callable[[], tuple[_D, DataSheet]], solve_for: Callable[[float], tuple[_D, DataSheet]]
 ) -> tuple[_D, DataSheet]:
-    """Return the drive for a top speed, or for a guessed climb if no propeller fits or the climb is too steep.
+    """Solve for a top speed, or for a guessed climb if no propeller fits or the climb is too steep.
 
     solve_for: solves for a climb, rad.
     """
     climbs = _CLIMB_GUESSES_DEG
     with contextlib.suppress(_NoPropellerError):
         drive, result = solve()
-        if result.climb <= STEEPEST_CLIMB:
+        if result.climb <= MAX_CLIMB:
             return drive, result
         climbs = climbs[::-1]
     for climb in climbs:
@@ -600,7 +597,7 @@ def _limit_climb(
 
 
 def _solve_first(stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Drag) -> tuple[ElectricMotor, DataSheet]:
-    """Return the motor for climb and top speed of the first of these sheets for which there is one."""
+    """Solve for the motor that meets climb and top speed of the first of these sheets that has a solution."""
     for sheet in sheets:
         with contextlib.suppress(_NoPropellerError):
             return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
@@ -610,14 +607,14 @@ def _solve_first(stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Dra
 def _solve_motor(
     stated_sheet: DataSheet, sheet: DataSheet, drag: Drag, target_fields: list[str]
 ) -> tuple[ElectricMotor, DataSheet]:
-    """Return the motor that meets these fields of the sheet, with as many free numbers.
+    """Solve for the motor that meets these fields of the sheet, with as many free numbers.
 
     The last free number is the motor's speed per volt, or the propeller's pitch.
     """
     volts, (diameter, pitch) = sheet.volts, stated_sheet.propeller
     # With the Aerosonde's blade shape the ratio of pitch to diameter is the zero-thrust ratio.
     pitch_ratio = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if pitch else 1.0
-    base = BOOK_PROPELLER.scaled(diameter=diameter / BOOK_PROPELLER.diameter if diameter else 1.0, pitch=pitch_ratio)
+    base = BOOK_PROPELLER.scale(diameter=diameter / BOOK_PROPELLER.diameter if diameter else 1.0, pitch=pitch_ratio)
     emf = 60.0 / (2.0 * math.pi * stated_sheet.motor) if stated_sheet.motor else 0.0
     initial_size = 1.0 if diameter else math.sqrt(sheet.mass / 11.0)
     # Initial guess: unloaded propeller speed slightly above the speed for the top airspeed, rad/s.
@@ -627,12 +624,12 @@ def _solve_motor(
     def make_motor(free: Sequence[float]) -> ElectricMotor:
         size_factor, speed_factor = (1.0, free[0]) if has_one_unknown else (*free, 1.0, 1.0)[:2]
         propeller = (
-            base.scaled(blades=size_factor * initial_size)
+            base.scale(blades=size_factor * initial_size)
             if diameter
-            else base.scaled(diameter=size_factor * initial_size)
+            else base.scale(diameter=size_factor * initial_size)
         )
         if emf:
-            return _motor_on_battery(propeller.scaled(pitch=speed_factor), volts, emf, sheet.cruise)
+            return _motor_on_battery(propeller.scale(pitch=speed_factor), volts, emf, sheet.cruise)
         return _motor_on_battery(propeller, volts, volts / (speed_factor * initial_speed), sheet.cruise)
 
     def errors(free: Sequence[float]) -> list[float]:
@@ -648,7 +645,7 @@ def _solve_motor(
 def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
     """Return a motor of this speed per volt with the Aerosonde's losses relative to its cruise power."""
     power = 0.3 * volts**2 * emf
-    motor = ElectricMotor(propeller, volts, emf, 0.1, 0.5, WINDMILL)
+    motor = ElectricMotor(propeller, volts, emf, 0.1, 0.5, WINDMILL_FRACTION)
     for _ in range(12):
         motor = replace(
             motor, resistance=_RESISTANCE_RATIO * volts**2 / power, idle_current=_IDLE_CURRENT_RATIO * power / volts
@@ -671,7 +668,7 @@ def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prio
 
 
 def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
-    """Return an engine whose torque meets the climb or the top speed.
+    """Size an engine whose torque meets the climb or the top speed.
 
     If both are stated, the propeller's pitch is chosen too.
     """
@@ -679,28 +676,32 @@ def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple
     target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
     if target_fields != ["top"]:
         return _solve_engine(sheet, drag, target_fields)
-    return _limit_climb(
+    return _solve_with_climb_limit(
         lambda: _solve_engine(sheet, drag, target_fields),
         lambda climb: _solve_engine(replace(sheet, climb=climb), drag, ["climb", "top"]),
     )
 
 
 def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tuple[FuelEngine, DataSheet]:
-    """Return the engine that meets these fields of the sheet by its torque, and for two fields the pitch."""
+    """Solve for the engine torque that meets these fields of the sheet, and for two fields also for the pitch."""
     needed_thrust = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
     diameter, pitch = sheet.propeller
     pitch_ratio = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if diameter else 1.0
     usual_size = min(math.sqrt(sheet.mass / 11.0), _ENGINE_DIAMETER_RATIO * sheet.span / BOOK_PROPELLER.diameter)
-    base = BOOK_PROPELLER.scaled(
+    base_propeller = BOOK_PROPELLER.scale(
         diameter=diameter / BOOK_PROPELLER.diameter if diameter else usual_size, pitch=pitch_ratio
     )
-    initial_torque = 0.12 * needed_thrust * base.diameter
+    initial_torque = 0.12 * needed_thrust * base_propeller.diameter
 
     def make_engine(free: Sequence[float]) -> FuelEngine:
         torque, pitch_factor = (*free, 1.0)[:2]
         torque *= initial_torque
         return FuelEngine(
-            base.scaled(pitch=pitch_factor), torque, _FRICTION_RATIO * torque, _ENGINE_EFFICIENCY, WINDMILL
+            base_propeller.scale(pitch=pitch_factor),
+            torque,
+            _FRICTION_RATIO * torque,
+            _ENGINE_EFFICIENCY,
+            WINDMILL_FRACTION,
         )
 
     def errors(free: Sequence[float]) -> list[float]:
@@ -711,12 +712,12 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
     return engine, _with_performance(sheet, engine, drag)
 
 
-def _thrust_error(motor: Drive, sheet: DataSheet, drag: Drag, field: str) -> float:
+def _thrust_error(drive: Drive, sheet: DataSheet, drag: Drag, field: str) -> float:
     """Return the relative error of the thrust from the thrust that a field of the sheet needs."""
     speed = sheet.top if field == "top" else sheet.cruise
     throttle = sheet.trim_throttle if field == "trim_throttle" else 1.0
     needed_thrust = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if field == "climb" else 0.0)
-    return motor.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
+    return drive.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
@@ -780,7 +781,7 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     if field == "top":
         min_value, max_value = (ratio * sheet.cruise for ratio in TOP_RATIO_RANGE)
     feasible_values = []
-    for value in np.geomspace(min_value, max_value, _RANGE_STEPS).tolist():
+    for value in np.geomspace(min_value, max_value, _RANGE_STEP_COUNT).tolist():
         changed = {field: value * factor}
         with contextlib.suppress(_NoPropellerError):
             _size_drive(replace(stated_sheet, **changed), replace(sheet, **changed), drag)
@@ -800,15 +801,15 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     return FlightError.of_argument(option, value, allowed, shown=f"{value:.3g} {unit}")
 
 
-def _with_performance(sheet: DataSheet, motor: Drive, drag: Drag) -> DataSheet:
+def _with_performance(sheet: DataSheet, drive: Drive, drag: Drag) -> DataSheet:
     """Return the sheet with the climb and top speed of a motor, if it can climb."""
-    excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
+    excess_thrust = drive.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))
     if not climb >= math.radians(RANGES["climb"][2]) * (1.0 - _EDGE_ROUNDING):
         raise _NoPropellerError
     min_speed, max_speed = sheet.cruise, 4.0 * sheet.cruise
     for _ in range(60):
         airspeed = 0.5 * (min_speed + max_speed)
-        has_excess = motor.thrust(1.0, airspeed, SHEET_DENSITY) > drag(airspeed)
+        has_excess = drive.thrust(1.0, airspeed, SHEET_DENSITY) > drag(airspeed)
         min_speed, max_speed = (airspeed, max_speed) if has_excess else (min_speed, airspeed)
     return replace(sheet, climb=climb, top=min_speed)

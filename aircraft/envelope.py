@@ -11,7 +11,7 @@ from world.kernels import compiled
 # Standard gravity, m/s^2.
 GRAVITY = 9.80665
 # Distance from an uncertain limit within which a slope is undecided, in standard deviations: 95 % one-sided.
-UNDECIDED = 1.645
+UNDECIDED_SIGMAS = 1.645
 # Names of the tables of an `Envelope`.
 TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
 # Names of its power tables.
@@ -37,7 +37,7 @@ class Envelope:
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
     fastest_sd: standard deviation of the fastest level flight, m/s.
     power_sd: standard deviation of the logarithm of power.
-    battery_guessed, climb_guessed: True if the battery's energy, the steepest climb was not stated.
+    battery_guessed, climb_guessed: True if the battery's energy, or the steepest climb, was not stated.
     """
 
     aircraft: str
@@ -79,30 +79,31 @@ class Envelope:
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
             return math.nan, math.nan
         return (
-            _bilinear(self.airspeed, self.amsl, self.climb, airspeed, amsl),
-            _bilinear(self.airspeed, self.amsl, self.descent, airspeed, amsl),
+            _interpolate_bilinearly(self.airspeed, self.amsl, self.climb, airspeed, amsl),
+            _interpolate_bilinearly(self.airspeed, self.amsl, self.descent, airspeed, amsl),
         )
 
-    def surely(self) -> "Envelope":
-        """Return the certain part of the envelope: `UNDECIDED` standard deviations below the estimate.
+    def with_margin(self) -> "Envelope":
+        """Return the envelope reduced by a margin of `UNDECIDED_SIGMAS` standard deviations.
 
         Slopes are at least 0, and the maximum level speed is at least the minimum level speed.
 
         >>> tables = {name: np.full((1, 1), 0.2) for name in ("climb", "descent")}
         >>> edges = dict.fromkeys(("airspeed", "amsl", "level_speed_min", "level_speed_max"), np.ones(1))
         >>> made = Envelope("mine", "", False, max_bank=0.5, climb_sd=0.1, descent_sd=0.2, **edges, **tables)
-        >>> round(float(made.surely().climb[0, 0]), 4), float(made.surely().descent[0, 0]), made.surely().climb_sd
+        >>> made = made.with_margin()
+        >>> round(float(made.climb[0, 0]), 4), float(made.descent[0, 0]), made.climb_sd
         (0.0355, 0.0, 0.0)
         """
         if not (self.climb_sd or self.descent_sd or self.fastest_sd):
             return self
-        margins = {name: UNDECIDED * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
+        margins = {name: UNDECIDED_SIGMAS * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
         # A loss of altitude is unchanged.
         climb, descent = (
             np.where(table > 0.0, np.maximum(0.0, table - margins[name]), table)
             for name, table in (("climb", self.climb), ("descent", self.descent))
         )
-        max_level_speed = np.fmax(self.level_speed_min, self.level_speed_max - UNDECIDED * self.fastest_sd)
+        max_level_speed = np.fmax(self.level_speed_min, self.level_speed_max - UNDECIDED_SIGMAS * self.fastest_sd)
         return replace(
             self,
             climb=climb,
@@ -141,7 +142,7 @@ class Envelope:
             return math.nan
         climb, descent = self.air_angles(airspeed, amsl)
         idle, level, full_throttle = (
-            _bilinear(self.airspeed, self.amsl, getattr(self, name), airspeed, amsl) for name in POWERS
+            _interpolate_bilinearly(self.airspeed, self.amsl, getattr(self, name), airspeed, amsl) for name in POWERS
         )
         sine = math.sin(air_angle)
         min_sine, max_sine = -math.sin(descent), math.sin(climb)
@@ -185,10 +186,10 @@ def turn_radius(speed: float, bank: float) -> float:
     return speed**2 / (GRAVITY * math.tan(bank))
 
 
-def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
+def _interpolate_bilinearly(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
     rows = _interpolate_rows(ys, table, y)
-    first_known = int(np.argmax(~np.isnan(rows)))
-    rows[:first_known] = rows[first_known]
+    first_finite_row = int(np.argmax(~np.isnan(rows)))
+    rows[:first_finite_row] = rows[first_finite_row]
     return float(np.interp(x, xs, rows, left=np.nan, right=np.nan))
 
 
@@ -197,9 +198,9 @@ def _interpolate_rows(ys: Floats, table: Floats, y: float) -> Floats:
     k = min(max(0, int(np.searchsorted(ys, y, side="right")) - 1), ys.size - 1)
     if y <= ys[k] or k == ys.size - 1:
         return np.array(table[:, k])
-    left, right = table[:, k], table[:, k + 1]
-    slope = (right - left) / (ys[k + 1] - ys[k])
-    rows = slope * (y - ys[k]) + left
+    left_column, right_column = table[:, k], table[:, k + 1]
+    slope = (right_column - left_column) / (ys[k + 1] - ys[k])
+    rows = slope * (y - ys[k]) + left_column
     # As in np.interp: interpolate from the other side if NaN, and keep equal neighbors unchanged.
-    rows = np.where(np.isnan(rows), slope * (y - ys[k + 1]) + right, rows)
-    return np.where(np.isnan(rows) & (left == right), left, rows)
+    rows = np.where(np.isnan(rows), slope * (y - ys[k + 1]) + right_column, rows)
+    return np.where(np.isnan(rows) & (left_column == right_column), left_column, rows)

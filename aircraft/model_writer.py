@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from aircraft.propulsion import Propulsion
-from aircraft.xml_text import number, product, scaled, total
+from aircraft.xml_text import add, multiply, number, scale
 
 # Control surfaces: a tail with elevator and rudder, a flying wing with elevons, a V-tail with ruddervators.
 Layout = Literal["tail", "wing", "vtail"]
@@ -188,24 +188,24 @@ def _flight_control(numbers: ModelNumbers) -> str:
     travels = {"elevator": elevator, "aileron": aileron, "rudder": rudder}
     mixed_controls = {"tail": (), "wing": ("elevator", "aileron"), "vtail": ("elevator", "rudder")}[numbers.layout]
     channels = [
-        _servo(f"surface/{name}-rad", f"command/{name}-rad", limit, numbers)
-        for name, limit in travels.items()
+        _servo(f"surface/{name}-rad", f"command/{name}-rad", travel, numbers)
+        for name, travel in travels.items()
         if name not in mixed_controls
     ]
     if mixed_controls:
         first_control, second_control = mixed_controls
         name = "elevon" if numbers.layout == "wing" else "ruddervator"
-        limit = MIXED_TRAVEL * max(travels[first_control], travels[second_control])
+        travel = MIXED_TRAVEL * max(travels[first_control], travels[second_control])
         sides = {"left": 1.0, "right": -1.0}
         # The outer functions only convert between commands and surfaces; the servos between them have lag and stops.
         for side, sign in sides.items():
-            command = total(f"<p> command/{first_control}-rad </p>", scaled(sign, f"command/{second_control}-rad"))
+            command = add(f"<p> command/{first_control}-rad </p>", scale(sign, f"command/{second_control}-rad"))
             channels.append(_function(f"{name}/{side}-command-rad", command))
-            channels.append(_servo(f"{name}/{side}-rad", f"{name}/{side}-command-rad", limit, numbers))
+            channels.append(_servo(f"{name}/{side}-rad", f"{name}/{side}-command-rad", travel, numbers))
         for control, signs in ((first_control, (0.5, 0.5)), (second_control, (0.5, -0.5))):
-            parts = (scaled(sign, f"{name}/{side}-rad") for side, sign in zip(sides, signs, strict=True))
-            channels.append(_function(f"surface/{control}-rad", total(*parts)))
-    lag = 1.0 / numbers.lag[1]
+            servo_terms = (scale(sign, f"{name}/{side}-rad") for side, sign in zip(sides, signs, strict=True))
+            channels.append(_function(f"surface/{control}-rad", add(*servo_terms)))
+    inverse_lag = 1.0 / numbers.lag[1]
     return f"""  <flight_control name="servos">
     <property value="0"> command/elevator-rad </property>
     <property value="0"> command/aileron-rad </property>
@@ -217,19 +217,19 @@ def _flight_control(numbers: ModelNumbers) -> str:
     <channel name="motor">
       <actuator name="motor/throttle-norm">
         <input> command/throttle-norm </input>
-        <lag> {number(lag)} </lag>
+        <lag> {number(inverse_lag)} </lag>
         <clipto> <min> 0 </min> <max> 1 </max> </clipto>
       </actuator>
     </channel>
   </flight_control>"""
 
 
-def _servo(name: str, command: str, limit: float, numbers: ModelNumbers) -> str:
+def _servo(name: str, command: str, travel: float, numbers: ModelNumbers) -> str:
     return f"""      <actuator name="{name}">
         <input> {command} </input>
         <lag> {number(1.0 / numbers.lag[0])} </lag>
         <rate_limit> {number(numbers.rate)} </rate_limit>
-        <clipto> <min> {number(-limit)} </min> <max> {number(limit)} </max> </clipto>
+        <clipto> <min> {number(-travel)} </min> <max> {number(travel)} </max> </clipto>
       </actuator>"""
 
 
@@ -305,16 +305,19 @@ _CONTROL = "aero/control-factor"
 
 def _aerodynamics(numbers: ModelNumbers) -> str:
     span, chord = "<p> metrics/bw-ft </p>", "<p> metrics/cbarw-ft </p>"
-    forces, moments = _force_terms(numbers.aero, numbers.factors), _moment_terms(numbers.aero, numbers.factors)
+    forces, moments = (
+        _force_coefficients(numbers.aero, numbers.factors),
+        _moment_coefficients(numbers.aero, numbers.factors),
+    )
     drag_factor = "<p> aero/drag-factor </p>"
     axes = "\n".join(
         [
-            _axis("X", "force/drag", product(_DYNAMIC_FORCE, drag_factor, forces[0]), ' frame="STABILITY"'),
-            _axis("Z", "force/lift", product(_DYNAMIC_FORCE, forces[1]), ' frame="STABILITY"'),
-            _axis("Y", "force/side", product(_DYNAMIC_FORCE, forces[2]), ' frame="STABILITY"'),
-            _axis("ROLL", "moment/roll", product(_DYNAMIC_FORCE, span, moments[0])),
-            _axis("PITCH", "moment/pitch", product(_DYNAMIC_FORCE, chord, moments[1])),
-            _axis("YAW", "moment/yaw", product(_DYNAMIC_FORCE, span, moments[2])),
+            _axis("X", "force/drag", multiply(_DYNAMIC_FORCE, drag_factor, forces[0]), ' frame="STABILITY"'),
+            _axis("Z", "force/lift", multiply(_DYNAMIC_FORCE, forces[1]), ' frame="STABILITY"'),
+            _axis("Y", "force/side", multiply(_DYNAMIC_FORCE, forces[2]), ' frame="STABILITY"'),
+            _axis("ROLL", "moment/roll", multiply(_DYNAMIC_FORCE, span, moments[0])),
+            _axis("PITCH", "moment/pitch", multiply(_DYNAMIC_FORCE, chord, moments[1])),
+            _axis("YAW", "moment/yaw", multiply(_DYNAMIC_FORCE, span, moments[2])),
         ]
     )
     return f"""  <aerodynamics>
@@ -337,68 +340,69 @@ def _axis(axis: str, name: str, content: str, frame: str = "") -> str:
 
 
 def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the property of a factor; () if the model lacks the factor."""
+    """Return the property of a factor as a tuple; () if the model lacks the factor."""
     return (f"ident/{name}",) if name in factors else ()
 
 
-def _force_terms(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
-    """Return the coefficients of drag, lift and side force."""
+def _force_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
+    """Return the XML of the coefficients of drag, lift and side force."""
     lift_difference = f"<difference> <p> aero/lift-linear </p> <v> {number(aero.lift_at_least_drag)} </v> </difference>"
     induced = (f"<p> {name} </p>" for name in _factor_property("induced-drag", factors))
-    drag = total(
-        scaled(aero.drag_min, *_factor_property("zero-lift-drag", factors)),
-        product(f"<v> {number(aero.drag_lift)} </v>", *induced, lift_difference, lift_difference),
-        product(f"<v> {number(aero.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
-        scaled(aero.drag_elevator_2, _ELEVATOR, _ELEVATOR),
-        scaled(aero.drag_beta_2, _BETA, _BETA),
+    drag = add(
+        scale(aero.drag_min, *_factor_property("zero-lift-drag", factors)),
+        multiply(f"<v> {number(aero.drag_lift)} </v>", *induced, lift_difference, lift_difference),
+        multiply(f"<v> {number(aero.drag_elevator)} </v>", f"<abs> <p> {_ELEVATOR} </p> </abs>"),
+        scale(aero.drag_elevator_2, _ELEVATOR, _ELEVATOR),
+        scale(aero.drag_beta_2, _BETA, _BETA),
     )
-    lift = total(
+    lift = add(
         "<p> aero/lift-alpha </p>",
-        scaled(aero.lift_q, "aero/ci2vel", _RATE_Q),
-        scaled(aero.lift_elevator, _ELEVATOR),
+        scale(aero.lift_q, "aero/ci2vel", _RATE_Q),
+        scale(aero.lift_elevator, _ELEVATOR),
     )
-    side = total(
-        scaled(aero.side_beta, _BETA),
-        scaled(aero.side_p, "aero/bi2vel", _RATE_P),
-        scaled(aero.side_r, "aero/bi2vel", _RATE_R),
-        scaled(aero.side_aileron, _AILERON),
-        scaled(aero.side_rudder, _RUDDER),
+    side = add(
+        scale(aero.side_beta, _BETA),
+        scale(aero.side_p, "aero/bi2vel", _RATE_P),
+        scale(aero.side_r, "aero/bi2vel", _RATE_R),
+        scale(aero.side_aileron, _AILERON),
+        scale(aero.side_rudder, _RUDDER),
     )
     return drag, lift, side
 
 
-def _moment_terms(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
-    """Return the coefficients of rolling, pitching and yawing moment."""
-    roll = total(
-        scaled(aero.roll_beta, _BETA),
-        scaled(aero.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", factors)),
-        scaled(aero.roll_r, "aero/bi2vel", _RATE_R),
-        scaled(aero.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", factors)),
-        scaled(aero.roll_rudder, _CONTROL, _RUDDER),
+def _moment_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tuple[str, str, str]:
+    """Return the XML of the coefficients of rolling, pitching and yawing moment."""
+    roll = add(
+        scale(aero.roll_beta, _BETA),
+        scale(aero.roll_p, "aero/bi2vel", _RATE_P, *_factor_property("roll-damping", factors)),
+        scale(aero.roll_r, "aero/bi2vel", _RATE_R),
+        scale(aero.roll_aileron, _CONTROL, _AILERON, *_factor_property("aileron-power", factors)),
+        scale(aero.roll_rudder, _CONTROL, _RUDDER),
     )
-    pitch = total(
+    pitch = add(
         f"<v> {number(aero.pitch_0)} </v>",
-        scaled(aero.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", factors)),
-        scaled(aero.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", factors)),
-        scaled(aero.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", factors)),
+        scale(aero.pitch_alpha, _ALPHA, *_factor_property("pitch-stiffness", factors)),
+        scale(aero.pitch_q, "aero/ci2vel", _RATE_Q, *_factor_property("pitch-damping", factors)),
+        scale(aero.pitch_elevator, _CONTROL, _ELEVATOR, *_factor_property("elevator-power", factors)),
     )
-    yaw = total(
-        scaled(aero.yaw_beta, _BETA),
-        scaled(aero.yaw_p, "aero/bi2vel", _RATE_P),
-        scaled(aero.yaw_r, "aero/bi2vel", _RATE_R),
-        scaled(aero.yaw_aileron, _CONTROL, _AILERON),
-        scaled(aero.yaw_rudder, _CONTROL, _RUDDER),
+    yaw = add(
+        scale(aero.yaw_beta, _BETA),
+        scale(aero.yaw_p, "aero/bi2vel", _RATE_P),
+        scale(aero.yaw_r, "aero/bi2vel", _RATE_R),
+        scale(aero.yaw_aileron, _CONTROL, _AILERON),
+        scale(aero.yaw_rudder, _CONTROL, _RUDDER),
     )
     return roll, pitch, yaw
 
 
 def _lift_curve(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
     """Return the lift as a function of angle of attack: a straight line, and a flat plate beyond the stall."""
-    straight_line = total(
-        f"<v> {number(aero.lift_0)} </v>", scaled(aero.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors))
+    straight_line = add(
+        f"<v> {number(aero.lift_0)} </v>",
+        scale(aero.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors)),
     )
     sine = f"<sin> <p> {_ALPHA} </p> </sin>"
-    flat_plate = product("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
+    flat_plate = multiply("<v> 2 </v>", sine, f"<abs> {sine} </abs>", f"<cos> <p> {_ALPHA} </p> </cos>")
     difference = f"<difference> {flat_plate} <p> aero/lift-linear </p> </difference>"
     return f"""    <function name="aero/lift-linear">
       {straight_line}
@@ -413,7 +417,7 @@ def _lift_curve(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
       </table>
     </function>
     <function name="aero/lift-alpha">
-      {total("<p> aero/lift-linear </p>", product("<p> aero/separated </p>", difference))}
+      {add("<p> aero/lift-linear </p>", multiply("<p> aero/separated </p>", difference))}
     </function>"""
 
 

@@ -1,4 +1,4 @@
-"""Limits of a path: the tighter ones of the scenario's limits and the aircraft's envelope.
+"""Limits of a path: the tighter of the scenario's limits and the aircraft's envelope.
 
 These are turn radii, turn lengths and slopes over the ground in wind. The compiled functions are their only definition,
 for the planner's candidates, for certificates and for missions.
@@ -18,9 +18,9 @@ from world.geometry import leg_courses, leg_slopes, wrap
 from world.kernels import compiled, compiled_inline, inlined
 from world.wind import W20, Wind, mean_wind_speed
 
-# Time to roll from one bank angle into the opposite one, s per rad by which the change exceeds the bank limit: rolling
-# in from level is part of every turn. Measured on the shortest S-turn legs that are flown within tolerance
-# (`benchmarks.limits`).
+# Time to roll from one bank angle into the opposite one, s per rad by which the bank change exceeds the bank limit:
+# rolling in from level flight is part of every turn. Measured on the shortest S-turn legs that are flown within
+# tolerance (`benchmarks.limits`).
 ROLL_TIME = 0.8
 # Vertical acceleration in the blend between two slopes, m/s^2.
 BLEND_ACCELERATION = 1.0
@@ -100,19 +100,16 @@ class Limits:
         climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)
 
-    def surely(self) -> "Limits":
-        """Return the limits with the slopes that the aircraft can certainly fly."""
-        return replace(self, envelope=self.envelope.surely())
+    def with_margin(self) -> "Limits":
+        """Return the limits with an envelope reduced by a margin for its uncertainty."""
+        return replace(self, envelope=self.envelope.with_margin())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
         """Return the radius (m) of the arc at `max_bank` between two courses, for its highest ground speed."""
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
     def rates(self, amsl: float) -> tuple[float, float]:
-        """Return the maximum steady climb and sink rates in still air at an altitude (m), m/s.
-
-        The rates are for the airspeed of the limits.
-        """
+        """Return the maximum climb and sink rates in still air at an altitude, m, and the limits' airspeed, m/s."""
         table = self.performance()
         speed = float(true_airspeed(table, amsl))
         climb, sink = (speed * math.sin(np.interp(amsl, table.amsl, angles)) for angles in (table.climb, table.descent))
@@ -147,17 +144,21 @@ class Limits:
         return self._tables[airspeed]
 
     def _make_table(self, airspeed: float | None) -> PerformanceTable:
-        speed, heights, wind = self.airspeed if airspeed is None else airspeed, self.envelope.amsl, self.wind
-        equivalent = airspeed is None and self.tracking is not None
-        speed_factors = [air_density_factor(float(amsl)) if equivalent else 1.0 for amsl in heights]
+        cruise_airspeed, altitudes, wind = (
+            self.airspeed if airspeed is None else airspeed,
+            self.envelope.amsl,
+            self.wind,
+        )
+        is_equivalent = airspeed is None and self.tracking is not None
+        speed_factors = [air_density_factor(float(amsl)) if is_equivalent else 1.0 for amsl in altitudes]
         angles = np.array(
             [
-                self.envelope.air_angles(speed * factor, float(amsl))
-                for factor, amsl in zip(speed_factors, heights, strict=True)
+                self.envelope.air_angles(cruise_airspeed * factor, float(amsl))
+                for factor, amsl in zip(speed_factors, altitudes, strict=True)
             ]
         )
         return PerformanceTable(
-            airspeed=float(speed),
+            airspeed=float(cruise_airspeed),
             tan_max_bank=math.tan(self.max_bank),
             wind_speed=float(wind.speed),
             wind_to=wind.to_course,
@@ -165,10 +166,10 @@ class Limits:
             wind_reference_amsl=float(wind.reference_amsl),
             # sigma_w of MIL-F-8785C, which sigma_u equals at 300 m.
             gust_sigma=0.1 * W20[wind.turbulence],
-            amsl=heights,
+            amsl=altitudes,
             climb=_read_only(angles[:, 0]),
             descent=_read_only(angles[:, 1]),
-            equivalent=float(equivalent),
+            equivalent=float(is_equivalent),
         )
 
 
@@ -189,13 +190,13 @@ def derate(
     >>> derate(table, 0.5, 1.0).climb.tolist(), derate(table, 0.9, 0.9, unused_climb=3.0).climb.round(3).tolist()
     ([0.1, -0.1], [0.079, -0.1])
     """
-    speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
+    airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
 
     def reduce_angles(angles: Floats, fraction: float, unused_rate: float) -> Floats:
         reduced = np.where(angles > 0.0, fraction * angles, angles)
         if unused_rate <= 0.0:
             return _read_only(reduced)
-        max_angles = np.arcsin(np.maximum(0.0, np.sin(angles) - unused_rate / speeds))
+        max_angles = np.arcsin(np.maximum(0.0, np.sin(angles) - unused_rate / airspeeds))
         return _read_only(np.where(reduced > 0.0, np.minimum(reduced, max_angles), reduced))
 
     climb, descent = (
@@ -213,8 +214,8 @@ def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) ->
     >>> slower.climb.round(3).tolist(), slower.descent.tolist()
     ([0.201, 0.201], [0.3, 0.3])
     """
-    speeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
-    climb_limit, descent_limit = [np.arcsin(np.minimum(1.0, rate / speeds)) for rate in (climb_rate, sink_rate)]
+    airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
+    climb_limit, descent_limit = [np.arcsin(np.minimum(1.0, rate / airspeeds)) for rate in (climb_rate, sink_rate)]
     climb, descent = (
         _read_only(np.minimum(table.climb, climb_limit)),
         _read_only(np.minimum(table.descent, descent_limit)),
@@ -272,9 +273,9 @@ def slopes_along(
     fraction = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
     climb = table.climb[k] + fraction * (table.climb[k + 1] - table.climb[k])
     dive = table.descent[k] + fraction * (table.descent[k + 1] - table.descent[k])
-    speed = true_airspeed(table, amsl)
-    climb_slope = ground_slope(climb, speed, wind * tail_fraction, wind * cross_fraction)
-    dive_slope = ground_slope(dive, speed, wind * tail_fraction, wind * cross_fraction)
+    airspeed = true_airspeed(table, amsl)
+    climb_slope = ground_slope(climb, airspeed, wind * tail_fraction, wind * cross_fraction)
+    dive_slope = ground_slope(dive, airspeed, wind * tail_fraction, wind * cross_fraction)
     if math.isnan(climb_slope) or math.isnan(dive_slope):
         return 0.0, 0.0
     # No leg may descend from an altitude at which the true airspeed exceeds that of the fastest level flight.
@@ -307,19 +308,19 @@ def _turn_radius(
     w: unit vector of `downwind`.
     turn_sign: sign of the turn, 0 for either direction.
     """
-    wind, speed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
+    wind, airspeed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
         # Without wind the speed is the same on every course.
-        max_speed = speed
+        max_speed = airspeed
     else:
-        speed_in = ground_speed(speed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
-        speed_out = ground_speed(speed, wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
+        speed_in = ground_speed(airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
+        speed_out = ground_speed(airspeed, wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
         if math.isnan(speed_in) or math.isnan(speed_out):
             return math.inf
         max_speed = max(speed_in, speed_out)
         # The highest ground speed is downwind, if the turn passes through that course.
         if turn_sign == 0.0 or (turn_sign * (ux * wy - uy * wx) > 0.0 and turn_sign * (wx * vy - wy * vx) > 0.0):
-            max_speed = max(max_speed, speed + wind)
+            max_speed = max(max_speed, airspeed + wind)
     max_speed += table.gust_sigma
     return max_speed * max_speed / (GRAVITY * table.tan_max_bank)
 

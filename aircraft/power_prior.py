@@ -1,6 +1,6 @@
 """Prior of drag and power of a small aircraft from its size, calibrated on real aircraft.
 
-Power in level flight is D V / efficiency + avionics. Least drag depends on layout and aspect ratio, the efficiency of
+Power in level flight is D V / efficiency + avionics. Minimum drag depends on layout and aspect ratio, the efficiency of
 the drive on mass. All deviations are log-normal. `examples/real/aircraft.csv` lists the powers of the 22 electric
 aircraft that the coefficients are fitted to; `benchmarks/real_power.py` is the fit, and predicts each aircraft from
 the others.
@@ -14,17 +14,17 @@ from aircraft.model_writer import Layout
 # Reynolds number on the mean chord for the reference minimum drag.
 DRAG_REYNOLDS = 3.2e5
 # Exponent of the Reynolds number in the minimum drag: turbulent skin friction of a flat plate (Schlichting).
-DRAG_POWER = -0.2
+DRAG_EXPONENT = -0.2
 # Aspect ratio for the reference minimum drag.
 DRAG_ASPECT = 8.0
 # Efficiency of a large drive: propeller 0.85, motor and speed controller 0.88. The Sky-Sailor's parts have 0.86 and
 # 0.80 (Noth, "Design of Solar Powered Airplanes for Continuous Flight", ETH 2008).
-LARGEST_EFFICIENCY = 0.75
+MAX_EFFICIENCY = 0.75
 # Exponent of the mass in the ratio of losses to output. Losses of bearings, iron, speed controller and of blades at low
 # Reynolds numbers weigh more in a small drive; powers from -0.5 to -0.8 fit the table equally well.
-LOSS_POWER = -2.0 / 3.0
+LOSS_EXPONENT = -2.0 / 3.0
 # Standard deviation of the logarithm of the minimum drag.
-LEAST_DRAG_LOG_SD = 0.35
+MIN_DRAG_LOG_SD = 0.35
 # Standard deviation of the logarithm of drag due to lift; span efficiencies of 0.65 to 0.95 are published.
 INDUCED_DRAG_LOG_SD = 0.15
 # Standard deviation of the logarithm of the drive's efficiency.
@@ -40,7 +40,7 @@ class PowerPrior:
     tail_drag, wing_drag: minimum drag coefficient at `DRAG_REYNOLDS` and `DRAG_ASPECT`, with a tail and for a flying
         wing.
     aspect_power: exponent of the aspect ratio in the minimum drag; fuselage and tail are smaller with a slender wing.
-    loss_mass: mass of an aircraft with half of `LARGEST_EFFICIENCY`, kg.
+    loss_mass: mass of an aircraft with half of `MAX_EFFICIENCY`, kg.
     avionics: power of autopilot, radios and servos, W.
     """
 
@@ -50,10 +50,12 @@ class PowerPrior:
     loss_mass: float
     avionics: float
 
-    def least_drag(self, layout: Layout, aspect: float, reynolds: float) -> float:
+    def min_drag_coefficient(self, layout: Layout, aspect: float, reynolds: float) -> float:
         """Return the minimum drag coefficient for an aspect ratio and a Reynolds number."""
-        reference = self.wing_drag if layout == "wing" else self.tail_drag
-        return reference * (aspect / DRAG_ASPECT) ** self.aspect_power * (reynolds / DRAG_REYNOLDS) ** DRAG_POWER
+        reference_drag = self.wing_drag if layout == "wing" else self.tail_drag
+        return (
+            reference_drag * (aspect / DRAG_ASPECT) ** self.aspect_power * (reynolds / DRAG_REYNOLDS) ** DRAG_EXPONENT
+        )
 
     def drive_efficiency(self, mass: float) -> float:
         """Return the ratio of D V to the battery power of the drive, for a mass in kg.
@@ -61,26 +63,26 @@ class PowerPrior:
         >>> [round(POWER_PRIOR.drive_efficiency(mass), 2) for mass in (0.5, 2.0, 20.0)]
         [0.26, 0.43, 0.64]
         """
-        return LARGEST_EFFICIENCY / (1.0 + (mass / self.loss_mass) ** LOSS_POWER)
+        return MAX_EFFICIENCY / (1.0 + (mass / self.loss_mass) ** LOSS_EXPONENT)
 
 
 # The fit of `benchmarks/real_power.py` to all aircraft of the table.
 POWER_PRIOR = PowerPrior(tail_drag=0.0315, wing_drag=0.0171, aspect_power=-0.42, loss_mass=1.32, avionics=3.2)
 
 
-def power_log_sd(least_share: float, avionics_share: float, least_drag_sd: float = LEAST_DRAG_LOG_SD) -> float:
+def power_log_sd(min_drag_fraction: float, avionics_fraction: float, min_drag_sd: float = MIN_DRAG_LOG_SD) -> float:
     """Return the standard deviation of the logarithm of the power in level flight.
 
-    least_share: share of the least drag in the drag.
-    avionics_share: share of the avionics in the power.
+    min_drag_fraction: fraction of the minimum drag in the drag.
+    avionics_fraction: fraction of the avionics in the power.
 
     >>> round(power_log_sd(1.0, 0.0), 3)  # of 0.35 and 0.29
     0.455
     """
-    drive_share = 1.0 - avionics_share
+    drive_fraction = 1.0 - avionics_fraction
     return math.hypot(
-        drive_share * least_share * least_drag_sd,
-        drive_share * (1.0 - least_share) * INDUCED_DRAG_LOG_SD,
-        drive_share * EFFICIENCY_LOG_SD,
-        avionics_share * AVIONICS_LOG_SD,
+        drive_fraction * min_drag_fraction * min_drag_sd,
+        drive_fraction * (1.0 - min_drag_fraction) * INDUCED_DRAG_LOG_SD,
+        drive_fraction * EFFICIENCY_LOG_SD,
+        avionics_fraction * AVIONICS_LOG_SD,
     )

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from aircraft.xml_text import number, product, scaled, total
+from aircraft.xml_text import add, multiply, number, scale
 
 # Direction or position vector in body axes: forward, right, down.
 Vector3 = tuple[float, float, float]
@@ -53,7 +53,7 @@ class Propeller:
     thrust: tuple[float, float, float]
     torque: tuple[float, float, float]
 
-    def scaled(self, *, diameter: float = 1.0, blades: float = 1.0, pitch: float = 1.0) -> "Propeller":
+    def scale(self, *, diameter: float = 1.0, blades: float = 1.0, pitch: float = 1.0) -> "Propeller":
         """Return a propeller of another size.
 
         Coefficients scale with the blade area, and J scales with the pitch. A propeller of steeper pitch gives its
@@ -91,10 +91,10 @@ class Propeller:
 # Propeller of the Aerosonde, D 0.508 m (Beard and McLain, appendix E.2).
 BOOK_PROPELLER = Propeller(0.508, (0.09357, -0.06044, -0.1079), (0.00523, 0.00497, -0.01664))
 # Radians per revolution.
-_RAD_PER_TURN = 2.0 * math.pi
+_RAD_PER_REVOLUTION = 2.0 * math.pi
 
 
-def root(square: float, linear: float, constant: float) -> float:
+def larger_root(square: float, linear: float, constant: float) -> float:
     """Return the larger root of a parabola; a negative discriminant is replaced by 0."""
     return (math.sqrt(max(0.0, linear**2 - 4.0 * square * constant)) - linear) / (2.0 * square)
 
@@ -129,8 +129,10 @@ class ElectricMotor:
         """Return the propeller speed, rad/s."""
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
         k, r = self.emf, self.resistance
-        driven = root(square, linear + k * k / r, constant + k * self.idle_current - k * self.volts * throttle / r)
-        return max(0.0, driven, root(square, linear, constant + k * self.idle_current))
+        driven = larger_root(
+            square, linear + k * k / r, constant + k * self.idle_current - k * self.volts * throttle / r
+        )
+        return max(0.0, driven, larger_root(square, linear, constant + k * self.idle_current))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the thrust, N."""
@@ -148,45 +150,45 @@ class ElectricMotor:
         factor = _factor_element(factors)
         k, r, i0 = self.emf, self.resistance, self.idle_current
         speed_factor = factor("motor-speed")
-        linear = f"<quotient> <v> {number(k * k / r)} </v> {product(speed_factor, speed_factor)} </quotient>"
+        linear = f"<quotient> <v> {number(k * k / r)} </v> {multiply(speed_factor, speed_factor)} </quotient>"
         losses = f"<quotient> <v> {number(k * i0)} </v> {speed_factor} </quotient>"
-        drive = f"<quotient> {scaled(-k / r, 'motor/input-v')} {speed_factor} </quotient>"
-        back_emf = f"<quotient> {scaled(k, 'motor/propeller-rad_sec')} {speed_factor} </quotient>"
-        drive_power = product(
+        drive = f"<quotient> {scale(-k / r, 'motor/input-v')} {speed_factor} </quotient>"
+        back_emf = f"<quotient> {scale(k, 'motor/propeller-rad_sec')} {speed_factor} </quotient>"
+        drive_power = multiply(
             f"<v> {number(self.power_ratio)} </v>",
             factor("drive-power"),
             factor("thrust"),
             "<p> motor/input-v </p>",
             "<p> motor/current-a </p>",
         )
-        avionics = product(f"<v> {number(self.avionics)} </v>", factor("avionics-power"))
+        avionics = multiply(f"<v> {number(self.avionics)} </v>", factor("avionics-power"))
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
-    <function name="motor/input-v"> {product("<p> motor/battery-v </p>", "<p> motor/throttle-norm </p>")} </function>
+    <function name="motor/input-v"> {multiply("<p> motor/battery-v </p>", "<p> motor/throttle-norm </p>")} </function>
 {_torque_xml(self.propeller)}
     <!-- Propeller speed with current flowing, and at none: the root of Q = KQ ((V - w KV) / R - i0), and of Q = -KQ i0.
          The current does not brake: of the two speeds the larger. -->
     <function name="motor/loss-n_m"> {losses} </function>
-    <function name="motor/b"> {total("<p> motor/q1 </p>", linear)} </function>
+    <function name="motor/b"> {add("<p> motor/q1 </p>", linear)} </function>
     <function name="motor/driven-rad_sec">
-      {_root_xml("motor/b", total("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>", drive))}
+      {_root_xml("motor/b", add("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>", drive))}
     </function>
     <function name="motor/windmill-rad_sec">
-      {_root_xml("motor/q1", total("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>"))}
+      {_root_xml("motor/q1", add("<p> motor/q0 </p>", "<p> motor/loss-n_m </p>"))}
     </function>
     <function name="motor/propeller-rad_sec">
       <max>
         <v> 0 </v> <p> motor/driven-rad_sec </p>
-        <difference> <p> motor/windmill-rad_sec </p> {scaled(1e9, "motor/braking")} </difference>
+        <difference> <p> motor/windmill-rad_sec </p> {scale(1e9, "motor/braking")} </difference>
       </max>
     </function>
     <function name="motor/current-a">
       <max>
-        {scaled(-1e6, "motor/braking")}
+        {scale(-1e6, "motor/braking")}
         <quotient> <difference> <p> motor/input-v </p> {back_emf} </difference> <v> {number(r)} </v> </quotient>
       </max>
     </function>
     <!-- Power of the drive, for more thrust more, and of autopilot, radios and servos. -->
-    <function name="motor/battery-power-w"> {total(drive_power, avionics)} </function>
+    <function name="motor/battery-power-w"> {add(drive_power, avionics)} </function>
     <function name="motor/battery-current-a">
       <quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>
     </function>
@@ -215,7 +217,7 @@ class FuelEngine:
         """Return the propeller speed, rad/s."""
         square, linear, constant = self.propeller.torque_parabola(airspeed, rho)
         driving = throttle * self.torque * rho / _SEA_LEVEL_DENSITY
-        return max(0.0, root(square, linear, constant + self.friction - driving))
+        return max(0.0, larger_root(square, linear, constant + self.friction - driving))
 
     def thrust(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the thrust, N."""
@@ -232,8 +234,8 @@ class FuelEngine:
         factor = _factor_element(factors)
         speed_factor = factor("motor-speed")
         factors_xml = (speed_factor, speed_factor, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
-        constant = total("<p> motor/q0 </p>", f"<v> {number(self.friction)} </v>", scaled(-1.0, "motor/drive-n_m"))
-        heat = product(
+        constant = add("<p> motor/q0 </p>", f"<v> {number(self.friction)} </v>", scale(-1.0, "motor/drive-n_m"))
+        heat = multiply(
             f"<v> {number(1.0 / self.efficiency)} </v>",
             factor("drive-power"),
             factor("thrust"),
@@ -242,7 +244,7 @@ class FuelEngine:
         )
         return f"""    <!-- The engine's torque at this throttle and density; the air turns an idle one. -->
     <function name="motor/drive-n_m">
-      {product(f"<v> {number(self.torque / _SEA_LEVEL_DENSITY)} </v>", *factors_xml)}
+      {multiply(f"<v> {number(self.torque / _SEA_LEVEL_DENSITY)} </v>", *factors_xml)}
     </function>
 {_torque_xml(self.propeller)}
     <function name="motor/driven-rad_sec">
@@ -283,24 +285,24 @@ class ActuatorDisc:
     def functions(self, factors: tuple[str, ...]) -> str:
         """Return the JSBSim functions."""
         factor = _factor_element(factors)
-        speed = product(f"<v> {number(self.exit_speed)} </v>", factor("motor-speed"))
+        speed = multiply(f"<v> {number(self.exit_speed)} </v>", factor("motor-speed"))
         air = "<p> motor/airspeed-mps </p>"
         exit_speed = (
-            total(air, product("<p> motor/throttle-norm </p>", f"<difference> {speed} {air} </difference>"))
+            add(air, multiply("<p> motor/throttle-norm </p>", f"<difference> {speed} {air} </difference>"))
             if self.ducted
-            else product(speed, "<p> motor/throttle-norm </p>")
+            else multiply(speed, "<p> motor/throttle-norm </p>")
         )
         exit_air = "<p> motor/exit-mps </p>"
-        first_factor = exit_air if self.ducted else total(exit_air, air)
+        first_factor = exit_air if self.ducted else add(exit_air, air)
         coefficient = number(0.5 * self.area * self.coefficient)
-        thrust = product(
+        thrust = multiply(
             f"<v> {coefficient} </v>",
             factor("thrust"),
             "<p> motor/rho-kg_m3 </p>",
             first_factor,
             f"<difference> {exit_air} {air} </difference>",
         )
-        power = product(f"<v> {number(0.5 / self.efficiency)} </v>", "<p> motor/thrust-n </p>", total(exit_air, air))
+        power = multiply(f"<v> {number(0.5 / self.efficiency)} </v>", "<p> motor/thrust-n </p>", add(exit_air, air))
         return f"""    <property value="{number(self.volts)}"> motor/battery-v </property>
     <function name="motor/exit-mps"> {exit_speed} </function>
     <function name="motor/thrust-n"> <max> <v> 0 </v> {thrust} </max> </function>
@@ -342,13 +344,13 @@ class ShaftPower:
         factor = _factor_element(factors)
         d = self.diameter
         speed_factor = factor("motor-speed")
-        shaft = product(
+        shaft = multiply(
             speed_factor,
             speed_factor,
             speed_factor,
             f"<max> <v> 0 </v> {_polynomial_xml(self.shaft, '<p> motor/throttle-norm </p>')} </max>",
         )
-        thrust = product(
+        thrust = multiply(
             f"<v> {number(d**4)} </v>",
             factor("thrust"),
             "<p> motor/rho-kg_m3 </p>",
@@ -363,7 +365,7 @@ class ShaftPower:
       <pow>
         <quotient>
           <p> motor/shaft-power-w </p>
-          {scaled(d * d, "motor/rho-kg_m3", "motor/flow-mps", "motor/flow-mps", "motor/flow-mps")}
+          {scale(d * d, "motor/rho-kg_m3", "motor/flow-mps", "motor/flow-mps", "motor/flow-mps")}
         </quotient>
         <v> 0.333333333333333 </v>
       </pow>
@@ -378,14 +380,14 @@ class ShaftPower:
       </table>
     </function>
     <function name="motor/turns-1_s">
-      <quotient> <p> motor/flow-mps </p> {scaled(d, "motor/advance")} </quotient>
+      <quotient> <p> motor/flow-mps </p> {scale(d, "motor/advance")} </quotient>
     </function>
-    <function name="motor/propeller-rad_sec"> {scaled(_RAD_PER_TURN, "motor/turns-1_s")} </function>
+    <function name="motor/propeller-rad_sec"> {scale(_RAD_PER_REVOLUTION, "motor/turns-1_s")} </function>
     <function name="motor/thrust-n"> {thrust} </function>
     <function name="motor/torque-n_m">
       <quotient> <p> motor/shaft-power-w </p> <p> motor/propeller-rad_sec </p> </quotient>
     </function>
-    <function name="motor/battery-power-w"> {scaled(1.0 / self.efficiency, "motor/shaft-power-w")} </function>
+    <function name="motor/battery-power-w"> {scale(1.0 / self.efficiency, "motor/shaft-power-w")} </function>
     <function name="motor/battery-current-a">
       <quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>
     </function>"""
@@ -424,7 +426,7 @@ def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
     *lower_coefficients, leading_coefficient = coefficients
     text = f"<v> {number(leading_coefficient)} </v>"
     for coefficient in reversed(lower_coefficients):
-        text = total(f"<v> {number(coefficient)} </v>", product(x, text))
+        text = add(f"<v> {number(coefficient)} </v>", multiply(x, text))
     return text
 
 
@@ -433,16 +435,16 @@ def _torque_xml(propeller: Propeller) -> str:
     square, linear, constant = propeller.torque_parabola(1.0, 1.0)
     rho, air = "motor/rho-kg_m3", "motor/airspeed-mps"
     return f"""    <!-- Torque of the propeller of {number(propeller.diameter)} m, q2 w^2 + q1 w + q0 at w rad/s. -->
-    <function name="motor/q2"> {scaled(square, rho)} </function>
-    <function name="motor/q1"> {scaled(linear, rho, air)} </function>
-    <function name="motor/q0"> {scaled(constant, rho, air, air)} </function>"""
+    <function name="motor/q2"> {scale(square, rho)} </function>
+    <function name="motor/q1"> {scale(linear, rho, air)} </function>
+    <function name="motor/q0"> {scale(constant, rho, air, air)} </function>"""
 
 
 def _root_xml(linear: str, constant: str) -> str:
     """Return the larger root of ``motor/q2`` w^2 + linear w + constant; clip the discriminant at 0."""
     discriminant = f"""<difference>
-              {product(f"<p> {linear} </p>", f"<p> {linear} </p>")}
-              {product("<v> 4 </v>", "<p> motor/q2 </p>", constant)}
+              {multiply(f"<p> {linear} </p>", f"<p> {linear} </p>")}
+              {multiply("<v> 4 </v>", "<p> motor/q2 </p>", constant)}
             </difference>"""
     return f"""<quotient>
         <difference>
@@ -451,7 +453,7 @@ def _root_xml(linear: str, constant: str) -> str:
           </max> </sqrt>
           <p> {linear} </p>
         </difference>
-        {scaled(2.0, "motor/q2")}
+        {scale(2.0, "motor/q2")}
       </quotient>"""
 
 
@@ -459,19 +461,19 @@ def _thrust_and_torque_xml(propeller: Propeller, windmill: float, factor: Callab
     d, (c0, c1, c2) = propeller.diameter, propeller.thrust
     braking = "<min> <v> 0 </v> <p> motor/pull-n </p> </min>"
     w, air = "motor/propeller-rad_sec", "motor/airspeed-mps"
-    thrust = total(
-        scaled(c0 * d**4 / _RAD_PER_TURN**2, w, w),
-        scaled(c1 * d**3 / _RAD_PER_TURN, air, w),
-        scaled(c2 * d**2, air, air),
+    thrust = add(
+        scale(c0 * d**4 / _RAD_PER_REVOLUTION**2, w, w),
+        scale(c1 * d**3 / _RAD_PER_REVOLUTION, air, w),
+        scale(c2 * d**2, air, air),
     )
     return f"""    <!-- T = rho n^2 D^4 CT(V / n D); below zero the idle propeller's drag. -->
-    <function name="motor/pull-n"> {product("<p> motor/rho-kg_m3 </p>", factor("thrust"), thrust)} </function>
+    <function name="motor/pull-n"> {multiply("<p> motor/rho-kg_m3 </p>", factor("thrust"), thrust)} </function>
     <function name="motor/thrust-n">
       <sum>
         <max> <v> 0 </v> <p> motor/pull-n </p> </max>
-        {product(f"<v> {number(windmill)} </v>", factor("windmill-drag"), braking)}
+        {multiply(f"<v> {number(windmill)} </v>", factor("windmill-drag"), braking)}
       </sum>
     </function>
     <function name="motor/torque-n_m">
-      <sum> {scaled(1.0, "motor/q2", w, w)} {scaled(1.0, "motor/q1", w)} <p> motor/q0 </p> </sum>
+      <sum> {scale(1.0, "motor/q2", w, w)} {scale(1.0, "motor/q1", w)} <p> motor/q0 </p> </sum>
     </function>"""

@@ -18,11 +18,11 @@ from world.errors import FlightError, PlanflyError
 from world.files import did_you_mean, read_small_file, read_toml, utf8_text
 
 # Files with uncertainties; the first that exists applies.
-FILES = ("posterior.toml", "uncertainty.toml")
+UNCERTAINTY_FILES = ("posterior.toml", "uncertainty.toml")
 # File of draws.
 DRAWS_FILE = "draws.csv"
 # Number of draws.
-DRAWS = 512
+DRAW_COUNT = 512
 # Standard deviation of the logarithm of the power of an aircraft from a data sheet whose file states none: the root
 # mean square error of `benchmarks/real_power.py`.
 POWER_SD = 0.35
@@ -73,21 +73,21 @@ class Uncertainty:
     """Uncertainty of an aircraft.
 
     source: source of the model: "a data sheet", "flight logs".
-    climb, descent: standard deviations of the steepest climb and descent at cruise, rad.
+    climb_sd, descent_sd: standard deviations of the steepest climb and descent at cruise, rad.
     quantities: uncertain properties of the model.
-    power: standard deviation of the logarithm of the power in flight.
-    fastest: standard deviation of the fastest level flight, m/s.
+    power_sd: standard deviation of the logarithm of the power in flight.
+    max_speed_sd: standard deviation of the fastest level flight, m/s.
     battery_guessed: True if the battery's energy was not stated.
     climb_guessed: True if the steepest climb was not stated.
     """
 
     source: str
-    climb: float
-    descent: float
+    climb_sd: float
+    descent_sd: float
     quantities: tuple[UncertainQuantity, ...] = ()
-    power: float = 0.0
+    power_sd: float = 0.0
     battery_guessed: bool = False
-    fastest: float = 0.0
+    max_speed_sd: float = 0.0
     climb_guessed: bool = False
 
 
@@ -100,7 +100,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     >>> read_uncertainty(load_aircraft("aerosonde").folder) is None
     True
     """
-    file = next((folder / name for name in FILES if (folder / name).is_file()), None)
+    file = next((folder / name for name in UNCERTAINTY_FILES if (folder / name).is_file()), None)
     if file is None:
         return None
     try:
@@ -109,7 +109,7 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
         raise FlightError(f"{file}: {error.strerror}", file=file) from None
     except ValueError as error:
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
-    source = table.get("source", "flight logs" if file.name == FILES[0] else "a data sheet")
+    source = table.get("source", "flight logs" if file.name == UNCERTAINTY_FILES[0] else "a data sheet")
     if not isinstance(source, str) or not source.strip():
         raise FlightError.at(str(file), "source", source, "expected a text", shown=repr(source))
     _check_keys(table, file)
@@ -124,17 +124,17 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise FlightError.at(str(file), "quantity", entries, "expected [[quantity]] tables", shown=repr(entries)[:60])
     quantities = tuple(_read_quantity(entry, file) for entry in entries)
-    power_sd = POWER_SD if file.name == FILES[1] else 0.0
+    power_sd = POWER_SD if file.name == UNCERTAINTY_FILES[1] else 0.0
     if "power_sd" in table:
         power_sd = _read_number(table, "power_sd", file, 0.0, 1.0)
     # Older folders have no fastest_sd_mps.
     max_speed_sd = _read_number(table, "fastest_sd_mps", file, 0.0, 100.0) if "fastest_sd_mps" in table else 0.0
-    return Uncertainty(source, climb_sd, descent_sd, quantities, power_sd, fastest=max_speed_sd, **guesses)
+    return Uncertainty(source, climb_sd, descent_sd, quantities, power_sd, max_speed_sd=max_speed_sd, **guesses)
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
     """Raise FlightError if a required deviation is missing, which would mean certainty, or a key is unknown."""
-    known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == FILES[0] else frozenset())
+    known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == UNCERTAINTY_FILES[0] else frozenset())
     missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
     suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
     # A misspelled key is missing as well; the spelling is the better message.
@@ -176,11 +176,11 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
         "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
         "",
         f'source = "{uncertainty.source}"',
-        f"climb_sd_deg = {math.degrees(uncertainty.climb):.2f}    # of the steepest climb at cruise, one standard"
+        f"climb_sd_deg = {math.degrees(uncertainty.climb_sd):.2f}    # of the steepest climb at cruise, one standard"
         " deviation",
-        f"descent_sd_deg = {math.degrees(uncertainty.descent):.2f}  # of the steepest descent",
-        f"fastest_sd_mps = {uncertainty.fastest:.2f}  # of the fastest level flight",
-        f"power_sd = {uncertainty.power:.3g}  # of the logarithm of the power that flight takes",
+        f"descent_sd_deg = {math.degrees(uncertainty.descent_sd):.2f}  # of the steepest descent",
+        f"fastest_sd_mps = {uncertainty.max_speed_sd:.2f}  # of the fastest level flight",
+        f"power_sd = {uncertainty.power_sd:.3g}  # of the logarithm of the power that flight takes",
     ]
     if uncertainty.climb_guessed:
         lines.append("climb_guessed = true  # --climb states it")
@@ -226,7 +226,7 @@ class Draws:
         return tuple(zip(self.names, self.values[self.row(seed)].tolist(), strict=True))
 
 
-def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAWS, seed: int = 1) -> Draws:
+def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW_COUNT, seed: int = 1) -> Draws:
     """Draw each quantity independently: a factor log-normally with the estimate as median, others normally.
 
     >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)

@@ -10,28 +10,28 @@ def number(value: float) -> str:
     return f"{value + 0.0:.12g}"
 
 
-def product(*parts: str) -> str:
-    """Return the product of some elements.
+def multiply(*parts: str) -> str:
+    """Return an element for the product of elements.
 
-    >>> product("<p> a </p>", "<v> 2 </v>")
+    >>> multiply("<p> a </p>", "<v> 2 </v>")
     '<product> <p> a </p> <v> 2 </v> </product>'
     """
     return f"<product> {' '.join(parts)} </product>"
 
 
-def scaled(value: float, *properties: str) -> str:
-    """Return the product of a number and properties.
+def scale(value: float, *properties: str) -> str:
+    """Return an element for the product of a number and properties.
 
-    >>> scaled(2.0, "x", "y")
+    >>> scale(2.0, "x", "y")
     '<product> <v> 2 </v> <p> x </p> <p> y </p> </product>'
     """
-    return product(f"<v> {number(value)} </v>", *(f"<p> {name} </p>" for name in properties))
+    return multiply(f"<v> {number(value)} </v>", *(f"<p> {name} </p>" for name in properties))
 
 
-def total(*parts: str) -> str:
-    """Return the sum of some elements.
+def add(*parts: str) -> str:
+    """Return an element for the sum of elements.
 
-    >>> total("<v> 1 </v>", "<p> a </p>")
+    >>> add("<v> 1 </v>", "<p> a </p>")
     '<sum> <v> 1 </v> <p> a </p> </sum>'
     """
     return f"<sum> {' '.join(parts)} </sum>"

@@ -14,7 +14,7 @@ import numpy as np
 from aircraft.data_sheet import CLASSES, SHEET_DENSITY, VISCOSITY
 from aircraft.envelope import GRAVITY
 from aircraft.model_writer import Layout
-from aircraft.power_prior import LEAST_DRAG_LOG_SD, POWER_PRIOR, PowerPrior, power_log_sd
+from aircraft.power_prior import MIN_DRAG_LOG_SD, POWER_PRIOR, PowerPrior, power_log_sd
 from world.arrays import Floats
 
 # Published facts of real aircraft.
@@ -95,7 +95,7 @@ def predict_power(prior: PowerPrior, real: RealAircraft) -> tuple[float, float]:
     """Predict the power in level flight, W, and the standard deviation of its logarithm."""
     pressure, aspect = 0.5 * SHEET_DENSITY * real.cruise**2, real.span**2 / real.area
     lift = real.mass * GRAVITY / (pressure * real.area)
-    least = prior.least_drag(real.layout, aspect, real.cruise * real.area / real.span / VISCOSITY)
+    least = prior.min_drag_coefficient(real.layout, aspect, real.cruise * real.area / real.span / VISCOSITY)
     induced = lift**2 / (math.pi * CLASSES[real.layout].oswald * aspect)
     drag_power = pressure * real.area * (least + induced) * real.cruise
     power = drag_power / prior.drive_efficiency(real.mass) + prior.avionics
@@ -130,7 +130,7 @@ def fit_prior(known: list[RealAircraft], drags: tuple[MeasuredDrag, ...] = DRAGS
         predicted = [predict_power(prior, real) for real in known]
         power_errors = [math.log(power / real.power) / sd for (power, sd), real in zip(predicted, known, strict=True)]
         drag_errors = [
-            math.log(prior.least_drag(one.layout, one.aspect, one.reynolds) / one.drag) / LEAST_DRAG_LOG_SD
+            math.log(prior.min_drag_coefficient(one.layout, one.aspect, one.reynolds) / one.drag) / MIN_DRAG_LOG_SD
             for one in drags
         ]
         return np.concatenate([power_errors, drag_errors, (values - mean) / deviations])

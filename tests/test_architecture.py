@@ -39,7 +39,7 @@ LONGER = {
     "flight/mission/route.py:with_end_courses": 61,
     "flight/simulation/simulate.py:make_loop": 98,
     "logs/recording/reader.py:read_log": 63,
-    "logs/verdict/returns/glide_reach.py:_fill_reach": 78,
+    "logs/verdict/returns/glide_reach.py:_fill_altitudes_left": 78,
     "logs/verdict/rules/completion_rule.py:imported_completion_finding": 64,
     "logs/verdict/rules/ground_ways_rule.py:approach_findings": 77,
     "logs/verdict/rules/ground_ways_rule.py:climbout_findings": 62,

@@ -48,7 +48,7 @@ POPULATION = 120
 # Partitions of the reference directions of MOEA/D.
 PARTITIONS = 7
 # Neighbours of MOEA/D.
-NEIGHBOURS = 15
+NEIGHBOUR_COUNT = 15
 # Weight of violations in MOEA/D's objectives, which are fractions of the reference box.
 PENALTY = 100.0
 
@@ -107,7 +107,7 @@ def _scenario(name: str) -> Scenario:
 def make_contest(scenario: Scenario, front: Front) -> Contest:
     """Make the contest of a problem, with the box of its default plan."""
     default = front.default
-    task = fit_margins(front_task(scenario, load_airframe(scenario).limits.surely()), default.plan.waypoints)
+    task = fit_margins(front_task(scenario, load_airframe(scenario).limits.with_margin()), default.plan.waypoints)
     space = task.problem.space
     straight = float(np.sqrt(((space.destination - space.start) ** 2).sum()))
     ends = np.stack([[end, end] for end in (space.start, space.destination)])
@@ -121,7 +121,7 @@ def make_contest(scenario: Scenario, front: Front) -> Contest:
 def ours(name: str, seed: int) -> tuple[Front, Contest, Row]:
     """Plan planfly's front of a problem; return it with its contest and its row."""
     scenario = _scenario(name)
-    limits = load_airframe(scenario).limits.surely()
+    limits = load_airframe(scenario).limits.with_margin()
     began = time.process_time()
     front = plan_front(scenario, limits, COUNT, seed=seed)
     seconds = time.process_time() - began
@@ -207,7 +207,7 @@ def _engine(algorithm: str, seeds: Floats, low: Floats, high: Floats, seed: int)
     first[: min(POPULATION, len(seeds))] = seeds[:POPULATION]
     if algorithm == "MOEA/D":
         towards = get_reference_directions("uniform", 4, n_partitions=PARTITIONS)
-        return MOEAD(towards, n_neighbors=NEIGHBOURS, sampling=first)
+        return MOEAD(towards, n_neighbors=NEIGHBOUR_COUNT, sampling=first)
     return NSGA2(pop_size=POPULATION, sampling=first)
 
 

@@ -49,10 +49,10 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     uncertainty = read_uncertainty(aircraft.folder)
     return Envelope(
         source="" if uncertainty is None else uncertainty.source,
-        climb_sd=0.0 if uncertainty is None else uncertainty.climb,
-        descent_sd=0.0 if uncertainty is None else uncertainty.descent,
-        fastest_sd=0.0 if uncertainty is None else uncertainty.fastest,
-        power_sd=0.0 if uncertainty is None else uncertainty.power,
+        climb_sd=0.0 if uncertainty is None else uncertainty.climb_sd,
+        descent_sd=0.0 if uncertainty is None else uncertainty.descent_sd,
+        fastest_sd=0.0 if uncertainty is None else uncertainty.max_speed_sd,
+        power_sd=0.0 if uncertainty is None else uncertainty.power_sd,
         battery_guessed=uncertainty is not None and uncertainty.battery_guessed,
         climb_guessed=uncertainty is not None and uncertainty.climb_guessed,
         aircraft=aircraft.name,

@@ -295,7 +295,7 @@ def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | 
     footprint = drawn_returns.glides.footprint
     if footprint is not None and terrain is not None:
         for band in footprint.bands():
-            _add_parts(entity, BAND_ROLES[band.up_to], band.parts, terrain)
+            _add_parts(entity, BAND_ROLES[band.max_height], band.parts, terrain)
         _add_parts(entity, "landable", footprint.landings(), terrain)
     return _encode_update(entity)
 

@@ -463,7 +463,7 @@ def suggest_level_flight_speed(
     commanded = float(requirements.setup.route.airspeed[leg])
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     envelope = requirements.setup.envelope
-    certain_envelope = envelope.surely() if finding.check == UNKNOWN_AIRCRAFT else envelope
+    certain_envelope = envelope.with_margin() if finding.check == UNKNOWN_AIRCRAFT else envelope
     min_speed, max_speed = (
         speed / _true_airspeed_ratio(requirements, leg) for speed in certain_envelope.level_speeds(altitude)
     )

@@ -95,7 +95,7 @@ SPEED_TOLERANCE_MPS = 1.0
 GUST_SPEED_FRACTION = 0.15
 # Standard deviations.  A slope is undecided if it is closer than this to the limit of an uncertain aircraft model: 95 %
 # one-sided, of a normal distribution.  Plans keep the same distance, so the value is the envelope's.
-UNDECIDED_FRACTION = envelope.UNDECIDED
+UNDECIDED_FRACTION = envelope.UNDECIDED_SIGMAS
 # s.  A climb at full throttle, or a glide without throttle, of this length shows the aircraft's ability: the speed
 # settles in 5 s, and the gusts of 15 s average out.
 MIN_EVIDENCE_FLIGHT_S = 20.0

@@ -70,8 +70,8 @@ def footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]
         return []
     layers, place = [], "home, rally point or landing" if len(drawn_returns.glides.sites) > 1 else "home"
     for band in footprint.bands(*extent):
-        name = f"{place} in reach from {band.up_to:.0f} m above ground"
-        layers.append(_area_layer(name, BAND_ROLES[band.up_to], band.parts))
+        name = f"{place} in reach from {band.max_height:.0f} m above ground"
+        layers.append(_area_layer(name, BAND_ROLES[band.max_height], band.parts))
     flat_parts = footprint.landings(*extent)
     return layers + (
         [_area_layer("flat ground according to the elevation file", "landable", flat_parts)] if flat_parts else []

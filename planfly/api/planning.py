@@ -183,7 +183,7 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
     """
     if plan.feasible:
         return ()
-    return tuple(explain_failure(plan, load_airframe(plan.scenario).limits.surely()))
+    return tuple(explain_failure(plan, load_airframe(plan.scenario).limits.with_margin()))
 
 
 def scenarios() -> dict[str, str]:

@@ -19,9 +19,9 @@ from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import (
-    causes_text,
+    describe_causes,
+    describe_landing,
     headline,
-    landing_text,
     point_of_no_return_text,
     range_text,
     remedy_text,
@@ -96,7 +96,7 @@ class ReturnsFound:
     @property
     def cause_lines(self) -> tuple[str, ...]:
         """Lines on the triggers of a return, the settings that trigger none, and the end of a return."""
-        return (*causes_text(self.returns.causes), *landing_text(self.returns))
+        return (*describe_causes(self.returns.causes), *describe_landing(self.returns))
 
     @property
     def range_lines(self) -> tuple[str, ...]:

@@ -275,13 +275,13 @@ def _print_sheet(aircraft: "Aircraft") -> None:
         f" up to {aircraft.airspeed_max:g} m/s"
     )
     if uncertainty is not None:
-        climb_sd, descent_sd = math.degrees(uncertainty.climb), math.degrees(uncertainty.descent)
+        climb_sd, descent_sd = math.degrees(uncertainty.climb_sd), math.degrees(uncertainty.descent_sd)
         print(
             f"  slopes   climb {climb:.1f} degrees ± {climb_sd:.1f}; descent {descent:.1f} ± "
             f"{descent_sd:.1f} (at cruise and 500 m; one standard deviation)"
         )
         power = envelope.power(aircraft.airspeed, 500.0, 0.0)
-        lower, upper = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power) for sign in (-1.0, 1.0))
+        lower, upper = (power * math.exp(sign * _INTERVAL_SIGMAS * uncertainty.power_sd) for sign in (-1.0, 1.0))
         source = "from the battery" if aircraft.battery_voltage else "of fuel heat"
         print(f"  power    {power:.3g} W {source} in level flight at cruise, {lower:.3g} to {upper:.3g} (95 %)")
     print("  guessed  README.md lists the guessed values and their possible error")

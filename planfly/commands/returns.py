@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from planfly import ReturnsFound
 
 # Maximum number of ranges of seconds that are listed.
-_MAX_LISTED = 20
+_MAX_LISTED_RANGES = 20
 
 
 def returns_options(command_line: LineParser) -> None:
@@ -101,10 +101,10 @@ def returns(args: argparse.Namespace) -> int:
         print(f"  {text}")
     for text in result.cause_lines:
         print(f"  {text}")
-    for text in result.range_lines[:_MAX_LISTED]:
+    for text in result.range_lines[:_MAX_LISTED_RANGES]:
         print(f"  {text}")
-    if len(result.range_lines) > _MAX_LISTED:
-        print(f"  and {len(result.range_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
+    if len(result.range_lines) > _MAX_LISTED_RANGES:
+        print(f"  and {len(result.range_lines) - _MAX_LISTED_RANGES} ranges more; --json FILE has them all")
     for text in result.program_lines:
         print(f"  {text}")
     print(f"  {result.no_return_line}")
@@ -113,10 +113,10 @@ def returns(args: argparse.Namespace) -> int:
     if args.suggest and not result.safe and not result.suggested:
         print("  no RTL_ALTITUDE, climb or set of rally points that would help was found")
     print(f"engine out: {result.glide_headline}")
-    for text in result.glide_lines[:_MAX_LISTED]:
+    for text in result.glide_lines[:_MAX_LISTED_RANGES]:
         print(f"  {text}")
-    if len(result.glide_lines) > _MAX_LISTED:
-        print(f"  and {len(result.glide_lines) - _MAX_LISTED} ranges more; --json FILE has them all")
+    if len(result.glide_lines) > _MAX_LISTED_RANGES:
+        print(f"  and {len(result.glide_lines) - _MAX_LISTED_RANGES} ranges more; --json FILE has them all")
     for text in result.notes:
         print(f"  note    {text}")
     for path in result.files:

@@ -79,8 +79,8 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "fronts": (
         *_PROBLEM_KERNELS,
         "planner.evaluation.front_scores._fill",
-        "planner.optimisers.hypervolume._covered",
-        "planner.optimisers.hypervolume._greedy",
+        "planner.optimisers.hypervolume._mark_covered_probes",
+        "planner.optimisers.hypervolume._choose_rows_greedily",
     ),
     "paper": (*_PROBLEM_KERNELS, "planner.evaluation.paper_scores._score_paths"),
     "flight": (
@@ -122,7 +122,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "flight.autopilots.arduplane.rtl_point_mass.fly_stages",
         _GLIDES_MODULE + "glide_map._fill_slopes",
         _GLIDES_MODULE + "glide_map._settle_cells",
-        _GLIDES_MODULE + "glide_reach._fill_reach",
+        _GLIDES_MODULE + "glide_reach._fill_altitudes_left",
         "world.highest_ground._fill_cells",
     ),
 }

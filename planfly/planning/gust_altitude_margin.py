@@ -139,7 +139,7 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
     24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
-    climb_rate, min_climb_rate = airframe.limits.surely().rates(amsl)[0], LEAST_SIGMAS * gust_deviation(turbulence)
+    climb_rate, min_climb_rate = airframe.limits.with_margin().rates(amsl)[0], LEAST_SIGMAS * gust_deviation(turbulence)
     if climb_rate >= min_climb_rate or not airframe.autopilot.gust_sink(climb_rate, turbulence):
         return ""
     return (
@@ -199,7 +199,7 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UN
 
     unused_fraction: maximum fraction of the maximum climb rate that is left unused for downdrafts.
     """
-    limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
+    limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
     climb, sink = limits.rates(float(plan.waypoints[:, 2].max()))
     deviation = gust_deviation(turbulence)
     for gust, displacement in _gust_displacements(plan.scenario, autopilot):
@@ -220,7 +220,7 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UN
 
 def limits_of_alternatives(plan: Plan, airframe: Airframe) -> Limits:
     """Return search limits for alternatives to a safe plan: the tightest limits that this plan meets."""
-    limits = airframe.limits.surely()
+    limits = airframe.limits.with_margin()
     if not _gusts_matter(plan, airframe):
         return limits
     for unused_fraction in (_UNUSED_CLIMB_FRACTION, _UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT):
@@ -253,7 +253,7 @@ class _Parts(NamedTuple):
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
     """Find the deepest displacement by gusts into each kind of hazard."""
-    limits, autopilot, turbulence = airframe.limits.surely(), airframe.autopilot, plan.scenario.wind.turbulence
+    limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
     rates = np.array([limits.rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
     climbs, shortfalls = limits.climb_rates(plan.waypoints), list[Shortfall | None]()

@@ -52,7 +52,7 @@ def limit_waypoint_orbits(
     >>> limit_waypoint_orbits(plan, airframe) is plan
     True
     """
-    autopilot, limits = airframe.autopilot, airframe.limits.surely()
+    autopilot, limits = airframe.autopilot, airframe.limits.with_margin()
     orbits = expected_orbits(plan, autopilot, limits)
     if not plan.safe or orbits == 0.0:
         return plan
@@ -85,7 +85,7 @@ def _with_problem(plan: Plan, problem: str) -> Plan:
 
 def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
     """Return True if few enough orbits are expected, and the aircraft stays in the corridor at every corner."""
-    if expected_orbits(plan, airframe.autopilot, airframe.limits.surely()) > MAX_EXPECTED_ORBITS:
+    if expected_orbits(plan, airframe.autopilot, airframe.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
     return max(_excursions(plan, airframe), default=0.0) <= _plan_corridor_half_width(plan, airframe)
 
@@ -142,7 +142,7 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     22
     """
     scenario, count = plan.scenario, len(plan.waypoints)
-    climb, sink = airframe.limits.surely().rates(float(plan.waypoints[:, 2].max()))
+    climb, sink = airframe.limits.with_margin().rates(float(plan.waypoints[:, 2].max()))
     probability = airframe.autopilot.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
     if probability == 0.0:
         return count

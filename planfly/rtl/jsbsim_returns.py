@@ -82,26 +82,26 @@ def return_setup(
 def positions_from_start(track: Track, start: Record) -> Floats | None:
     """Return the positions (t, 3) from the start of the return on, or None if the flight does not reach the start."""
     start_position = np.array([float(start["east"]), float(start["north"])])
-    start_distances = np.hypot(*(track.position[: round(2.0 * LEAD_IN_LENGTH_M / 10.0 * 60.0), :2] - start_position).T)
-    if not start_distances.size or float(start_distances.min()) > _MAX_START_DISTANCE_M:
+    distances = np.hypot(*(track.position[: round(2.0 * LEAD_IN_LENGTH_M / 10.0 * 60.0), :2] - start_position).T)
+    if not distances.size or float(distances.min()) > _MAX_START_DISTANCE_M:
         return None
-    position: Floats = track.position[int(np.argmin(start_distances)) :]
-    return None if abs(float(position[0, 2]) - float(start["up"])) > _MAX_START_HEIGHT_ERROR_M else position
+    positions: Floats = track.position[int(np.argmin(distances)) :]
+    return None if abs(float(positions[0, 2]) - float(start["up"])) > _MAX_START_HEIGHT_ERROR_M else positions
 
 
-def nearest_approaches(world: ReturnWorld, position: Floats) -> NearestApproaches:
+def nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproaches:
     """Find the nearest approaches of a path to ground and missiles.  position: path points, (t, 3), m."""
     clearance, lowest_position = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
-        heights = position[:, 2] - world.scenario.terrain.height(position[:, 0], position[:, 1])
+        heights = positions[:, 2] - world.scenario.terrain.height(positions[:, 0], positions[:, 1])
         lowest_row = int(np.argmin(heights))
-        clearance, (east, north, altitude) = float(heights[lowest_row]), position[lowest_row].tolist()
+        clearance, (east, north, altitude) = float(heights[lowest_row]), positions[lowest_row].tolist()
         lowest_position = east, north, altitude
     min_distance, threat = math.inf, -1
     threats = world.scenario.threats
     for index in np.flatnonzero(threats.kill_radius > 0.0):
         distance = float(
-            (np.linalg.norm(position - threats.position[index], axis=1) - threats.kill_radius[index]).min()
+            (np.linalg.norm(positions - threats.position[index], axis=1) - threats.kill_radius[index]).min()
         )
         if distance < min_distance:
             min_distance, threat = distance, int(index)

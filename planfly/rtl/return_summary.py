@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.returns.drawn_returns import DrawnReturns, draw_returns_without_glides, drawn_returns
+from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
@@ -20,7 +20,7 @@ def return_starts(setup: FlightSetup, track: Track | None, interval: float) -> R
 
 
 # Number of returns in the summary and its pictures.
-_SUMMARY_RETURNS = 50
+_SUMMARY_RETURN_COUNT = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,11 +42,11 @@ class ReturnSummary:
             return None
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
-    def draw_returns_without_glides(self) -> DrawnReturns | None:
+    def drawn_returns_without_glides(self) -> DrawnReturns | None:
         """Return the data of the pictures without glides and minimum heights, within some hundredths of a second."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
-        return draw_returns_without_glides(self.world, self.starts, self.returns)
+        return drawn_returns_without_glides(self.world, self.starts, self.returns)
 
 
 def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
@@ -58,14 +58,14 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
         duration = setup.path.length / max(1.0, setup.airspeed)
         if track is not None and len(track):
             duration = float(track.time[-1] - track.time[0])
-        interval = max(1.0, duration / _SUMMARY_RETURNS)
+        interval = max(1.0, duration / _SUMMARY_RETURN_COUNT)
         starts = return_starts(setup, track, interval)
         returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
     names_stand_in = world.stands_in and not world.has_other_law
-    stands_in = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if names_stand_in else ""
-    return ReturnSummary(headline(returns) + stands_in, world, starts, returns)
+    stand_in_text = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if names_stand_in else ""
+    return ReturnSummary(headline(returns) + stand_in_text, world, starts, returns)
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:

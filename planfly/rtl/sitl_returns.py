@@ -31,7 +31,7 @@ from logs.verdict.returns.judge_returns import (
     badness,
     classify_return,
     distance_to_limit,
-    is_steady,
+    is_reachable_start,
     most_violated_zone,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
@@ -46,7 +46,7 @@ from world.scenario import Scenario
 
 # Minimum height above ground of the lead-in to the start of a return, m; a return with a lower lead-in is not flown.
 _MIN_LEAD_IN_HEIGHT_M = 20.0
-# Maximum distance from its target at which a return that ends has arrived, m.
+# Maximum distance between the end of a return and its target at which the return has arrived, m.
 _ARRIVAL_DISTANCE_M = 500.0
 # Maximum angle between course and bearing at which a return heads for a target, rad.
 _ARRIVAL_HEADING_TOLERANCE_RAD = math.radians(10.0)
@@ -140,20 +140,20 @@ class ProgramReturns:
 
     def with_worse_results(self, returns: Returns) -> Returns:
         """Replace each simulated result by the program's result if the program's result is worse."""
-        worse_results = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
+        worse_result_by_id = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
         return replace(
             returns,
             each=tuple(
-                worse_results.get(id(simulated_return)) or simulated_return for simulated_return in returns.each
+                worse_result_by_id.get(id(simulated_return)) or simulated_return for simulated_return in returns.each
             ),
         )
 
 
 def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
-    kind = program_autopilot(program)
-    if not issubclass(kind, ArduPlaneSitl):
-        allowed = f"expected ArduPlane's program; returns of {kind.title} are not supported"
+    autopilot_class = program_autopilot(program)
+    if not issubclass(autopilot_class, ArduPlaneSitl):
+        allowed = f"expected ArduPlane's program; returns of {autopilot_class.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
 
 
@@ -162,24 +162,24 @@ def worst_separated_returns(
 ) -> list[tuple[SimulatedReturn, int]]:
     """Choose at most `points` of the worst returns that can be flown, the worst first, with the index of each start.
 
-    Starts closer together than half the path length divided by `points` are skipped, because neighbouring returns are
-    alike.
+    Starts closer to a chosen start than half the path length divided by `points` are skipped, because neighbouring
+    returns are alike.
     """
     start_rows = starts.rows
     positions = np.column_stack([start_rows["east"], start_rows["north"]])
     min_distance = 0.5 * float(np.hypot(*np.diff(positions, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
-    numbers = {float(time): start_index for start_index, time in enumerate(starts.time)}
+    start_index_by_time = {float(time): start_index for start_index, time in enumerate(starts.time)}
     chosen_returns: list[tuple[SimulatedReturn, int]] = []
     for candidate in sorted(returns.each, key=_worst_first_key):
-        start_index = numbers[candidate.time]
+        start_index = start_index_by_time[candidate.time]
         is_near = any(
-            np.hypot(*(positions[start_index] - positions[chosen_number])) < min_distance
-            for _, chosen_number in chosen_returns
+            np.hypot(*(positions[start_index] - positions[chosen_index])) < min_distance
+            for _, chosen_index in chosen_returns
         )
         if (
             is_near
             or starts.is_low[start_index]
-            or not is_steady(world, start_rows[start_index])
+            or not is_reachable_start(world, start_rows[start_index])
             or not _is_lead_in_clear(world, start_rows[start_index])
         ):
             continue

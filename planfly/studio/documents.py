@@ -352,7 +352,7 @@ def make_certified_plan(context: EditContext, judged: JudgedMission) -> Plan:
 
 
 def _scored_plan(context: EditContext, waypoints: Floats) -> Plan:
-    problem = make_problem(context.scenario, context.airframe.limits.surely())
+    problem = make_problem(context.scenario, context.airframe.limits.with_margin())
     certificate = certify(problem, waypoints)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     scores = Violations(*counts[0]), Objectives(*objectives[0])

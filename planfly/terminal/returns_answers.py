@@ -209,30 +209,30 @@ class ReturnsAnswer:
     notes: list[str]
 
 
-def suggestion_entry(result: ReturnsFound, suggestion: RemedyTrial) -> ReturnSuggestion:
-    """Return a suggested remedy, with the numbers of safe and unsafe returns after it, for the JSON answer."""
+def suggestion_entry(answer: ReturnsFound, trial: RemedyTrial) -> ReturnSuggestion:
+    """Return a suggested remedy, with the numbers of safe and unsafe returns under it, for the JSON answer."""
     rally = None
-    if suggestion.remedy.rally is not None:
+    if trial.remedy.rally is not None:
         rally = []
-        for point in suggestion.remedy.rally:
-            lat, lon = (float(value) for value in to_geo(result.setup.scenario.origin, point.east, point.north))
+        for point in trial.remedy.rally:
+            lat, lon = (float(value) for value in to_geo(answer.setup.scenario.origin, point.east, point.north))
             rally.append(
                 RallyEntry(lat_deg=round(lat, 7), lon_deg=round(lon, 7), over_home_m=round(point.up - point.base, 1))
             )
     return ReturnSuggestion(
-        parameters=suggestion.remedy.parameters,
+        parameters=trial.remedy.parameters,
         rally=rally,
-        safe=suggestion.returns.count("safe"),
-        unsafe=len(suggestion.returns.each) - suggestion.returns.count("safe"),
-        headline=headline(suggestion.returns),
+        safe=trial.returns.count("safe"),
+        unsafe=len(trial.returns.each) - trial.returns.count("safe"),
+        headline=headline(trial.returns),
     )
 
 
-def program_entry(result: ReturnsFound) -> ByProgram | None:
+def program_entry(answer: ReturnsFound) -> ByProgram | None:
     """Return the entry of the returns that the ArduPlane program flew, or None if the program was not used."""
-    if result.by_program is None:
+    if answer.by_program is None:
         return None
-    names = {log.name: str(log) for log in result.files}
+    log_path_by_name = {log.name: str(log) for log in answer.files}
     entries = [
         ProgramReturnEntry(
             at_s=round(pair.simulated.time, 2),
@@ -243,11 +243,11 @@ def program_entry(result: ReturnsFound) -> ByProgram | None:
             agrees=pair.agrees,
             worse=pair.worse,
             reason=pair.reason,
-            log=None if pair.log is None else names.get(pair.log.name),
+            log=None if pair.log is None else log_path_by_name.get(pair.log.name),
         )
-        for pair in result.by_program.pairs
+        for pair in answer.by_program.pairs
     ]
-    return ByProgram(version=result.by_program.program, returns=entries)
+    return ByProgram(version=answer.by_program.program, returns=entries)
 
 
 def _measured_return(simulated_return: SimulatedReturn) -> MeasuredReturn:
@@ -264,9 +264,9 @@ def _round_to_tenths(value: float) -> float | None:
     return round(value, 1) if math.isfinite(value) else None
 
 
-def glides_entry(result: ReturnsFound) -> GlidesEntry:
+def glides_entry(answer: ReturnsFound) -> GlidesEntry:
     """Return the entry of the glides without the engine."""
-    glides = result.glides
+    glides = answer.glides
     entries = []
     for glide_range in glides.ranges:
         glide = glide_range.lowest_glide
@@ -308,9 +308,9 @@ def glides_entry(result: ReturnsFound) -> GlidesEntry:
     )
 
 
-def return_entry(result: ReturnsFound, return_range: ReturnRange) -> ReturnEntry:
+def return_entry(answer: ReturnsFound, return_range: ReturnRange) -> ReturnEntry:
     """Return the entry of a range of returns."""
-    worst_return, scenario, tenths = return_range.worst, result.setup.scenario, _round_to_tenths
+    worst_return, scenario, round_to_tenths = return_range.worst, answer.setup.scenario, _round_to_tenths
 
     return ReturnEntry(
         first_s=round(return_range.first, 2),
@@ -320,13 +320,13 @@ def return_entry(result: ReturnsFound, return_range: ReturnRange) -> ReturnEntry
         target=worst_return.target.name,
         reason=worst_return.target.reason,
         worst_at_s=round(worst_return.time, 2),
-        clearance_m=tenths(worst_return.clearance),
-        clearance_east_m=tenths(worst_return.lowest_position[0]),
-        clearance_north_m=tenths(worst_return.lowest_position[1]),
-        outside_m=tenths(worst_return.sphere_distance),
+        clearance_m=round_to_tenths(worst_return.clearance),
+        clearance_east_m=round_to_tenths(worst_return.lowest_position[0]),
+        clearance_north_m=round_to_tenths(worst_return.lowest_position[1]),
+        outside_m=round_to_tenths(worst_return.sphere_distance),
         threat=scenario.threats.names[worst_return.threat] if worst_return.kind == "threat" else None,
-        zone=result.returns.airspace.zones[worst_return.zone].name if worst_return.zone >= 0 else None,
-        energy_wh=tenths(worst_return.energy),
-        left_wh=tenths(worst_return.energy_left),
-        text=range_text(return_range, result.returns, scenario),
+        zone=answer.returns.airspace.zones[worst_return.zone].name if worst_return.zone >= 0 else None,
+        energy_wh=round_to_tenths(worst_return.energy),
+        left_wh=round_to_tenths(worst_return.energy_left),
+        text=range_text(return_range, answer.returns, scenario),
     )

@@ -66,7 +66,7 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan
         slope=lambda height, distance, tailwind, amsl: autopilot.landing_glide(height, distance, tailwind, amsl).slope,
     )
     flown_departure = None if flown_plan is None or flown_plan.ways is None else flown_plan.ways.climb
-    return with_ground_ways(plan, airframe.limits.surely(), final_law, flown_departure)
+    return with_ground_ways(plan, airframe.limits.with_margin(), final_law, flown_departure)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:

@@ -19,18 +19,18 @@ from aircraft.data_sheet import (
     check_sheet,
     size_aircraft,
 )
-from aircraft.envelope import GRAVITY, UNDECIDED, turn_radius
+from aircraft.envelope import GRAVITY, UNDECIDED_SIGMAS, turn_radius
 from aircraft.model_writer import FACTORS, POWER_FACTORS, Layout, model_xml
 from aircraft.power_prior import (
     AVIONICS_LOG_SD,
     EFFICIENCY_LOG_SD,
     INDUCED_DRAG_LOG_SD,
-    LEAST_DRAG_LOG_SD,
+    MIN_DRAG_LOG_SD,
     power_log_sd,
 )
 from aircraft.propulsion import ElectricMotor
 from aircraft.uncertainty import (
-    DRAWS,
+    DRAW_COUNT,
     DRAWS_FILE,
     Draws,
     UncertainQuantity,
@@ -190,7 +190,7 @@ def _parse_number(text: str) -> float:
 
 # Standard deviation of the logarithm of each guessed factor, and the basis of the guess.
 _SPREADS = {
-    "zero-lift-drag": (LEAST_DRAG_LOG_SD, "least drag by layout and aspect ratio, fitted to real aircraft"),
+    "zero-lift-drag": (MIN_DRAG_LOG_SD, "least drag by layout and aspect ratio, fitted to real aircraft"),
     "induced-drag": (INDUCED_DRAG_LOG_SD, "span efficiency from published aircraft of the class"),
     "drive-power": (EFFICIENCY_LOG_SD, "efficiency of the drive by mass, fitted to real aircraft"),
     "avionics-power": (AVIONICS_LOG_SD, "autopilot, radios and servos, fitted to real aircraft"),
@@ -241,7 +241,7 @@ def _uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty,
     effects["drive-power"] *= drive_scale
     total_climb_sd, descent_sd, top_speed_sd, power_sd = np.linalg.norm(list(effects.values()), axis=0).tolist()
     # The sheet states that the aircraft flies level at cruise speed; this limits the deviation of the top speed.
-    top_speed_sd = min(top_speed_sd, max(0.0, float(estimated[2]) - aircraft.airspeed) / UNDECIDED)
+    top_speed_sd = min(top_speed_sd, max(0.0, float(estimated[2]) - aircraft.airspeed) / UNDECIDED_SIGMAS)
     balance_sds = [balance[name] * spreads[name] for name in slopes]
     spreads["thrust"] = math.hypot(climb_sd / thrust_slopes[0], *balance_sds)
     quantities = tuple(
@@ -249,12 +249,12 @@ def _uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty,
     )
     uncertainty = Uncertainty(
         "a data sheet",
-        climb=total_climb_sd,
-        descent=descent_sd,
+        climb_sd=total_climb_sd,
+        descent_sd=descent_sd,
         quantities=quantities,
-        power=power_sd,
+        power_sd=power_sd,
         battery_guessed="energy" in sized.guessed,
-        fastest=top_speed_sd,
+        max_speed_sd=top_speed_sd,
         climb_guessed="climb" in sized.guessed,
     )
     return uncertainty, _draw_with_climb(uncertainty, balance, climb_sd / thrust_slopes[0])
@@ -634,9 +634,9 @@ def _readme_text(
         "",
         "## Uncertainties",
         "",
-        f"Standard deviations; the steepest climb's is {math.degrees(uncertainty.climb):.1f} degrees, the steepest"
-        f" descent's {math.degrees(uncertainty.descent):.1f} degrees, the fastest level flight's"
-        f" {uncertainty.fastest:.1f} m/s.",
+        f"Standard deviations; the steepest climb's is {math.degrees(uncertainty.climb_sd):.1f} degrees, the steepest"
+        f" descent's {math.degrees(uncertainty.descent_sd):.1f} degrees, the fastest level flight's"
+        f" {uncertainty.max_speed_sd:.1f} m/s.",
         "",
         "| property of the model | factor on | deviation | because |",
         "|---|---|---|---|",
@@ -646,7 +646,7 @@ def _readme_text(
         lines.append(f"| `{quantity.name}` | {factor_text} | {100.0 * quantity.sd:.0f} % | {quantity.reason} |")
     lines += [
         "",
-        f"`{DRAWS_FILE}` has {DRAWS} aircraft drawn from them; a campaign flies one of them in each flight.",
+        f"`{DRAWS_FILE}` has {DRAW_COUNT} aircraft drawn from them; a campaign flies one of them in each flight.",
         "",
         "| file | content |",
         "|---|---|",

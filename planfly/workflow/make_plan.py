@@ -52,7 +52,7 @@ def make_plan(
     flown_plan_and_leg: the plan being flown, and the leg from which it is replanned; None for a new plan.
     continues: True if the mission continues beyond the destination of the plan.
     """
-    limits = airframe.limits.surely()
+    limits = airframe.limits.with_margin()
 
     def complete_plan(plan: Plan, search: Search) -> Plan:
         def limit_orbits(candidate: Plan, search_limits: Limits) -> Plan:

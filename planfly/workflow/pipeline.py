@@ -214,7 +214,7 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
         for event in judged_flight.events:
             recorder.event(event.time, event.text, event.level)
         summary = return_summary(flight.setup, judged_flight.track) if task.returns else None
-        drawn_returns = None if summary is None else summary.draw_returns_without_glides()
+        drawn_returns = None if summary is None else summary.drawn_returns_without_glides()
         recorder.finish(judged_flight.ended, judged_flight.verdict, judged_flight.reference, drawn_returns)
     return replace(judged_flight, returns=summary)
 

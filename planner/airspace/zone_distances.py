@@ -1,8 +1,8 @@
-"""Measure how deep legs penetrate zones, for the search, and how far path pieces are from zones, for the certificate.
+"""Measure how deep legs penetrate zones, for the search, and how far a path is from zones, for the certificate.
 
-A search charges each leg the depth of its penetration times its length, computed from a zone's extent across and along
-the leg; for levels above ground the terrain is sampled. A certificate cuts pieces near a zone so short that the heights
-apply to the positions, and measures their distances exactly for straight edges and circles.
+The search charges each leg the depth of its penetration times its length, computed from a zone's extent across and
+along the leg; for levels above ground the terrain is sampled. The certificate cuts the path near a zone into pieces so
+short that the heights apply to the positions, and measures their distances exactly for straight edges and circles.
 """
 
 import math
@@ -22,23 +22,23 @@ from world.terrain import pixel_height, segment_clearance
 # The charge is 0 only if the leg violates no margin. An exclusion is charged along the full part of the leg that is
 # abreast of its shape, so that a leg through a concave part of the outline may be charged although it stays outside.
 
-# Spacing of samples on a leg that leaves an inclusion, m.
-OUTSIDE_PITCH = 100.0
+# Spacing of the samples on a leg that leaves an inclusion, m.
+OUTSIDE_SAMPLE_SPACING = 100.0
 # Maximum number of these samples.
 MAX_SAMPLES = 20
 # Shortest length that is charged, m.
 MIN_CHARGED_LENGTH = 1.0
 # Bound on the height above unknown ground, m.
-UNKNOWN_HEIGHT = 9000.0
+UNKNOWN_HEIGHT_BOUND = 9000.0
 
 
 class AltitudeBand(NamedTuple):
     """Vertical range of a part of a path, above mean sea level and above the ground below the part, m."""
 
-    lowest: float
-    highest: float
-    lowest_above_ground: float
-    highest_above_ground: float
+    min_altitude: float
+    max_altitude: float
+    min_height: float
+    max_height: float
 
 
 @inner
@@ -49,26 +49,27 @@ def zone_excess(
     pitch: float,
     a: Floats,
     b: Floats,
-    lateral: float,
-    below: float,
-    above: float,
+    lateral_error: float,
+    error_below: float,
+    error_above: float,
 ) -> float:
     """Return the depth of the leg a-b in zones enlarged by their margins, integrated over its length, m x km.
 
-    pitch: spacing of terrain samples (m), for levels above ground. lateral, below, above: tracking error, m.
+    pitch: spacing of terrain samples (m), for levels above ground. lateral_error, error_below, error_above: tracking
+    error, m.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
     for z in range(zones.inclusions):
-        required_distance = required[z].horizontal + lateral
+        required_distance = required[z].horizontal + lateral_error
         total += _inclusion_excess(records, z, line, required_distance)
         zone = records.zones[z]
-        band = altitude_band(a[2], b[2], below, above)
+        band = altitude_band(a[2], b[2], error_below, error_above)
         if zone.floor_above_ground or zone.ceiling_above_ground:
-            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, 0.0, 1.0, below, above)
+            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, 0.0, 1.0, error_below, error_above)
         vertical_excess = vertical_distance(zone, band) + required[z].vertical
-        total += max(0.0, vertical_excess) * max(line.run, MIN_CHARGED_LENGTH) / 1000.0
-    max_margin = zones.max_horizontal + lateral
+        total += max(0.0, vertical_excess) * max(line.length, MIN_CHARGED_LENGTH) / 1000.0
+    max_margin = zones.max_horizontal + lateral_error
     west, east = min(a[0], b[0]) - max_margin, max(a[0], b[0]) + max_margin
     south, north = min(a[1], b[1]) - max_margin, max(a[1], b[1]) + max_margin
     for z in range(first_exclusion_near(zones, west), required.shape[0]):
@@ -77,19 +78,23 @@ def zone_excess(
             break
         if zone.east < west or zone.south > north or zone.north < south:
             continue
-        depth, first_fraction, last_fraction = penetration_depth(records, z, line, required[z].horizontal + lateral)
+        depth, first_fraction, last_fraction = penetration_depth(
+            records, z, line, required[z].horizontal + lateral_error
+        )
         if depth <= 0.0:
             continue
         altitude_change = b[2] - a[2]
         band = altitude_band(
-            a[2] + first_fraction * altitude_change, a[2] + last_fraction * altitude_change, below, above
+            a[2] + first_fraction * altitude_change, a[2] + last_fraction * altitude_change, error_below, error_above
         )
         if zone.floor_above_ground or zone.ceiling_above_ground:
-            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, first_fraction, last_fraction, below, above)
+            band = _sampled_altitude_band(
+                heights, to_pixel, pitch, a, b, first_fraction, last_fraction, error_below, error_above
+            )
         vertical_excess = required[z].vertical - vertical_distance(zone, band)
         total += (
             max(0.0, min(depth, vertical_excess))
-            * max((last_fraction - first_fraction) * line.run, MIN_CHARGED_LENGTH)
+            * max((last_fraction - first_fraction) * line.length, MIN_CHARGED_LENGTH)
             / 1000.0
         )
     return total
@@ -110,7 +115,7 @@ def penetration_depth(
         depth = required_distance + max(0.0, min(view.left, -view.right))
     else:
         depth = required_distance - view.distance
-    per_metre = 1.0 / max(line.run, 1e-9)
+    per_metre = 1.0 / max(line.length, 1e-9)
     first_fraction, last_fraction = (
         (view.first - required_distance) * per_metre,
         (view.last + required_distance) * per_metre,
@@ -124,23 +129,26 @@ def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_d
     view = view_shape(records, z, line, required_distance)
     if view.inside and view.distance >= required_distance:
         return 0.0
-    samples = int(min(MAX_SAMPLES, 2.0 + line.run / OUTSIDE_PITCH))
+    sample_count = int(min(MAX_SAMPLES, 2.0 + line.length / OUTSIDE_SAMPLE_SPACING))
     total = 0.0
-    for k in range(samples):
-        distance = line.run * k / (samples - 1)
+    for k in range(sample_count):
+        distance = line.length * k / (sample_count - 1)
         east, north = line.east + distance * line.course_east, line.north + distance * line.course_north
         total += max(0.0, required_distance + edge_distance(records, z, east, north))
-    spacing = max(line.run, MIN_CHARGED_LENGTH) / samples
+    spacing = max(line.length, MIN_CHARGED_LENGTH) / sample_count
     # Between the samples the line may be nearer to the outline.
     shortfall = max(1e-9, required_distance - view.distance) if total == 0.0 else 0.0
     return (total * spacing + shortfall * MIN_CHARGED_LENGTH) / 1000.0
 
 
 @inlined
-def altitude_band(begin_altitude: float, end_altitude: float, below: float, above: float) -> AltitudeBand:
-    """Return the vertical range of a straight line over unknown ground; below, above: tracking error, m."""
-    lowest, highest = min(begin_altitude, end_altitude) - below, max(begin_altitude, end_altitude) + above
-    return AltitudeBand(lowest, highest, -UNKNOWN_HEIGHT, UNKNOWN_HEIGHT)
+def altitude_band(start_altitude: float, end_altitude: float, error_below: float, error_above: float) -> AltitudeBand:
+    """Return the vertical range of a straight line over unknown ground; error_below, error_above: tracking error, m."""
+    min_altitude, max_altitude = (
+        min(start_altitude, end_altitude) - error_below,
+        max(start_altitude, end_altitude) + error_above,
+    )
+    return AltitudeBand(min_altitude, max_altitude, -UNKNOWN_HEIGHT_BOUND, UNKNOWN_HEIGHT_BOUND)
 
 
 @inner
@@ -152,24 +160,28 @@ def _sampled_altitude_band(
     b: Floats,
     first_fraction: float,
     last_fraction: float,
-    below: float,
-    above: float,
+    error_below: float,
+    error_above: float,
 ) -> AltitudeBand:
     """Return the vertical range of a-b between two fractions of its length, with sampled heights above ground."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    band = altitude_band(a[2] + first_fraction * dz, a[2] + last_fraction * dz, below, above)
-    column, row = polymap(to_pixel, a[0] + first_fraction * dx, a[1] + first_fraction * dy)
-    to_column, to_row = polymap(to_pixel, a[0] + last_fraction * dx, a[1] + last_fraction * dy)
-    samples = 2 + int((last_fraction - first_fraction) * math.sqrt(dx * dx + dy * dy) / pitch)
-    lowest, highest = math.inf, -math.inf
-    for k in range(samples):
-        fraction = k / (samples - 1)
-        ground = pixel_height(heights, column + fraction * (to_column - column), row + fraction * (to_row - row))
-        if math.isnan(ground):
+    band = altitude_band(a[2] + first_fraction * dz, a[2] + last_fraction * dz, error_below, error_above)
+    first_column, first_row = polymap(to_pixel, a[0] + first_fraction * dx, a[1] + first_fraction * dy)
+    last_column, last_row = polymap(to_pixel, a[0] + last_fraction * dx, a[1] + last_fraction * dy)
+    sample_count = 2 + int((last_fraction - first_fraction) * math.sqrt(dx * dx + dy * dy) / pitch)
+    min_height, max_height = math.inf, -math.inf
+    for k in range(sample_count):
+        fraction = k / (sample_count - 1)
+        ground_height = pixel_height(
+            heights,
+            first_column + fraction * (last_column - first_column),
+            first_row + fraction * (last_row - first_row),
+        )
+        if math.isnan(ground_height):
             return band
-        height = a[2] + (first_fraction + fraction * (last_fraction - first_fraction)) * dz - ground
-        lowest, highest = min(lowest, height - below), max(highest, height + above)
-    return AltitudeBand(band.lowest, band.highest, lowest, highest)
+        height = a[2] + (first_fraction + fraction * (last_fraction - first_fraction)) * dz - ground_height
+        min_height, max_height = min(min_height, height - error_below), max(max_height, height + error_above)
+    return AltitudeBand(band.min_altitude, band.max_altitude, min_height, max_height)
 
 
 @inlined
@@ -178,15 +190,15 @@ def vertical_distance(zone: Record, band: AltitudeBand) -> float:
 
     The distance is the smallest over the range for an exclusion, and the largest for an inclusion.
     """
-    floor_lowest, floor_highest = band.lowest, band.highest
+    floor_min, floor_max = band.min_altitude, band.max_altitude
     if zone.floor_above_ground:
-        floor_lowest, floor_highest = band.lowest_above_ground, band.highest_above_ground
-    ceiling_lowest, ceiling_highest = band.lowest, band.highest
+        floor_min, floor_max = band.min_height, band.max_height
+    ceiling_min, ceiling_max = band.min_altitude, band.max_altitude
     if zone.ceiling_above_ground:
-        ceiling_lowest, ceiling_highest = band.lowest_above_ground, band.highest_above_ground
-    distance: float = max(zone.floor - floor_highest, ceiling_lowest - zone.ceiling)
+        ceiling_min, ceiling_max = band.min_height, band.max_height
+    distance: float = max(zone.floor - floor_max, ceiling_min - zone.ceiling)
     if not zone.exclusion:
-        distance = max(zone.floor - floor_lowest, ceiling_highest - zone.ceiling)
+        distance = max(zone.floor - floor_min, ceiling_max - zone.ceiling)
     return distance
 
 
@@ -208,22 +220,22 @@ def measure_zone_margin(
     to_pixel: PolyMapRecord,
     a: Floats,
     b: Floats,
-    lateral: Floats,
-    below: float,
-    above: float,
+    lateral_error: Floats,
+    error_below: float,
+    error_above: float,
     margin: Record,
 ) -> None:
     """Fill the `ZONE_MARGIN` record of the piece a-b.
 
-    depths: negated heights of the ground. lateral: (2,) lateral tracking error at a and b; below, above: vertical
-    tracking error, m.
+    depths: negated heights of the ground. lateral_error: (2,) lateral tracking error at a and b; error_below,
+    error_above: vertical tracking error, m.
     """
     margin.nearest, margin.satisfied, margin.zone = math.inf, True, -1
-    records, max_lateral = zones.records, max(lateral[0], lateral[1])
-    west, east = min(a[0], b[0]) - max_lateral, max(a[0], b[0]) + max_lateral
-    south, north = min(a[1], b[1]) - max_lateral, max(a[1], b[1]) + max_lateral
+    records, max_lateral_error = zones.records, max(lateral_error[0], lateral_error[1])
+    west, east = min(a[0], b[0]) - max_lateral_error, max(a[0], b[0]) + max_lateral_error
+    south, north = min(a[1], b[1]) - max_lateral_error, max(a[1], b[1]) + max_lateral_error
     horizontal_length = math.hypot(b[0] - a[0], b[1] - a[1])
-    piece_begin, piece_end, piece_lateral = a.copy(), b.copy(), lateral.copy()
+    piece_start, piece_end, piece_error = a.copy(), b.copy(), lateral_error.copy()
     for z in range(zones.required.shape[0]):
         required, zone = zones.required[z], records.zones[z]
         max_required = max(required.horizontal, required.vertical)
@@ -231,30 +243,31 @@ def measure_zone_margin(
         if zone.exclusion and box_distance(records, z, west, east, south, north) >= search_distance:
             continue
         uses_ground = zone.floor_above_ground or zone.ceiling_above_ground
-        band = altitude_band(a[2], b[2], below, above)
+        band = altitude_band(a[2], b[2], error_below, error_above)
         if uses_ground:
-            band = _exact_altitude_band(heights, depths, to_pixel, a, b, lateral, below, above)
+            band = _exact_altitude_band(heights, depths, to_pixel, a, b, lateral_error, error_below, error_above)
         horizontal, vertical = (
-            _horizontal_distance(records, z, a, b, search_distance + max_lateral) - max_lateral,
+            _horizontal_distance(records, z, a, b, search_distance + max_lateral_error) - max_lateral_error,
             vertical_distance(zone, band),
         )
         if _distance_to_violation(zone, horizontal, vertical) >= search_distance:
             continue
-        pieces = max(1, math.ceil(horizontal_length / MAX_PIECE_LENGTH))
-        for k in range(pieces):
+        piece_count = max(1, math.ceil(horizontal_length / MAX_PIECE_LENGTH))
+        for k in range(piece_count):
             for axis in range(3):
-                piece_begin[axis] = a[axis] + (b[axis] - a[axis]) * k / pieces
-                piece_end[axis] = a[axis] + (b[axis] - a[axis]) * (k + 1) / pieces
+                piece_start[axis] = a[axis] + (b[axis] - a[axis]) * k / piece_count
+                piece_end[axis] = a[axis] + (b[axis] - a[axis]) * (k + 1) / piece_count
             for end in range(2):
-                piece_lateral[end] = lateral[0] + (lateral[1] - lateral[0]) * (k + end) / pieces
-            band = altitude_band(piece_begin[2], piece_end[2], below, above)
+                piece_error[end] = lateral_error[0] + (lateral_error[1] - lateral_error[0]) * (k + end) / piece_count
+            band = altitude_band(piece_start[2], piece_end[2], error_below, error_above)
             if uses_ground:
                 band = _exact_altitude_band(
-                    heights, depths, to_pixel, piece_begin, piece_end, piece_lateral, below, above
+                    heights, depths, to_pixel, piece_start, piece_end, piece_error, error_below, error_above
                 )
-            max_offset = max(piece_lateral[0], piece_lateral[1])
+            max_piece_error = max(piece_error[0], piece_error[1])
             horizontal, vertical = (
-                _horizontal_distance(records, z, piece_begin, piece_end, search_distance + max_offset) - max_offset,
+                _horizontal_distance(records, z, piece_start, piece_end, search_distance + max_piece_error)
+                - max_piece_error,
                 vertical_distance(zone, band),
             )
             _update_margin(zone, required, z, horizontal, vertical, margin)
@@ -307,23 +320,26 @@ def _exact_altitude_band(
     to_pixel: PolyMapRecord,
     a: Floats,
     b: Floats,
-    lateral: Floats,
-    below: float,
-    above: float,
+    lateral_error: Floats,
+    error_below: float,
+    error_above: float,
 ) -> AltitudeBand:
-    """Return the vertical range along a-b, also above the ground on a-b and within `lateral` (2,) m to both sides."""
-    band = altitude_band(a[2], b[2], below, above)
+    """Return the vertical range along a-b, also above the ground within the lateral error (2,) m of a-b."""
+    band = altitude_band(a[2], b[2], error_below, error_above)
     horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     ux, uy = (b[0] - a[0]) / horizontal_length, (b[1] - a[1]) / horizontal_length
-    offset_begin, offset_end = a.copy(), b.copy()
-    lowest, highest = math.inf, -math.inf
+    offset_start, offset_end = a.copy(), b.copy()
+    min_height, max_height = math.inf, -math.inf
     for side in (0.0, -1.0, 1.0):
-        for end, point, offset in ((offset_begin, a, lateral[0]), (offset_end, b, lateral[1])):
+        for end, point, offset in ((offset_start, a, lateral_error[0]), (offset_end, b, lateral_error[1])):
             end[0], end[1], end[2] = point[0] + side * offset * uy, point[1] - side * offset * ux, point[2]
-        clearance, _ = segment_clearance(heights, to_pixel, offset_begin, offset_end)
-        offset_begin[2], offset_end[2] = -a[2], -b[2]
-        mirrored, _ = segment_clearance(depths, to_pixel, offset_begin, offset_end)
-        if math.isnan(clearance) or math.isnan(mirrored):
+        clearance, _ = segment_clearance(heights, to_pixel, offset_start, offset_end)
+        offset_start[2], offset_end[2] = -a[2], -b[2]
+        depth_clearance, _ = segment_clearance(depths, to_pixel, offset_start, offset_end)
+        if math.isnan(clearance) or math.isnan(depth_clearance):
             return band
-        lowest, highest = min(lowest, clearance - below), max(highest, above - mirrored)
-    return AltitudeBand(band.lowest, band.highest, lowest, highest)
+        min_height, max_height = (
+            min(min_height, clearance - error_below),
+            max(max_height, error_above - depth_clearance),
+        )
+    return AltitudeBand(band.min_altitude, band.max_altitude, min_height, max_height)

@@ -2,7 +2,7 @@
 
 Each zone has a horizontal and a vertical margin. A fixed end that violates a margin reduces it for its zone. Exclusions
 are sorted from west to east, so that a kernel visits only those near a leg. Distances are computed in the axes of the
-line: along it from its beginning, and across it to the left.
+line: along it from its start, and across it to the left.
 """
 
 import math
@@ -44,12 +44,12 @@ class ZonesWithMargins(NamedTuple):
 class ZoneMargins(NamedTuple):
     """Margins of a path to zones, m: horizontal and vertical as in `REQUIRED_MARGINS`.
 
-    share: fraction of a fixed end's distance that replaces the margin if the end is within the margin.
+    end_fraction: fraction of a fixed end's distance that replaces the margin if the end is within the margin.
     """
 
     horizontal: float
     vertical: float
-    share: float
+    end_fraction: float
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
@@ -64,31 +64,35 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
     >>> float(required["horizontal"][0]), float(required["vertical"][0])
     (4.0, 10.0)
     """
-    unsorted = zone_records(zones)
-    indices = np.lexsort((unsorted.zones["west"], unsorted.zones["exclusion"]))
-    records = ZoneRecords(unsorted.zones[indices], unsorted.edges)
-    required: Records = np.zeros(len(indices), REQUIRED_MARGINS)
-    required["number"], required["horizontal"], required["vertical"] = indices, margins.horizontal, margins.vertical
+    unsorted_records = zone_records(zones)
+    order = np.lexsort((unsorted_records.zones["west"], unsorted_records.zones["exclusion"]))
+    records = ZoneRecords(unsorted_records.zones[order], unsorted_records.edges)
+    required: Records = np.zeros(len(order), REQUIRED_MARGINS)
+    required["number"], required["horizontal"], required["vertical"] = order, margins.horizontal, margins.vertical
     inclusions = int((~records.zones["exclusion"]).sum())
     required["furthest_east"][inclusions:] = np.maximum.accumulate(records.zones["east"][inclusions:])
-    grounds = np.full(len(ends), np.nan) if terrain is None else terrain.height(ends[:, 0], ends[:, 1])
-    _reduce_margins(records, np.ascontiguousarray(ends), np.ascontiguousarray(grounds), margins.share, required)
+    ground_heights = np.full(len(ends), np.nan) if terrain is None else terrain.height(ends[:, 0], ends[:, 1])
+    _reduce_margins(
+        records, np.ascontiguousarray(ends), np.ascontiguousarray(ground_heights), margins.end_fraction, required
+    )
     for array in (records.zones, required):
         array.setflags(write=False)
     return ZonesWithMargins(records, required, inclusions, margins.horizontal)
 
 
 @compiled
-def _reduce_margins(records: ZoneRecords, ends: Floats, grounds: Floats, fraction: float, required: Records) -> None:
+def _reduce_margins(
+    records: ZoneRecords, ends: Floats, ground_heights: Floats, fraction: float, required: Records
+) -> None:
     """Reduce margins to a fraction of the distances of the ends (k, 3).
 
-    grounds: (k,) ground heights at the ends, m.
+    ground_heights: (k,) ground heights at the ends, m.
     """
     for z in range(required.shape[0]):
         zone, margin = records.zones[z], required[z]
         for k in range(ends.shape[0]):
             horizontal_distance = edge_distance(records, z, ends[k, 0], ends[k, 1])
-            vertical_distance = outside_band(zone, ends[k, 2], grounds[k])
+            vertical_distance = outside_band(zone, ends[k, 2], ground_heights[k])
             if not zone.exclusion:
                 margin.horizontal = min(margin.horizontal, max(0.0, -fraction * horizontal_distance))
                 margin.vertical = min(margin.vertical, max(0.0, -fraction * vertical_distance))
@@ -140,8 +144,8 @@ class PlannerAirspace(NamedTuple):
 def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> PlannerAirspace:
     """Make the airspace of a scenario with its margins.
 
-    buffer: margin below the maximum height, m; at a fixed end with a smaller margin, a fraction (`ZoneMargins.share`)
-    of the end's own margin.
+    buffer: margin below the maximum height, m; at a fixed end with a smaller margin, a fraction
+    (`ZoneMargins.end_fraction`) of the end's own margin.
 
     >>> from world.scenario import load_scenario
     >>> space = make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
@@ -159,7 +163,7 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Pl
     if max_height is not None and terrain is not None:
         headrooms = max_height - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
         buffers = [
-            buffer if headroom >= buffer else margins.share * max(0.0, float(headroom)) for headroom in headrooms
+            buffer if headroom >= buffer else margins.end_fraction * max(0.0, float(headroom)) for headroom in headrooms
         ]
     return PlannerAirspace(
         zones, math.inf if max_height is None else max_height, buffer, buffers[0], buffers[1], depths
@@ -180,19 +184,19 @@ def is_limited(airspace: PlannerAirspace) -> bool:
 
 
 class MapSegment(NamedTuple):
-    """Horizontal line: beginning, unit course (east, north) and length, m."""
+    """Horizontal line: start, unit course (east, north) and length, m."""
 
     east: float
     north: float
     course_east: float
     course_north: float
-    run: float
+    length: float
 
 
 class ShapeView(NamedTuple):
     """Shape as seen from a line, m.
 
-    inside: True if the line begins in the shape.
+    inside: True if the line starts in the shape.
     distance: distance from the line to the shape's outline, 0 if they meet; inf if beyond the requested limit.
     right, left: extent of the shape across the line, negative to the right.
     first, last: extent of the shape along the line.
@@ -224,7 +228,7 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         east_offset, north_offset = zone.centre_east - line.east, zone.centre_north - line.north
         along = east_offset * line.course_east + north_offset * line.course_north
         across = north_offset * line.course_east - east_offset * line.course_north
-        return _view_circle(along, across, zone.radius, line.run)
+        return _view_circle(along, across, zone.radius, line.length)
     is_inside, distance2 = False, math.inf
     right, left, first, last = math.inf, -math.inf, math.inf, -math.inf
     edges = records.edges
@@ -240,9 +244,9 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
         if (across > 0.0) != (to_across > 0.0):
             crossing = along + (to_along - along) * across / (across - to_across)
             is_inside = is_inside != (crossing > 0.0)
-            if 0.0 <= crossing <= line.run:
+            if 0.0 <= crossing <= line.length:
                 distance2 = 0.0
-        is_ahead, is_behind = min(along, to_along) > line.run + max_distance, max(along, to_along) < -max_distance
+        is_ahead, is_behind = min(along, to_along) > line.length + max_distance, max(along, to_along) < -max_distance
         if (
             is_ahead
             or is_behind
@@ -251,7 +255,7 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
             or distance2 == 0.0
         ):
             continue
-        distance2 = min(distance2, _edge_distance2(along, across, to_along, to_across, line.run))
+        distance2 = min(distance2, _edge_distance2(along, across, to_along, to_across, line.length))
     distance = math.sqrt(distance2)
     return ShapeView(is_inside, distance if distance <= max_distance else math.inf, right, left, first, last)
 
@@ -278,7 +282,7 @@ def _edge_distance2(along: float, across: float, to_along: float, to_across: flo
     min_distance2 = min(min_distance2, distance_beyond_end * distance_beyond_end + to_across * to_across)
     along_step, across_step = to_along - along, to_across - across
     length2 = along_step * along_step + across_step * across_step
-    # From the line's beginning, then from its end.
+    # From the line's start, then from its end.
     fraction = min(1.0, max(0.0, -(along * along_step + across * across_step) / length2))
     x, y = along + fraction * along_step, across + fraction * across_step
     min_distance2 = min(min_distance2, x * x + y * y)

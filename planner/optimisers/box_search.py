@@ -1,4 +1,4 @@
-"""Define the ask-and-tell interface that all optimisers share, a population-based search in a box."""
+"""Ask-and-tell interface of all optimisers: a population-based search in a box."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
@@ -12,7 +12,7 @@ class BoxSearch(ABC):
     """Population-based search in a box: `ask` returns samples to score, `tell` takes their scores.
 
     lower, upper: (d,) box.
-    rank: (n, c) scores -> (n,) ranks, smaller is better.
+    rank: function of scores (n, c) for their ranks (n,); smaller is better.
     population: even number of samples.
     initial: (population, d) first samples; None for uniform ones.
 
@@ -35,14 +35,14 @@ class BoxSearch(ABC):
         self._half = population // 2
         if initial is None:
             initial = rng.uniform(lower, upper, (population, lower.size))
-        self._asked = np.clip(initial, lower, upper)
+        self._pending_samples = np.clip(initial, lower, upper)
         self.samples: Floats = np.empty((0, lower.size))
         self.scores: Floats = np.empty((0, 0))
 
     def ask(self) -> Floats:
         """Return the samples (n, d) inside the box to score."""
-        return self._asked
+        return self._pending_samples
 
     @abstractmethod
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of the last samples of `ask`, and make the next samples."""
+        """Process the scores (n, c) of the last samples of `ask`, and make the next samples."""

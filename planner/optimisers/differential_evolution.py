@@ -9,9 +9,9 @@ from planner.optimisers.box_search import BoxSearch
 from world.arrays import Floats, Ints
 
 # Differential weight F, within the range that Storn and Price recommend.
-WEIGHT = 0.5
+DIFFERENTIAL_WEIGHT = 0.5
 # Crossover rate CR, within the range that Storn and Price recommend.
-CROSSOVER = 0.9
+CROSSOVER_RATE = 0.9
 
 
 class DifferentialEvolution(BoxSearch):
@@ -34,30 +34,30 @@ class DifferentialEvolution(BoxSearch):
     _generation = 0
 
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of the trial vectors, select the survivors, and make the next trial vectors."""
+        """Process the scores (n, c) of the trial vectors, select the survivors, and make the next trial vectors."""
         if not len(self.scores):
-            self.samples, self.scores = self._asked.copy(), np.array(scores)
+            self.samples, self.scores = self._pending_samples.copy(), np.array(scores)
         else:
             rows = self._target_rows()
-            order = self._rank(np.concatenate([self.scores, scores]))
-            is_better = order[len(self.samples) :] <= order[rows]
-            self.samples[rows[is_better]] = self._asked[is_better]
+            ranks = self._rank(np.concatenate([self.scores, scores]))
+            is_better = ranks[len(self.samples) :] <= ranks[rows]
+            self.samples[rows[is_better]] = self._pending_samples[is_better]
             self.scores[rows[is_better]] = scores[is_better]
             self._generation += 1
-        self._asked = self._trial_vectors(self._target_rows())
+        self._pending_samples = self._trial_vectors(self._target_rows())
 
     def _target_rows(self) -> Ints:
-        """Return the target rows of this generation, which is one half of the population in turn."""
+        """Return the target rows of this generation: the two halves of the population take turns."""
         count = len(self.samples)
         return np.arange(self._half) if self._generation % 2 == 0 else np.arange(count - self._half, count)
 
     def _trial_vectors(self, rows: Ints) -> Floats:
         """Return trial vectors, with a + F (b - c) in most variables and the target's own value in the others."""
         count, size = self.samples.shape
-        picked_rows = self._rng.integers(0, count, (3, rows.size))
-        a, b, c = (self.samples[index] for index in picked_rows)
-        mutants = a + WEIGHT * (b - c)
-        is_crossed = self._rng.random((rows.size, size)) < CROSSOVER
+        parent_rows = self._rng.integers(0, count, (3, rows.size))
+        a, b, c = (self.samples[index] for index in parent_rows)
+        mutants = a + DIFFERENTIAL_WEIGHT * (b - c)
+        is_crossed = self._rng.random((rows.size, size)) < CROSSOVER_RATE
         is_crossed[np.arange(rows.size), self._rng.integers(0, size, rows.size)] = True
         trials = np.where(is_crossed, mutants, self.samples[rows])
         # A variable outside the box is set halfway between the target and the bound: clipping would accumulate samples

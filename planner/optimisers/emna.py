@@ -6,7 +6,7 @@ Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002, cha
 
 import numpy as np
 
-from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
+from planner.optimisers.linear_algebra import cholesky, covariance, multiply_by_lower
 from planner.optimisers.umda import Umda
 from world.arrays import Floats
 
@@ -38,5 +38,8 @@ class Emna(Umda):
         rows = np.ascontiguousarray((self.samples - mean) / width)
         factor = cholesky(covariance(rows, 0, 0, mean.size), COVARIANCE_RIDGE)
         return self._redraw(
-            lambda number: mean + width * times_lower(self._rng.normal(size=(number, mean.size)), factor), count
+            lambda sample_count: (
+                mean + width * multiply_by_lower(self._rng.normal(size=(sample_count, mean.size)), factor)
+            ),
+            count,
         )

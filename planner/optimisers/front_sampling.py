@@ -26,13 +26,13 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from world.arrays import Floats, Ints
 
 # Number of solutions nearest to a mean that give its covariance.
-NEIGHBOURS = 6
+NEIGHBOUR_COUNT = 6
 # Factor on their differences from the mean.
 DIFFERENCE_FACTOR = 0.7
 # Largest step of a block, as a fraction of the difference to the other solution.
 MAX_BLOCK_STEP = 1.2
 # Fraction of the samples that take the whole step, and of the coordinates of a block's points that move.
-HALF = 0.5
+EVEN_CHANCE = 0.5
 # Initial scale of the noise, as a fraction of each direction's length.
 FIRST_SCALE = 0.1
 # Smallest scale of the noise.
@@ -46,7 +46,7 @@ SHRINK_FACTOR = 0.9
 # Fraction of successful samples above which the scale grows.
 TARGET_SUCCESS = 0.02
 # Maximum number of directions in the noise of a sample.
-USED_DIRECTIONS = 4
+MAX_DIRECTIONS = 4
 # Exponent of 2 in the smallest factor of a sample on the common scale.
 MIN_EXPONENT = -3
 # Exponent of 2 in the largest factor of a sample on the common scale.
@@ -68,7 +68,7 @@ class FrontSampling:
     lower, upper: (d,) box.
     directions: (k, d) directions of the noise, each as long as its largest deviation.
     reference: (m,) reference point; solutions with objectives beyond it are ignored.
-    axes: number of variables of a point; the variables of neighbouring points are adjacent.
+    axes: number of variables per point; the variables of neighbouring points are adjacent.
     size: size of the archive. population: number of samples per generation.
 
     >>> unit = np.eye(2)
@@ -102,74 +102,76 @@ class FrontSampling:
 
     def ask(self) -> Floats:
         """Draw samples (population, d) of the mixture."""
-        means = self._rng.integers(len(self.vectors), size=self._population)
+        mean_rows = self._rng.integers(len(self.vectors), size=self._population)
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
-        samples = self.vectors[means]
+        samples = self.vectors[mean_rows]
         is_near, is_in_block, is_noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
-        samples[is_near] += self._draw_near_departures(means[is_near])
-        samples[is_in_block] += self._draw_block_departures(means[is_in_block])
+        samples[is_near] += self._draw_near_departures(mean_rows[is_near])
+        samples[is_in_block] += self._draw_block_departures(mean_rows[is_in_block])
         samples[is_noisy] += self._draw_noise(self._scales[kinds[is_noisy], None])
         return np.clip(samples, self._lower, self._upper)
 
-    def _draw_near_departures(self, means: Ints) -> Floats:
+    def _draw_near_departures(self, mean_rows: Ints) -> Floats:
         """Draw departures (n, d) from means, with the covariance of the nearest solutions, relative to the box."""
-        neighbour_count = min(NEIGHBOURS, len(self.vectors) - 1)
-        departures = np.zeros((len(means), self._lower.size))
-        scaled = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
+        neighbour_count = min(NEIGHBOUR_COUNT, len(self.vectors) - 1)
+        departures = np.zeros((len(mean_rows), self._lower.size))
+        scaled_vectors = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
         # Summed over the first axis: in sequence, with the same rounding on every machine.
-        distances2 = ((scaled[:, means, None] - scaled[:, None, :]) ** 2).sum(axis=0)
-        nearest = np.argsort(distances2, axis=1, kind="stable")[:, 1 : neighbour_count + 1]
+        distances2 = ((scaled_vectors[:, mean_rows, None] - scaled_vectors[:, None, :]) ** 2).sum(axis=0)
+        nearest_rows = np.argsort(distances2, axis=1, kind="stable")[:, 1 : neighbour_count + 1]
         weights = (
             DIFFERENCE_FACTOR
-            * self._rng.standard_normal((len(means), neighbour_count))
+            * self._rng.standard_normal((len(mean_rows), neighbour_count))
             / np.sqrt(max(1, neighbour_count))
         )
         for k in range(neighbour_count):
-            departures += weights[:, k, None] * (self.vectors[nearest[:, k]] - self.vectors[means])
+            departures += weights[:, k, None] * (self.vectors[nearest_rows[:, k]] - self.vectors[mean_rows])
         return departures
 
-    def _draw_block_departures(self, means: Ints) -> Floats:
+    def _draw_block_departures(self, mean_rows: Ints) -> Floats:
         """Draw departures (n, d) of a block of points towards their positions in another solution."""
-        rng, count, points = self._rng, len(means), self._lower.size // self._axes
-        others = rng.integers(len(self.vectors), size=count)
-        lengths = rng.integers(1, points + 1, size=count)
+        rng, count, point_count = self._rng, len(mean_rows), self._lower.size // self._axes
+        other_rows = rng.integers(len(self.vectors), size=count)
+        block_lengths = rng.integers(1, point_count + 1, size=count)
         # Blocks may begin before the first point and end after the last, so that each point is equally often in one.
-        begins, places = rng.integers(1 - lengths, points), np.arange(points)
-        is_in_block = (places >= begins[:, None]) & (places < (begins + lengths)[:, None])
-        is_taken = rng.random((count, 1, self._axes)) < HALF
-        is_taken |= ~is_taken.any(axis=2, keepdims=True)
-        fractions = np.where(rng.random((count, 1)) < HALF, 1.0, rng.uniform(0.0, MAX_BLOCK_STEP, (count, 1)))
-        is_moved = (is_in_block[:, :, None] & is_taken).reshape(count, -1)
-        return np.asarray(fractions * is_moved * (self.vectors[others] - self.vectors[means]))
+        block_starts, point_indices = rng.integers(1 - block_lengths, point_count), np.arange(point_count)
+        is_in_block = (point_indices >= block_starts[:, None]) & (
+            point_indices < (block_starts + block_lengths)[:, None]
+        )
+        is_moving_coordinate = rng.random((count, 1, self._axes)) < EVEN_CHANCE
+        is_moving_coordinate |= ~is_moving_coordinate.any(axis=2, keepdims=True)
+        fractions = np.where(rng.random((count, 1)) < EVEN_CHANCE, 1.0, rng.uniform(0.0, MAX_BLOCK_STEP, (count, 1)))
+        is_moving_variable = (is_in_block[:, :, None] & is_moving_coordinate).reshape(count, -1)
+        return np.asarray(fractions * is_moving_variable * (self.vectors[other_rows] - self.vectors[mean_rows]))
 
     def _draw_noise(self, scales: Floats) -> Floats:
         """Draw noise (n, d) along a few directions per sample, at scales (n, 1) times a random factor per sample."""
         rng, count, direction_count = self._rng, len(scales), len(self._directions)
-        used_count = min(USED_DIRECTIONS, direction_count)
-        picked = rng.integers(direction_count, size=(count, used_count))
+        directions_per_sample = min(MAX_DIRECTIONS, direction_count)
+        picked_directions = rng.integers(direction_count, size=(count, directions_per_sample))
         factors = np.ldexp(rng.uniform(1.0, 2.0, (count, 1)), rng.integers(MIN_EXPONENT, MAX_EXPONENT, (count, 1)))
-        sizes = scales * factors * rng.standard_normal((count, used_count))
-        sizes[:, 1:] *= rng.random((count, used_count - 1)) < HALF
+        step_lengths = scales * factors * rng.standard_normal((count, directions_per_sample))
+        step_lengths[:, 1:] *= rng.random((count, directions_per_sample - 1)) < EVEN_CHANCE
         noise = np.zeros((count, self._lower.size))
-        for k in range(used_count):
-            noise += sizes[:, k, None] * self._directions[picked[:, k]]
+        for k in range(directions_per_sample):
+            noise += step_lengths[:, k, None] * self._directions[picked_directions[:, k]]
         return noise
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
-        """Take samples (n, d) with objectives (n, m) and violations (n, c), all 0 if the constraints are met."""
+        """Process samples (n, d) with objectives (n, m) and violations (n, c), all 0 if the constraints are met."""
         feasible_rows = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
-        has_joined = np.zeros(len(vectors), dtype=bool)
+        is_in_archive = np.zeros(len(vectors), dtype=bool)
         if feasible_rows.size:
             values = np.concatenate([self.objectives, objectives[feasible_rows]])
             archive_rows = self._archive_rows(values)
-            has_joined[feasible_rows[archive_rows[archive_rows >= len(self.vectors)] - len(self.vectors)]] = True
+            is_in_archive[feasible_rows[archive_rows[archive_rows >= len(self.vectors)] - len(self.vectors)]] = True
             self.vectors, self.objectives = (
                 np.concatenate([self.vectors, vectors[feasible_rows]])[archive_rows],
                 values[archive_rows],
             )
         kinds, self._kinds = self._kinds, np.empty(0, dtype=np.int64)
         for kind in np.unique(kinds):
-            should_grow = has_joined[kinds == kind].mean() > TARGET_SUCCESS
+            should_grow = is_in_archive[kinds == kind].mean() > TARGET_SUCCESS
             self._scales[kind] = np.clip(
                 self._scales[kind] * (GROWTH_FACTOR if should_grow else SHRINK_FACTOR), MIN_SCALE, MAX_SCALE
             )

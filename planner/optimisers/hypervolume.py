@@ -15,7 +15,7 @@ from world.kernels import compiled, inner
 Marks = NDArray[np.uint8]
 
 # Number of random points at which coverage is counted.
-PROBES = 4096
+PROBE_COUNT = 4096
 # Seed of these points if no generator is given, so that the same points give the same choice.
 SEED = 20
 
@@ -50,10 +50,10 @@ def _non_dominated(points: Floats) -> Floats:
 
 
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
-    """Return up to `count` rows of points (n, m) below a reference (m,): the best of each objective, then greedy ones.
+    """Return up to `count` rows of points (n, m) below a reference (m,), in the order of a greedy choice.
 
-    Each further point adds most to the covered volume, counted at random probes between the points' best values and the
-    reference. Points that add nothing are last, in their order.
+    The best point of each objective comes first. Each further point adds most to the covered volume, counted at random
+    probes between the points' best values and the reference. Points that add nothing come last, in their order.
 
     rng: draws the probes; None for the same probes in every call.
 
@@ -65,17 +65,21 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
     if not rows_below.size:
         return np.zeros(0, dtype=np.int64)
     points_below = np.ascontiguousarray(points[rows_below])
-    best, generator = points_below.min(axis=0), np.random.default_rng(SEED) if rng is None else rng
-    probes = best + generator.random((PROBES, len(best))) * (reference - best)
-    best_rows = dict.fromkeys(int(np.lexsort((points_below.sum(axis=1), column))[0]) for column in points_below.T)
-    chosen = _greedy(
-        _covered(points_below, np.ascontiguousarray(probes.T)), np.array(list(best_rows)), min(count, len(points_below))
+    best_values, probe_rng = points_below.min(axis=0), np.random.default_rng(SEED) if rng is None else rng
+    probes = best_values + probe_rng.random((PROBE_COUNT, len(best_values))) * (reference - best_values)
+    single_best_rows = dict.fromkeys(
+        int(np.lexsort((points_below.sum(axis=1), column))[0]) for column in points_below.T
     )
-    return np.asarray(rows_below[chosen], dtype=np.int64)
+    chosen_rows = _choose_rows_greedily(
+        _mark_covered_probes(points_below, np.ascontiguousarray(probes.T)),
+        np.array(list(single_best_rows)),
+        min(count, len(points_below)),
+    )
+    return np.asarray(rows_below[chosen_rows], dtype=np.int64)
 
 
 @compiled
-def _covered(points: Floats, probes: Floats) -> Marks:
+def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
     """Return marks (n, p), 1 if points (n, m) are at or below probes (m, p)."""
     marks = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
     for n in range(points.shape[0]):
@@ -86,26 +90,26 @@ def _covered(points: Floats, probes: Floats) -> Marks:
 
 
 @compiled
-def _greedy(covered: Marks, first_rows: Ints, count: int) -> Ints:
+def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
     """Return rows of marks (n, p), (count,): `first_rows`, then always the row that covers most uncovered probes.
 
-    Among equal rows, the first is taken.
-    The gain of a row only decreases as others are chosen, so that its last count is an upper bound, and few rows are
+    Among equal rows, the first is chosen.
+    The gain of a row only decreases as others are chosen. Its last count is therefore an upper bound, and few rows are
     counted again (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
     """
-    size, width = covered.shape
-    uncovered, counted_at, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)
-    chosen = np.empty(count, dtype=np.int64)
+    size, width = marks.shape
+    uncovered, count_positions, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)
+    chosen_rows = np.empty(count, dtype=np.int64)
     for position in range(count):
         row = first_rows[position] if position < first_rows.size else np.argmax(gains)
-        while position >= first_rows.size and counted_at[row] < position:
-            gains[row], counted_at[row] = _count_common_marks(covered[row], uncovered), position
+        while position >= first_rows.size and count_positions[row] < position:
+            gains[row], count_positions[row] = _count_common_marks(marks[row], uncovered), position
             row = np.argmax(gains)
-        chosen[position] = row
+        chosen_rows[position] = row
         gains[row] = -1
         for p in range(width):
-            uncovered[p] &= 1 - covered[row, p]
-    return chosen
+            uncovered[p] &= 1 - marks[row, p]
+    return chosen_rows
 
 
 @inner

@@ -10,16 +10,16 @@ from world.kernels import compiled, inner
 
 
 @compiled
-def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:
+def covariance(rows: Floats, first_column: int, second_column: int, size: int) -> Floats:
     """Return the covariance (size, size) of two groups of columns of centred rows (n, d).
 
-    first, second: first column of each group.
+    first_column, second_column: index of the first column of each group.
     """
     out = np.zeros((size, size))
     for n in range(rows.shape[0]):
         for i in range(size):
             for j in range(size):
-                out[i, j] += rows[n, first + i] * rows[n, second + j]
+                out[i, j] += rows[n, first_column + i] * rows[n, second_column + j]
     out /= rows.shape[0]
     return out
 
@@ -31,13 +31,13 @@ def cholesky(matrix: Floats, ridge: float) -> Floats:
     trace = 0.0
     for i in range(size):
         trace += matrix[i, i]
-    extra = ridge * trace / size + 1e-300
+    diagonal_term = ridge * trace / size + 1e-300
     out = np.zeros((size, size))
     for j in range(size):
-        pivot = matrix[j, j] + extra
+        pivot = matrix[j, j] + diagonal_term
         for k in range(j):
             pivot -= out[j, k] * out[j, k]
-        out[j, j] = np.sqrt(max(pivot, extra))
+        out[j, j] = np.sqrt(max(pivot, diagonal_term))
         for i in range(j + 1, size):
             total = matrix[i, j]
             for k in range(j):
@@ -47,7 +47,7 @@ def cholesky(matrix: Floats, ridge: float) -> Floats:
 
 
 @compiled
-def times_lower(rows: Floats, factor: Floats) -> Floats:
+def multiply_by_lower(rows: Floats, factor: Floats) -> Floats:
     """Multiply rows (n, d) by the transpose of a lower triangular matrix (d, d)."""
     out = np.zeros(rows.shape)
     for n in range(rows.shape[0]):
@@ -58,19 +58,19 @@ def times_lower(rows: Floats, factor: Floats) -> Floats:
 
 
 @compiled
-def times_sparse(rows: Floats, basis: Floats) -> Floats:
+def multiply_by_sparse(rows: Floats, basis: Floats) -> Floats:
     """Multiply rows (n, d) by a basis (d, k) whose entries are mostly 0."""
     columns = rows.T.copy()
     out = np.zeros((basis.shape[1], rows.shape[0]))
     for k in range(basis.shape[1]):
         for d in range(basis.shape[0]):
             if basis[d, k] != 0.0:
-                _add_times(columns[d], basis[d, k], out[k])
+                _add_multiple(columns[d], basis[d, k], out[k])
     return out.T.copy()
 
 
 @inner
-def _add_times(values: Floats, factor: float, out: Floats) -> None:
+def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
     for n in range(out.size):
         out[n] += values[n] * factor
 

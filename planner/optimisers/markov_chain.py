@@ -13,7 +13,7 @@ from world.arrays import Floats
 from world.kernels import compiled, copy_into
 
 # Regularisation added to each variance of a group, as a fraction of their mean.
-RIDGE = 1e-6
+VARIANCE_RIDGE = 1e-6
 
 
 class MarkovChain(Umda):
@@ -38,7 +38,7 @@ class MarkovChain(Umda):
         """Draw samples group by group, each conditional on the previous group, and keep them inside the box."""
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
-        slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, RIDGE)
+        slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, VARIANCE_RIDGE)
         return self._redraw(
             lambda rows: mean + width * draw_chain(self._rng.normal(size=(rows, mean.size)), slope, spread), count
         )

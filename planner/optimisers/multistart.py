@@ -17,28 +17,28 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.optimisers.box_search import BoxSearch
-from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
+from planner.optimisers.linear_algebra import cholesky, covariance, multiply_by_lower
 from world.arrays import Floats, Ints
 
-# Smallest and largest standard deviation of a start, as fractions of the box; drawn log-uniformly.
-WIDTHS = 0.003, 0.3
+# Minimum and maximum standard deviation of a start, as fractions of the box; drawn log-uniformly.
+WIDTH_RANGE = 0.003, 0.3
 # Standard deviation of the first start, as a fraction of the box.
 FIRST_WIDTH = 0.2
-# Evaluations of a slice per variable.
-SLICE = 25
-# Fraction of the searches that start from the centre of the box, where users put expected values; the others start
-# anywhere.
-FROM_MIDDLE = 0.5
+# Number of evaluations of a slice, per variable.
+SLICE_EVALUATIONS = 25
+# Fraction of the searches that start from the centre of the box, where users put expected values; the other searches
+# start anywhere.
+CENTRE_START_FRACTION = 0.5
 # Fraction of all evaluations after which a search waits unless it is the best.
-MAX_SHARE = 0.1
+MAX_EVALUATION_FRACTION = 0.1
 # Number of first evaluations of equal rank after which a start is abandoned.
-BLIND_START = 100
+MAX_BLIND_START_EVALUATIONS = 100
 # Number of later evaluations of equal rank after which a search is abandoned.
-BLIND = 1000
+MAX_BLIND_EVALUATIONS = 1000
 # Factor on the width of a search in each generation of equal rank.
-NARROWING = 0.9
+NARROWING_FACTOR = 0.9
 # Standard deviation at which a search has converged, as a fraction of the box.
-CONVERGED = 1e-10
+CONVERGED_DEVIATION = 1e-10
 # Ratio of the largest to the smallest standard deviation at which a search has converged.
 MAX_DEVIATION_RATIO = 1e7
 
@@ -55,14 +55,14 @@ class Gaussian:
         self.mean, self.deviation, self.population = mean.copy(), deviation, population
         weights = np.log(population / 2.0 + 0.5) - np.log(np.arange(1, population // 2 + 1))
         self.weights = weights / weights.sum()
-        effective = 1.0 / float((self.weights**2).sum())
-        self._effective = effective
+        parent_count = 1.0 / float((self.weights**2).sum())
+        self._effective_parent_count = parent_count
         # Rates of table 1 of the tutorial.
-        self._step_rate = (effective + 2.0) / (size + effective + 5.0)
-        self._damping = 1.0 + 2.0 * max(0.0, math.sqrt((effective - 1.0) / (size + 1.0)) - 1.0) + self._step_rate
-        self._path_rate = (4.0 + effective / size) / (size + 4.0 + 2.0 * effective / size)
-        self._rank_one_rate = 2.0 / ((size + 1.3) ** 2 + effective)
-        rate = 2.0 * (effective - 2.0 + 1.0 / effective) / ((size + 2.0) ** 2 + effective)
+        self._step_rate = (parent_count + 2.0) / (size + parent_count + 5.0)
+        self._damping = 1.0 + 2.0 * max(0.0, math.sqrt((parent_count - 1.0) / (size + 1.0)) - 1.0) + self._step_rate
+        self._path_rate = (4.0 + parent_count / size) / (size + 4.0 + 2.0 * parent_count / size)
+        self._rank_one_rate = 2.0 / ((size + 1.3) ** 2 + parent_count)
+        rate = 2.0 * (parent_count - 2.0 + 1.0 / parent_count) / ((size + 2.0) ** 2 + parent_count)
         self._rank_mu_rate = min(1.0 - self._rank_one_rate, rate)
         self._expected_length = math.sqrt(size) * (1.0 - 1.0 / (4.0 * size) + 1.0 / (21.0 * size**2))
         self._matrix = np.diag(np.ones(size) if scale is None else scale**2)
@@ -72,7 +72,7 @@ class Gaussian:
         self._generations = 0
         self._blind_evaluations, self._stalled_generations = 0, 0
         self.evaluations = 0
-        self.done = False
+        self.is_done = False
         # The best point (d,) in the unit box and its scores (c,), once a generation has points of different rank.
         self.best: tuple[Floats, Floats] | None = None
         # Width and best scores after each slice.
@@ -86,16 +86,21 @@ class Gaussian:
     def draw(self, rng: np.random.Generator) -> Floats:
         """Draw a generation (population, d) in the unit box."""
         self._draws = rng.standard_normal((self.population, self.mean.size))
-        return reflect_into_box(self.mean + self.deviation * times_lower(self._draws, self._factor))
+        return reflect_into_box(self.mean + self.deviation * multiply_by_lower(self._draws, self._factor))
 
-    def learn(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
-        """Take the scores (n, c) of the last generation (n, d).  noise: (n,) random numbers that break ties."""
+    def update(self, points: Floats, scores: Floats, rank: Callable[[Floats], Ints], noise: Floats) -> None:
+        """Update the Gaussian by the scores (n, c) of its last generation (n, d).
+
+        noise: (n,) random numbers that break ties.
+        """
         self.evaluations += len(points)
         ranks = rank(scores)
         if not ranks.any():
             self._blind_evaluations += len(points)
-            self.deviation *= 1.0 if self.best is None else NARROWING
-            self.done = self._blind_evaluations >= (BLIND_START if self.best is None else BLIND)
+            self.deviation *= 1.0 if self.best is None else NARROWING_FACTOR
+            self.is_done = self._blind_evaluations >= (
+                MAX_BLIND_START_EVALUATIONS if self.best is None else MAX_BLIND_EVALUATIONS
+            )
             return
         self._blind_evaluations = 0
         order = np.lexsort((noise, ranks))
@@ -106,29 +111,31 @@ class Gaussian:
                 self._stalled_generations = 0
             self.best = points[best_row].copy(), scores[best_row].copy()
         self._update_distribution(self._draws[order[: self.weights.size]])
-        spread = np.diag(self._factor)
-        patience = 30 + round(60 * self.mean.size / self.population)
+        factor_diagonal = np.diag(self._factor)
+        max_stalled_generations = 30 + round(60 * self.mean.size / self.population)
         max_deviation = self.deviation * math.sqrt(float(np.diag(self._matrix).max()))
-        self.done = (
-            max_deviation < CONVERGED
-            or float(spread.max()) > MAX_DEVIATION_RATIO * float(spread.min())
-            or self._stalled_generations > patience
+        self.is_done = (
+            max_deviation < CONVERGED_DEVIATION
+            or float(factor_diagonal.max()) > MAX_DEVIATION_RATIO * float(factor_diagonal.min())
+            or self._stalled_generations > max_stalled_generations
         )
 
     def _update_distribution(self, draws: Floats) -> None:
-        """Move mean, deviation and covariance towards the better half's standard normal draws (m, d), best first."""
+        """Move mean, deviation and covariance towards the normal draws (m, d) of the better half, best first."""
         self._generations += 1
-        steps = times_lower(draws, self._factor)
-        draw, step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
-        self.mean = reflect_into_box(self.mean + self.deviation * step)
+        steps = multiply_by_lower(draws, self._factor)
+        mean_draw, mean_step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
+        self.mean = reflect_into_box(self.mean + self.deviation * mean_step)
         rate = self._step_rate
-        self._step_path = (1.0 - rate) * self._step_path + math.sqrt(rate * (2.0 - rate) * self._effective) * draw
+        self._step_path = (1.0 - rate) * self._step_path + math.sqrt(
+            rate * (2.0 - rate) * self._effective_parent_count
+        ) * mean_draw
         length = math.sqrt(float((self._step_path**2).sum()))
         expected_length = self._expected_length * math.sqrt(1.0 - (1.0 - rate) ** (2 * self._generations))
         is_steady = float(length < (1.4 + 2.0 / (self.mean.size + 1.0)) * expected_length)
         rate = self._path_rate
-        path_factor = is_steady * math.sqrt(rate * (2.0 - rate) * self._effective)
-        self._path = (1.0 - rate) * self._path + path_factor * step
+        path_factor = is_steady * math.sqrt(rate * (2.0 - rate) * self._effective_parent_count)
+        self._path = (1.0 - rate) * self._path + path_factor * mean_step
         size, parent_count = self.mean.size, self.weights.size
         rank_mu_update = covariance(np.sqrt(self.weights * parent_count)[:, None] * steps, 0, 0, size)
         rank_one_update = np.outer(self._path, self._path) + (1.0 - is_steady) * rate * (2.0 - rate) * self._matrix
@@ -172,29 +179,32 @@ class Multistart(BoxSearch):
     ) -> None:
         super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._population = population
-        self._middle, self._scale = np.full(lower.size, 0.5), None
+        self._centre, self._scale = np.full(lower.size, 0.5), None
         self._searches: list[Gaussian] = []
         # Evaluations at the beginning of the slice; evaluations spent on new starts and on continued searches.
-        self._slice_start, self._continued = 0, False
-        self._spent = {False: 0, True: 0}
+        self._slice_start, self._is_continued = 0, False
+        self._spent_evaluations = {False: 0, True: 0}
         self._search: Gaussian | None = None
         if initial is None:
             self._search = self._start_search()
             self._draw(self._search)
 
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of the last samples of `ask`, and draw the next generation."""
+        """Process the scores (n, c) of the last samples of `ask`, and draw the next generation."""
         ranks, noise = self._rank(scores), self._rng.random(len(scores))
         order = np.lexsort((noise, ranks))
-        self._store_generation(self._asked[order], scores[order])
+        self._store_generation(self._pending_samples[order], scores[order])
         if self._search is None:
-            better_half = self._to_unit_box(self._asked[order[: self._half]])
-            self._middle, spread = better_half.mean(axis=0), np.maximum(better_half.std(axis=0), WIDTHS[0])
-            self._scale = spread / math.sqrt(float((spread**2).mean()))
+            better_half = self._to_unit_box(self._pending_samples[order[: self._half]])
+            self._centre, deviations = better_half.mean(axis=0), np.maximum(better_half.std(axis=0), WIDTH_RANGE[0])
+            self._scale = deviations / math.sqrt(float((deviations**2).mean()))
             self._search = self._start_search()
         else:
-            self._search.learn(self._asked_in_unit_box, scores, self._rank, noise)
-            if self._search.done or self._search.evaluations - self._slice_start >= SLICE * self.lower.size:
+            self._search.update(self._pending_unit_samples, scores, self._rank, noise)
+            if (
+                self._search.is_done
+                or self._search.evaluations - self._slice_start >= SLICE_EVALUATIONS * self.lower.size
+            ):
                 self._search = self._next_search(self._search)
         self._draw(self._search)
 
@@ -208,12 +218,14 @@ class Multistart(BoxSearch):
         return (points - self.lower) / (self.upper - self.lower)
 
     def _draw(self, search: Gaussian) -> None:
-        self._asked_in_unit_box = search.draw(self._rng)
-        self._asked = np.clip(self.lower + self._asked_in_unit_box * (self.upper - self.lower), self.lower, self.upper)
+        self._pending_unit_samples = search.draw(self._rng)
+        self._pending_samples = np.clip(
+            self.lower + self._pending_unit_samples * (self.upper - self.lower), self.lower, self.upper
+        )
 
     def _next_search(self, search: Gaussian) -> Gaussian:
         """Return the search that gets the next slice, after a slice of `search`."""
-        self._spent[self._continued] += search.evaluations - self._slice_start
+        self._spent_evaluations[self._is_continued] += search.evaluations - self._slice_start
         next_search = search if self._may_continue(search) else self._choose_search()
         self._slice_start = next_search.evaluations
         return next_search
@@ -230,23 +242,29 @@ class Multistart(BoxSearch):
         other_curves = [
             other_search.curve for other_search in self._searches if other_search is not search and other_search.curve
         ]
-        if search.done or not other_curves or search.evaluations > MAX_SHARE * sum(self._spent.values()):
+        if (
+            search.is_done
+            or not other_curves
+            or search.evaluations > MAX_EVALUATION_FRACTION * sum(self._spent_evaluations.values())
+        ):
             return False
         if self._rank(np.stack([search.best[1], *(curve[-1][1] for curve in other_curves)]))[0] == 0:
             return False
         other_scores = [
             next((scores for width, scores in curve if width <= search.width), None) for curve in other_curves
         ]
-        equally_narrow = [scores for scores in other_scores if scores is not None]
-        ranks = self._rank(np.stack([search.best[1], *equally_narrow]))
-        return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow)
+        equally_narrow_scores = [scores for scores in other_scores if scores is not None]
+        ranks = self._rank(np.stack([search.best[1], *equally_narrow_scores]))
+        return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow_scores)
 
     def _choose_search(self) -> Gaussian:
         """Return the best waiting search or a new start, whichever kind has had fewer evaluations."""
-        waiting = [search for search in self._searches if search.curve and not search.done]
-        self._continued = bool(waiting) and self._spent[True] <= self._spent[False]
-        if self._continued:
-            return waiting[int(np.argmin(self._rank(np.stack([search.curve[-1][1] for search in waiting]))))]
+        waiting_searches = [search for search in self._searches if search.curve and not search.is_done]
+        self._is_continued = bool(waiting_searches) and self._spent_evaluations[True] <= self._spent_evaluations[False]
+        if self._is_continued:
+            return waiting_searches[
+                int(np.argmin(self._rank(np.stack([search.curve[-1][1] for search in waiting_searches]))))
+            ]
         return self._start_search()
 
     def _start_search(self) -> Gaussian:
@@ -254,11 +272,11 @@ class Multistart(BoxSearch):
         size = self.lower.size
         min_population = min(self._population, 4 + int(3.0 * math.log(size)))
         if not self._searches:
-            search = Gaussian(self._middle, FIRST_WIDTH, min_population, self._scale)
+            search = Gaussian(self._centre, FIRST_WIDTH, min_population, self._scale)
         else:
-            min_log, max_log = (math.log(width) for width in WIDTHS)
+            min_log, max_log = (math.log(width) for width in WIDTH_RANGE)
             width = math.exp(self._rng.uniform(min_log, max_log))
-            mean = self._middle if self._rng.random() < FROM_MIDDLE else self._rng.random(size)
+            mean = self._centre if self._rng.random() < CENTRE_START_FRACTION else self._rng.random(size)
             # The size of generations grows with the number of starts.
             growth = max(1.0, min(self._population / min_population, 1.0 + len(self._searches) / 4.0))
             search = Gaussian(mean, width, int(min_population * growth ** self._rng.random()), self._scale)
@@ -268,5 +286,5 @@ class Multistart(BoxSearch):
 
 def reflect_into_box(points: Floats) -> Floats:
     """Return points (n, d) or (d,) reflected into the unit box at its sides."""
-    folded = np.mod(points, 2.0)
-    return np.where(folded > 1.0, 2.0 - folded, folded)
+    folded_points = np.mod(points, 2.0)
+    return np.where(folded_points > 1.0, 2.0 - folded_points, folded_points)

@@ -13,23 +13,23 @@ import numpy as np
 from world.arrays import Flags, Floats, Ints
 from world.kernels import compiled, copy_into, inner
 
-# Redraws of an infeasible first sample before it is accepted.
-FIRST_REDRAWS = 8
-# Redraws of an infeasible later sample before it is accepted.
-REDRAWS = 4
+# Maximum number of redraws of an infeasible first sample before it is accepted.
+MAX_FIRST_REDRAWS = 8
+# Maximum number of redraws of an infeasible later sample before it is accepted.
+MAX_REDRAWS = 4
 # Clearing radius of niches, as a fraction of the sampling deviation.
-CLEARING = 0.5
+CLEARING_RADIUS_RATIO = 0.5
 # Largest fraction of a group's samples that is selected.
-MAX_SELECTED_SHARE = 0.5
+MAX_SELECTED_FRACTION = 0.5
 # Number of samples of each group that are selected regardless of their cost.
-MIN_SELECTED = 4
+MIN_SELECTED_COUNT = 4
 
 
 class NicheSampling:
     """Sampling of groups of variables (g, n, d), from the whole box to the niches of the best samples.
 
     lower, upper: (g, d) boxes.
-    allowed: samples (n, d) of groups (n,) -> feasibility (n,).
+    allowed: function of samples (n, d) and their groups (n,) that returns if each sample is feasible, (n,).
     rng: random generator of all samples.
 
     >>> lower, upper = np.full((3, 2), -2.0), np.full((3, 2), 6.0)
@@ -69,7 +69,7 @@ class NicheSampling:
                 np.minimum(lower[groups, 0] + fractions * (upper - lower)[groups, 0], self._upper[groups])
             )
 
-        return self._draw(size, draw, FIRST_REDRAWS)
+        return self._draw(size, draw, MAX_FIRST_REDRAWS)
 
     def next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
@@ -80,7 +80,7 @@ class NicheSampling:
         a selected sample. elite: (g, d), always selected.
         """
         selected, counts = _select(
-            rows, costs, elite, CLEARING * deviation, max_cost, max(1, int(MAX_SELECTED_SHARE * count))
+            rows, costs, elite, CLEARING_RADIUS_RATIO * deviation, max_cost, max(1, int(MAX_SELECTED_FRACTION * count))
         )
         groups, parents = len(rows), selected.shape[1]
 
@@ -91,22 +91,22 @@ class NicheSampling:
             )
             return np.clip(samples, self._lower[group_numbers], self._upper[group_numbers])
 
-        out = self._draw((groups, count, rows.shape[2]), draw, REDRAWS)
+        out = self._draw((groups, count, rows.shape[2]), draw, MAX_REDRAWS)
         is_selected = np.arange(parents) < counts[:, None]
         out[:, :parents][is_selected] = selected[is_selected]
         return out
 
-    def _draw(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], redraws: int) -> Floats:
+    def _draw(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
         """Draw samples of this shape with a function of the group numbers, and redraw infeasible samples."""
         groups = np.repeat(np.arange(size[0]), size[1])
         samples = draw(groups)
-        infeasible = np.flatnonzero(~self._allowed(samples, groups))
-        for _ in range(redraws):
-            if not infeasible.size:
+        infeasible_rows = np.flatnonzero(~self._allowed(samples, groups))
+        for _ in range(max_redraws):
+            if not infeasible_rows.size:
                 break
-            redrawn = draw(groups[infeasible])
-            samples[infeasible] = redrawn
-            infeasible = infeasible[~self._allowed(redrawn, groups[infeasible])]
+            redrawn_samples = draw(groups[infeasible_rows])
+            samples[infeasible_rows] = redrawn_samples
+            infeasible_rows = infeasible_rows[~self._allowed(redrawn_samples, groups[infeasible_rows])]
         return samples.reshape(size)
 
 
@@ -114,7 +114,7 @@ class NicheSampling:
 def _select(
     rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, max_count: int
 ) -> tuple[Floats, Ints]:
-    """Select samples (g, number, d) of each group, the elite first, and return them with their numbers (g,)."""
+    """Select samples (g, number, d) of each group, the elite first, and return them with their counts (g,)."""
     groups, _, size = rows.shape
     selected, counts = np.zeros((groups, max_count, size)), np.ones(groups, dtype=np.int64)
     for g in range(groups):
@@ -124,7 +124,7 @@ def _select(
             if (
                 selected_count == max_count
                 or costs[g, k] == np.inf
-                or (costs[g, k] > max_cost and selected_count >= MIN_SELECTED)
+                or (costs[g, k] > max_cost and selected_count >= MIN_SELECTED_COUNT)
             ):
                 break
             if _is_distinct(rows[g, k], selected[g, :selected_count], clearing_radius):
@@ -135,7 +135,7 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
-    """Return True if a sample (d,) differs from each other one by at least `clearing_radius` in some variable."""
+    """Return True if a sample (d,) differs from each other sample by at least `clearing_radius` in some variable."""
     for n in range(other_rows.shape[0]):
         is_near = True
         for d in range(row.size):

@@ -20,7 +20,7 @@ NO_GOAL = -np.inf
 
 # Run length of insertion sort.
 INSERTION_RUN = 8
-# Number of rows of two columns above which a tree is faster than a scan.
+# Number of rows with two columns above which a tree is faster than a scan.
 TREE_THRESHOLD = 4000
 
 
@@ -50,16 +50,19 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
     """
     columns = [column for level in levels for column in level.columns]
     goals = [goal for level in levels for goal in level.goals]
-    lowest = list(levels[-1].columns)
-    # The lowest level is appended without goals, for rows that are equal on all levels.
-    table = np.concatenate([np.maximum(scores[:, columns], goals), scores[:, lowest]], axis=1)
-    widths = np.array([*(len(level.columns) for level in levels), len(lowest)])
+    lowest_level_columns = list(levels[-1].columns)
+    # The lowest level is appended without goals, to compare rows that are equal on all levels.
+    table = np.concatenate([np.maximum(scores[:, columns], goals), scores[:, lowest_level_columns]], axis=1)
+    widths = np.array([*(len(level.columns) for level in levels), len(lowest_level_columns)])
     return np.asarray(_rank_rows(np.ascontiguousarray(table.T), widths))
 
 
 @compiled
 def _rank_rows(table: Floats, widths: Ints) -> Ints:
-    """Return the ranks (n,) of a table (c, n) whose levels have these widths."""
+    """Return the ranks (n,) of the columns of a table (c, n).
+
+    widths: number of rows of each level in the table.
+    """
     count = table.shape[1]
     row_ranks = np.zeros(count, dtype=np.int64)
     order, scratch = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
@@ -67,35 +70,35 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:
         order[k] = k
     sorted_rows = np.empty((table.shape[0], count))
     marks = np.empty(count, dtype=np.int64)
-    # Groups of tied rows: the position in the order at which each begins, followed by the count.
-    begins, next_begins = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
-    begins[0], begins[1], group_count = 0, count, 1
+    # Groups of tied rows: the start of each group in the order, followed by the count.
+    group_starts, next_group_starts = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
+    group_starts[0], group_starts[1], group_count = 0, count, 1
     column = 0
     for width in widths:
         next_group_count = 0
         for g in range(group_count):
-            begin, end = begins[g], begins[g + 1]
-            next_begins[next_group_count] = begin
+            start, end = group_starts[g], group_starts[g + 1]
+            next_group_starts[next_group_count] = start
             next_group_count += 1
-            if end - begin == 1:
+            if end - start == 1:
                 continue
-            _merge_sort(table, column, width, order, scratch, begin, end)
+            _merge_sort(table, column, width, order, scratch, start, end)
             for c in range(width):
-                for k in range(begin, end):
+                for k in range(start, end):
                     sorted_rows[c, k] = table[column + c, order[k]]
-            if width == 2 and end - begin > TREE_THRESHOLD:
-                _add_dominators_by_tree(sorted_rows, begin, end, order, row_ranks)
+            if width == 2 and end - start > TREE_THRESHOLD:
+                _add_dominator_counts_by_tree(sorted_rows, start, end, order, row_ranks)
             else:
-                _add_dominators(sorted_rows, width, begin, end, order, marks, row_ranks)
-            for k in range(begin + 1, end):
+                _add_dominator_counts(sorted_rows, width, start, end, order, marks, row_ranks)
+            for k in range(start + 1, end):
                 for c in range(width):
                     if sorted_rows[c, k] != sorted_rows[c, k - 1]:
-                        next_begins[next_group_count] = k
+                        next_group_starts[next_group_count] = k
                         next_group_count += 1
                         break
-        next_begins[next_group_count] = count
+        next_group_starts[next_group_count] = count
         group_count = next_group_count
-        begins, next_begins = next_begins, begins
+        group_starts, next_group_starts = next_group_starts, group_starts
         column += width
         if group_count == count:
             # No ties left for lower levels to decide.
@@ -145,7 +148,7 @@ def _precedes(table: Floats, column: int, width: int, a: int, b: int) -> bool:
 
 
 @inner
-def _add_dominators(
+def _add_dominator_counts(
     rows: Floats, width: int, begin: int, end: int, order: Ints, scratch: Ints, row_ranks: Ints
 ) -> None:
     """Add the number of dominators of each row of a group to `row_ranks`.
@@ -167,7 +170,7 @@ def _add_dominators(
                 for j in range(marks.size):
                     marks[j] = 1
                 for c in range(1, width):
-                    _clear_above(rows[c, begin:k], rows[c, k], marks)
+                    _clear_marks_above(rows[c, begin:k], rows[c, k], marks)
                 dominators = _count_marks(marks)
         row_ranks[order[k]] += dominators
 
@@ -182,7 +185,7 @@ def _count_at_most(values: Floats, limit: float) -> int:
 
 
 @inner
-def _clear_above(values: Floats, limit: float, marks: Ints) -> None:
+def _clear_marks_above(values: Floats, limit: float, marks: Ints) -> None:
     """Clear the marks of values above the limit."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
@@ -198,45 +201,45 @@ def _count_marks(marks: Ints) -> int:
 
 
 @inner
-def _rank_places(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
-    """Return the places of a group's rows in the order of the second column, from 1, and the number of places.
+def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
+    """Return the dense ranks of a group's rows by the second column, from 1, and the number of different ranks.
 
-    Equal values have the same place.
+    Equal values have the same rank.
     """
     count = end - begin
-    order, places = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
+    order, dense_ranks = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     for k in range(count):
         order[k] = begin + k
-    _merge_sort(rows, 1, 1, order, places, 0, count)
-    place = 0
+    _merge_sort(rows, 1, 1, order, dense_ranks, 0, count)
+    rank = 0
     for k in range(count):
         if k == 0 or rows[1, order[k]] != rows[1, order[k - 1]]:
-            place += 1
-        places[order[k] - begin] = place
-    return places, place
+            rank += 1
+        dense_ranks[order[k] - begin] = rank
+    return dense_ranks, rank
 
 
 @inner
-def _add_dominators_by_tree(rows: Floats, begin: int, end: int, order: Ints, row_ranks: Ints) -> None:
+def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, row_ranks: Ints) -> None:
     """Add the number of dominators of each row of a group to `row_ranks`, in O(n log n), for many rows.
 
     Uses a Fenwick tree over the second of two columns.
     """
-    places, place_count = _rank_places(rows, begin, end)
-    tree = np.zeros(place_count + 1, dtype=np.int64)
+    dense_ranks, rank_count = _dense_ranks(rows, begin, end)
+    tree = np.zeros(rank_count + 1, dtype=np.int64)
     k = begin
     while k < end:
         group_begin = k
-        place = places[k - begin]
+        rank = dense_ranks[k - begin]
         dominators = 0
-        node = place
+        node = rank
         while node > 0:
             dominators += tree[node]
             node -= node & -node
         while k < end and rows[0, k] == rows[0, group_begin] and rows[1, k] == rows[1, group_begin]:
             row_ranks[order[k]] += dominators
             k += 1
-        node = place
-        while node <= place_count:
+        node = rank
+        while node <= rank_count:
             tree[node] += k - group_begin
             node += node & -node

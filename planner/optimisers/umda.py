@@ -9,15 +9,15 @@ from collections.abc import Callable
 import numpy as np
 
 from planner.optimisers.box_search import BoxSearch
-from planner.optimisers.linear_algebra import times_sparse
+from planner.optimisers.linear_algebra import multiply_by_sparse
 from world.arrays import Floats, Ints
 
-# Redraws of a sample outside the box before it is clipped.
-REDRAWS = 10
+# Maximum number of redraws of a sample outside the box before it is clipped.
+MAX_REDRAWS = 10
 
 
 class Umda(BoxSearch):
-    """UMDA: keeps the better half of a population and replaces the other half by samples of its marginals.
+    """UMDA: keep the better half of a population, and replace the other half by samples of its marginals.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -55,12 +55,12 @@ class Umda(BoxSearch):
 
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of the last samples of `ask`, select the better half, and draw the next samples."""
-        samples = np.concatenate([self.samples, self._asked])
+        samples = np.concatenate([self.samples, self._pending_samples])
         all_scores = np.concatenate([self.scores, scores]) if len(self.scores) else scores
         # Ties are broken by a seeded draw, not by age.
         order = np.lexsort((self._rng.random(len(all_scores)), self._rank(all_scores)))[: self._half]
         self.samples, self.scores = samples[order], all_scores[order]
-        self._asked = self._sample(len(samples) - self._half)
+        self._pending_samples = self._sample(len(samples) - self._half)
 
     def _sample(self, count: int) -> Floats:
         """Draw samples of independent Gaussians (maximum likelihood, 1/N), redrawn and finally clipped to the box."""
@@ -76,29 +76,29 @@ class Umda(BoxSearch):
         )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Draw samples with `draw`; samples outside the box are redrawn and finally clipped."""
+        """Draw samples with `draw`, redraw those outside the box, and finally clip them."""
         samples = draw(count)
-        rows = np.flatnonzero(((samples < self.lower) | (samples > self.upper)).any(axis=1))
-        for _ in range(REDRAWS):
-            if rows.size == 0:
+        outside_rows = np.flatnonzero(((samples < self.lower) | (samples > self.upper)).any(axis=1))
+        for _ in range(MAX_REDRAWS):
+            if outside_rows.size == 0:
                 return samples
-            redrawn = draw(rows.size)
-            samples[rows] = redrawn
-            rows = rows[((redrawn < self.lower) | (redrawn > self.upper)).any(axis=1)]
+            redrawn_samples = draw(outside_rows.size)
+            samples[outside_rows] = redrawn_samples
+            outside_rows = outside_rows[((redrawn_samples < self.lower) | (redrawn_samples > self.upper)).any(axis=1)]
         return np.clip(samples, self.lower, self.upper)
 
     def _redraw_each(self, samples: Floats, mean: Floats, deviation: Floats) -> Floats:
         """Redraw the values outside the box from independent Gaussians, and finally clip them."""
         rows, columns = np.nonzero((samples < self.lower) | (samples > self.upper))
-        for _ in range(REDRAWS):
+        for _ in range(MAX_REDRAWS):
             if rows.size == 0:
                 return samples
-            redrawn = mean[columns] + deviation[columns] * self._rng.standard_normal(columns.size)
-            samples[rows, columns] = redrawn
-            is_outside = (redrawn < self.lower[columns]) | (redrawn > self.upper[columns])
+            redrawn_values = mean[columns] + deviation[columns] * self._rng.standard_normal(columns.size)
+            samples[rows, columns] = redrawn_values
+            is_outside = (redrawn_values < self.lower[columns]) | (redrawn_values > self.upper[columns])
             rows, columns = rows[is_outside], columns[is_outside]
         return np.clip(samples, self.lower, self.upper)
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    return times_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))
+    return multiply_by_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))

@@ -103,7 +103,7 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
         if not view.inside or view.distance < required_distance:
             return _ClosedHeights(-math.inf, math.inf)
     max_margin = zones.max_horizontal + lateral
-    to_east, to_north = line.east + line.run * line.course_east, line.north + line.run * line.course_north
+    to_east, to_north = line.east + line.length * line.course_east, line.north + line.length * line.course_north
     west, east = min(line.east, to_east) - max_margin, max(line.east, to_east) + max_margin
     south, north = min(line.north, to_north) - max_margin, max(line.north, to_north) + max_margin
     for z in range(first_exclusion_near(zones, west), zones.required.shape[0]):

@@ -5,7 +5,14 @@ import math
 import pytest
 
 from aircraft.catalog import load_aircraft
-from aircraft.contacts import Gear, _center_of_gravity, _own_contacts, contacts_of, usual_contacts, with_contacts
+from aircraft.contacts import (
+    Gear,
+    _center_of_gravity,
+    _model_contacts,
+    contacts_of,
+    default_contacts,
+    with_contacts,
+)
 from flight.dynamics.fdm import Fdm
 
 START = (46.0, 8.0)
@@ -13,7 +20,7 @@ START = (46.0, 8.0)
 
 @pytest.mark.parametrize("gear", ["belly", "wheels"])
 def test_contacts_are_the_same_on_both_sides_and_carry_on_three_points(gear: Gear) -> None:
-    made = usual_contacts(load_aircraft("x8"), gear)
+    made = default_contacts(load_aircraft("x8"), gear)
     assert sum(one.stands for one in made) == 3
     assert sum(one.right for one in made) == pytest.approx(0.0)
     # The centre of gravity is within what carries.
@@ -43,7 +50,7 @@ def test_places_count_from_the_centre_of_gravity_and_in_the_model_s_unit() -> No
     <ground_reactions>
     <contact type="BOGEY" name="N"><location unit="IN"><x>20</x><y>-10</y><z>-35</z></location></contact>
     </ground_reactions></fdm_config>"""
-    (wheel,) = _own_contacts(model)
+    (wheel,) = _model_contacts(model)
     assert (wheel.forward, wheel.right, wheel.down) == pytest.approx((20 * 0.0254, -10 * 0.0254, 40 * 0.0254))
 
 
@@ -71,7 +78,7 @@ def test_a_model_with_skids_of_its_own_stands_on_its_lowest_points_and_one_with_
     def standing(*contacts: tuple[str, str, float, float]) -> list[str]:
         text = "".join(contact_xml(*one) for one in contacts)
         model = f"<fdm_config><ground_reactions>{text}</ground_reactions></fdm_config>".encode()
-        return [one.name for one in _own_contacts(model) if one.stands]
+        return [one.name for one in _model_contacts(model) if one.stands]
 
     assert standing(*skids) == ["front", "rear"]
     assert standing(*skids, ("BOGEY", "wheel", 0.1, 0.3)) == ["wheel"]

@@ -8,7 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aircraft.envelope import GRAVITY, UNDECIDED, Envelope, _interpolate_rows, ground_slope, ground_speed, turn_radius
+from aircraft.envelope import (
+    GRAVITY,
+    UNDECIDED_SIGMAS,
+    Envelope,
+    _interpolate_rows,
+    ground_slope,
+    ground_speed,
+    turn_radius,
+)
 from logs.verdict import tolerances
 from tests.setups import falling_envelope
 
@@ -118,16 +126,16 @@ def test_level_speeds_lie_between_those_of_the_heights() -> None:
 
 def test_the_verdict_publishes_what_decides(monkeypatch: pytest.MonkeyPatch) -> None:
     # 2 deviations of 0.05 rad, and not 1.645, once the one constant says so.
-    monkeypatch.setattr("aircraft.envelope.UNDECIDED", 2.0)
+    monkeypatch.setattr("aircraft.envelope.UNDECIDED_SIGMAS", 2.0)
     known = replace(falling_envelope(), climb=np.full_like(falling_envelope().climb, 0.2), climb_sd=0.05)
-    assert known.surely().climb == pytest.approx(0.1)
+    assert known.with_margin().climb == pytest.approx(0.1)
     monkeypatch.undo()
-    assert tolerances.UNDECIDED_FRACTION == UNDECIDED == 1.645
+    assert tolerances.UNDECIDED_FRACTION == UNDECIDED_SIGMAS == 1.645
 
 
 def test_the_fastest_that_is_sure_is_1_645_deviations_less_and_no_slower_than_the_slowest() -> None:
     known = replace(falling_envelope(), fastest_sd=2.0)
-    assert known.surely().level_speed_max == pytest.approx(falling_envelope().level_speed_max - 3.29)
-    assert known.surely().fastest_sd == 0.0
-    none = replace(falling_envelope(), fastest_sd=50.0).surely()
+    assert known.with_margin().level_speed_max == pytest.approx(falling_envelope().level_speed_max - 3.29)
+    assert known.with_margin().fastest_sd == 0.0
+    none = replace(falling_envelope(), fastest_sd=50.0).with_margin()
     assert none.level_speed_max.tolist() == none.level_speed_min.tolist()

@@ -171,20 +171,20 @@ def test_plans_leave_nothing_open_at_the_airspeeds_that_are_flown() -> None:
     flat = np.zeros((TURNS.size, SPEED_RATIOS.size))
     tracking = TrackingError(25.0, flat, flat, flat, flat, across=1.0, up=1.0, lag=0.0, step=0.0)
     limits = Limits(None, None, None, 30.0, unsure, 25.0, 0.5, Wind(), tracking)
-    climb, descent = (math.degrees(angle) for angle in limits.surely().slopes(0.0, 1000.0))
+    climb, descent = (math.degrees(angle) for angle in limits.with_margin().slopes(0.0, 1000.0))
     factor = air_density_factor(1000.0)
     assert climb == pytest.approx(12.5 - 8.9 * 25.0 * (factor - 1.0) / 5.0 - 1.645 * 2.0, abs=1e-6)
     assert descent == pytest.approx(7.8 + 2.2 * 25.0 * (factor - 1.0) / 5.0 - 1.645, abs=1e-6)
     # Over the ground the headwind counts less, the faster it is flown: tan = v sin(a) / (v cos(a) - w).
     sure, fast, wind = math.radians(climb), 25.0 * factor, 8.0
-    against = replace(limits, wind=Wind(wind, 0.0)).surely().slopes(0.0, 1000.0)[0]
+    against = replace(limits, wind=Wind(wind, 0.0)).with_margin().slopes(0.0, 1000.0)[0]
     assert math.tan(against) == pytest.approx(fast * math.sin(sure) / (fast * math.cos(sure) - wind), rel=1e-6)
     # A turn's radius is that of its true airspeed: v^2 / (g tan(bank)).
     assert limits.turn_radius(0.0, 1.0, 1000.0) == pytest.approx(fast**2 / (9.80665 * math.tan(0.5)))
     # What is certain at the airspeed itself, without an autopilot's; and an aircraft that is known stays as it is.
-    exact = replace(limits, tracking=None).surely()
+    exact = replace(limits, tracking=None).with_margin()
     assert math.degrees(exact.slopes(0.0, 1000.0)[0]) == pytest.approx(12.5 - 1.645 * 2.0, abs=1e-6)
-    assert replace(limits, envelope=known).surely().envelope is known
+    assert replace(limits, envelope=known).with_margin().envelope is known
 
 
 def test_no_leg_may_lead_where_the_air_is_too_thin_to_fly_level() -> None:

@@ -28,20 +28,20 @@ def test_it_is_read_as_written(tmp_path: Path) -> None:
         math.radians(5.0),
         math.radians(1.25),
         (THRUST, LEVEL),
-        power=0.3,
+        power_sd=0.3,
         battery_guessed=True,
-        fastest=1.25,
+        max_speed_sd=1.25,
         climb_guessed=True,
     )
     (tmp_path / "uncertainty.toml").write_text(uncertainty_text(known), encoding="utf-8")
     found = read_uncertainty(tmp_path)
     assert found is not None
     assert found.source == "a data sheet"
-    assert (found.climb, found.descent) == pytest.approx((known.climb, known.descent))
+    assert (found.climb_sd, found.descent_sd) == pytest.approx((known.climb_sd, known.descent_sd))
     assert found.quantities == (THRUST, LEVEL)
     assert found.battery_guessed
     assert found.climb_guessed
-    assert (found.power, found.fastest) == (0.3, 1.25)
+    assert (found.power_sd, found.max_speed_sd) == (0.3, 1.25)
     assert read_uncertainty(tmp_path.parent) is None
 
 

@@ -420,7 +420,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     turns = turn_requirements(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
-    certain_limits = limits.surely()
+    certain_limits = limits.with_margin()
     certain_climb, certain_dive = climb, dive
     if certain_limits.envelope is not limits.envelope:
         certain_climb, certain_dive, _ = _leg_limits(route, performance_tables(route, certain_limits), points, courses)

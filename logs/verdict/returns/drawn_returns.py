@@ -1,6 +1,6 @@
 """Prepare returns for drawing: the worst paths, and the lowest altitude from which a return is safe.
 
-Neither is needed to judge returns, and both take as long as judging: they are computed only if a picture is wanted.
+Neither is needed to judge returns, and both take as long as judging: they are computed only for a picture.
 """
 
 import math
@@ -19,8 +19,8 @@ from logs.verdict.returns.judge_returns import (
     ReturnWorld,
     SimulatedReturn,
     badness,
-    fly_home,
     heights_above_ground,
+    simulate_returns,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.suggest_returns import meets_return_limits
@@ -30,17 +30,17 @@ from world.arrays import Flags, Floats
 MAX_DRAWN_PATHS = 3
 # Largest number of places at which the least safe altitude is searched.
 _MAX_PLACES = 40
-# Step of that search above or below the flight, m.
+# Step of that search above or below the flight's altitude, m.
 _STEP_M = 80.0
 # Number of steps in one direction.
-_STEPS = 15
+_MAX_STEPS = 15
 # Number of times that the last step is halved.
-_HALVINGS = 3
+_HALVING_COUNT = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstReturn:
-    """Return that is drawn, the worst of its time range.
+    """Return to draw: the worst return of its time range.
 
     return_range: the time range.  path: (t, 3) positions a second apart, m.
     marked_position: position at which it fails, or is lowest, (3,) m.
@@ -68,14 +68,14 @@ class MinSafeAltitudes:
 
     time: Floats
     altitude: Floats
-    search_range: float = _STEP_M * _STEPS
+    search_range: float = _STEP_M * _MAX_STEPS
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawnReturns:
     """Returns with the data for drawing them.
 
-    worst: the worst first.  glides: from the same places; empty if not wanted.
+    worst: the returns to draw, the worst first.  glides: from the same places; empty if they are not drawn.
     """
 
     returns: Returns
@@ -123,18 +123,22 @@ def drawn_returns(
     return DrawnReturns(returns, worst_returns(world, starts, returns), min_altitudes, glides)
 
 
-def draw_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
-    """Add the data for drawing to judged returns, except glides and minimum altitudes, which take longest."""
+def drawn_returns_without_glides(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> DrawnReturns:
+    """Add the data for drawing to judged returns, without glides and minimum altitudes, which take longest."""
     return DrawnReturns(returns, worst_returns(world, starts, returns), MinSafeAltitudes(np.zeros(0), np.zeros(0)))
 
 
 def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) -> tuple[WorstReturn, ...]:
-    """Select the returns to draw: the worst of each failure, then the next worst; or the lowest if all are safe."""
-    unsafe = [return_range for return_range in returns.ranges if not return_range.worst.safe]
-    worst_of_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe)}
-    ranked_ranges = [return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is return_range]
+    """Select the returns to draw: the worst of each kind of failure, then others; or the lowest if all are safe."""
+    unsafe_ranges = [return_range for return_range in returns.ranges if not return_range.worst.safe]
+    worst_range_by_kind = {return_range.worst.kind: return_range for return_range in reversed(unsafe_ranges)}
+    ranked_ranges = [
+        return_range for return_range in unsafe_ranges if worst_range_by_kind[return_range.worst.kind] is return_range
+    ]
     ranked_ranges += [
-        return_range for return_range in unsafe if worst_of_kind[return_range.worst.kind] is not return_range
+        return_range
+        for return_range in unsafe_ranges
+        if worst_range_by_kind[return_range.worst.kind] is not return_range
     ]
     drawn_ranges = ranked_ranges[:MAX_DRAWN_PATHS] or list(returns.ranges[:1])
     rows = np.array(
@@ -143,7 +147,7 @@ def worst_returns(world: ReturnWorld, starts: ReturnStarts, returns: Returns) ->
     if not drawn_ranges:
         return ()
     targets = [return_range.worst.target for return_range in drawn_ranges]
-    _, paths = fly_home(world, starts.subset(rows), targets, keep_paths=True)
+    _, paths = simulate_returns(world, starts.subset(rows), targets, keep_paths=True)
     return tuple(
         WorstReturn(drawn_range, path, _marked_position(world, drawn_range.worst, path))
         for drawn_range, path in zip(drawn_ranges, paths, strict=True)
@@ -173,36 +177,38 @@ def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltit
     start_heights = heights_above_ground(world, selected_starts)
     min_offset = np.where(np.isfinite(start_heights), np.minimum(0.0, world.limit - start_heights), math.nan)
     is_safe = meets_return_limits(world, selected_starts)
-    # Altitudes relative to the flight, m: the last one that was safe, and the last one that was not.
-    last_safe, last_unsafe = np.where(is_safe, 0.0, math.nan), np.where(is_safe, math.nan, 0.0)
-    direction = np.where(is_safe, -1.0, 1.0)
+    # Offsets from the flight's altitude, m: the last safe one and the last unsafe one.
+    last_safe_offset, last_unsafe_offset = np.where(is_safe, 0.0, math.nan), np.where(is_safe, math.nan, 0.0)
+    search_direction = np.where(is_safe, -1.0, 1.0)
     is_searching = np.isfinite(min_offset)
-    for step in range(1, _STEPS + 1):
-        offsets = np.maximum(direction * step * _STEP_M, min_offset)
-        is_offset_safe = _safe_at_offset(world, selected_starts, offsets, is_searching)
-        last_safe, last_unsafe = (
-            np.where(is_searching & is_offset_safe, offsets, last_safe),
-            np.where(is_searching & ~is_offset_safe, offsets, last_unsafe),
+    for step in range(1, _MAX_STEPS + 1):
+        offsets = np.maximum(search_direction * step * _STEP_M, min_offset)
+        is_offset_safe = _are_safe_at_offset(world, selected_starts, offsets, is_searching)
+        last_safe_offset, last_unsafe_offset = (
+            np.where(is_searching & is_offset_safe, offsets, last_safe_offset),
+            np.where(is_searching & ~is_offset_safe, offsets, last_unsafe_offset),
         )
         is_searching &= (is_offset_safe == is_safe) & (offsets > min_offset)
-    for _ in range(_HALVINGS):
-        is_bracketed = np.isfinite(last_safe) & np.isfinite(last_unsafe)
-        midpoints = np.where(is_bracketed, 0.5 * (last_safe + last_unsafe), 0.0)
-        is_offset_safe = _safe_at_offset(world, selected_starts, midpoints, is_bracketed)
-        last_safe, last_unsafe = (
-            np.where(is_bracketed & is_offset_safe, midpoints, last_safe),
-            np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe),
+    for _ in range(_HALVING_COUNT):
+        is_bracketed = np.isfinite(last_safe_offset) & np.isfinite(last_unsafe_offset)
+        midpoints = np.where(is_bracketed, 0.5 * (last_safe_offset + last_unsafe_offset), 0.0)
+        is_offset_safe = _are_safe_at_offset(world, selected_starts, midpoints, is_bracketed)
+        last_safe_offset, last_unsafe_offset = (
+            np.where(is_bracketed & is_offset_safe, midpoints, last_safe_offset),
+            np.where(is_bracketed & ~is_offset_safe, midpoints, last_unsafe_offset),
         )
     return MinSafeAltitudes(
-        selected_starts.time, np.where(np.isfinite(min_offset), selected_starts.rows["up"] + last_safe, math.nan)
+        selected_starts.time, np.where(np.isfinite(min_offset), selected_starts.rows["up"] + last_safe_offset, math.nan)
     )
 
 
-def _safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, is_flown: Flags) -> Flags:
-    """Flag each return that is safe from a start ``offsets`` m higher, (n,); fly only those flagged in ``is_flown``."""
+def _are_safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, is_simulated: Flags) -> Flags:
+    """Flag each return that is safe from a start ``offsets`` m higher, (n,); simulate only ``is_simulated`` ones."""
     is_safe = np.zeros(len(starts), dtype=np.bool_)
-    if is_flown.any():
-        rows = starts.rows[is_flown].copy()
-        rows["up"] += offsets[is_flown]
-        is_safe[is_flown] = meets_return_limits(world, replace(starts.subset(np.flatnonzero(is_flown)), rows=rows))
+    if is_simulated.any():
+        rows = starts.rows[is_simulated].copy()
+        rows["up"] += offsets[is_simulated]
+        is_safe[is_simulated] = meets_return_limits(
+            world, replace(starts.subset(np.flatnonzero(is_simulated)), rows=rows)
+        )
     return is_safe

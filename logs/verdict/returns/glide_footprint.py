@@ -22,16 +22,16 @@ Part = tuple[Floats, ...]
 BANDS = (150.0, 300.0, 600.0)
 # Drawing role of each band, by its upper limit.
 BAND_ROLES = dict(zip(BANDS, ("glide-near", "glide-middle", "glide-far"), strict=True))
-_ALL = (-math.inf, math.inf)
-# Largest number of blocks along the longer side of the shown map; a block is as bad as the worst cell in it.
-_MAX_CELLS = 200
+_WHOLE_RANGE = (-math.inf, math.inf)
+# Maximum number of blocks along the longer side of the drawn map; a block has the value of its worst cell.
+_MAX_BLOCKS = 200
 
 
 class Band(NamedTuple):
     """Area where the required height above ground lies between two heights, m.  parts: outlines on the map."""
 
-    above: float
-    up_to: float
+    min_height: float
+    max_height: float
     parts: tuple[Part, ...]
 
 
@@ -49,7 +49,9 @@ class GlideFootprint:
     min_altitude: Floats
     is_landable: Flags
 
-    def bands(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Band, ...]:
+    def bands(
+        self, east: tuple[float, float] = _WHOLE_RANGE, north: tuple[float, float] = _WHOLE_RANGE
+    ) -> tuple[Band, ...]:
         """Return the bands of needed height above ground, lowest first, within ranges of the map, m."""
         grid = self.grid
         needed_heights = np.where(np.isfinite(grid.ground), self.min_altitude - grid.ground, math.inf)
@@ -62,8 +64,10 @@ class GlideFootprint:
         )
         return tuple(band for band in bands if band.parts)
 
-    def landings(self, east: tuple[float, float] = _ALL, north: tuple[float, float] = _ALL) -> tuple[Part, ...]:
-        """Return the outlines of ground that is flat by the elevation file, within ranges of the map, m."""
+    def landings(
+        self, east: tuple[float, float] = _WHOLE_RANGE, north: tuple[float, float] = _WHOLE_RANGE
+    ) -> tuple[Part, ...]:
+        """Return the outlines of ground that is flat according to the elevation file, within ranges of the map, m."""
         blocks = _CellBlocks.from_map(self.grid, east, north)
         return blocks.outlines(blocks.max_by_block(self.is_landable.astype(np.float64)) > 0.0)
 
@@ -71,37 +75,42 @@ class GlideFootprint:
 class _CellBlocks(NamedTuple):
     """Square blocks of map cells, in rows to the north.
 
-    west, south: corner of the first block, m.  side: side of a block, m.  block: number of cells along a side.
-    first: row and column of the first cell.  shape: rows and columns of blocks.
+    west, south: corner of the first block, m.  side: side of a block, m.  cells_per_side: number of cells along a side.
+    first_cell: row and column of the first cell.  shape: rows and columns of blocks.
     """
 
     west: float
     south: float
     side: float
-    block: int
-    first: tuple[int, int]
+    cells_per_side: int
+    first_cell: tuple[int, int]
     shape: tuple[int, int]
 
     @classmethod
     def from_map(cls, grid: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_CellBlocks":
         """Return the blocks of a map that lie within ranges, m."""
         rows, columns = grid.floor.shape
-        sides = ((north, grid.south, rows), (east, grid.west, columns))
-        first = [math.floor(max(0.0, (edge[0] - origin) / grid.cell)) for edge, origin, _ in sides]
-        end = [math.ceil(min(count - 1.0, (edge[1] - origin) / grid.cell)) + 1 for edge, origin, count in sides]
-        counts = [max(0, end - start) for start, end in zip(first, end, strict=True)]
-        block = max(1, math.ceil(max(counts) / _MAX_CELLS))
-        west, south = grid.west + (first[1] - 0.5) * grid.cell, grid.south + (first[0] - 0.5) * grid.cell
+        axes = ((north, grid.south, rows), (east, grid.west, columns))
+        first_cell = [math.floor(max(0.0, (limits[0] - origin) / grid.cell)) for limits, origin, _ in axes]
+        end_cell = [math.ceil(min(count - 1.0, (limits[1] - origin) / grid.cell)) + 1 for limits, origin, count in axes]
+        counts = [max(0, end_cell - start) for start, end_cell in zip(first_cell, end_cell, strict=True)]
+        cells_per_side = max(1, math.ceil(max(counts) / _MAX_BLOCKS))
+        west, south = grid.west + (first_cell[1] - 0.5) * grid.cell, grid.south + (first_cell[0] - 0.5) * grid.cell
         return cls(
-            west, south, block * grid.cell, block, (first[0], first[1]), (counts[0] // block, counts[1] // block)
+            west,
+            south,
+            cells_per_side * grid.cell,
+            cells_per_side,
+            (first_cell[0], first_cell[1]),
+            (counts[0] // cells_per_side, counts[1] // cells_per_side),
         )
 
     def max_by_block(self, values: Floats) -> Floats:
-        """Return the greatest value in each block."""
-        (row, column), (rows, columns) = self.first, self.shape
-        values_within = values[row : row + rows * self.block, column : column + columns * self.block]
-        blocks = values_within.reshape(rows, self.block, columns, self.block)
-        return np.asarray(blocks.max(axis=(1, 3)))
+        """Return the maximum of the cells in each block."""
+        (row, column), (rows, columns) = self.first_cell, self.shape
+        cell_values = values[row : row + rows * self.cells_per_side, column : column + columns * self.cells_per_side]
+        block_values = cell_values.reshape(rows, self.cells_per_side, columns, self.cells_per_side)
+        return np.asarray(block_values.max(axis=(1, 3)))
 
     def outlines(self, is_chosen: Flags) -> tuple[Part, ...]:
         """Return the outlines of chosen blocks, with their holes."""

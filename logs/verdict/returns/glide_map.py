@@ -1,10 +1,10 @@
 """Compute the altitude from which an aircraft can glide to a place, for every cell of a map.
 
 The shortest paths over terrain are searched backwards.  One search begins at the places to be reached and runs
-against the direction of flight.  A cell's label is the least altitude from which the glide gets there: the label of
+against the direction of flight.  A cell's label is the minimum altitude from which the glide gets there: the label of
 the next cell plus the height lost on the step to it, and no less than the ground with its margin, there and between
 them.  So the labels include the terrain, and one search serves every second of a flight.  A step costs its length
-times sink by ground speed on its course in the wind at that altitude, which is exact for each step of a path.  Labels
+times sink rate over ground speed on its course in the wind at that altitude, which is exact for each step.  Labels
 only grow in the backward direction: cells are settled by altitude, in bands no higher than the cheapest step (E. W.
 Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm 360", 1969).
 
@@ -34,7 +34,7 @@ from world.wind import mean_wind_speed
 Cells = NDArray[np.int64]
 
 # ----------------------------------------------------------------------
-# The map: cells with their least altitudes.
+# The map: cells with their minimum altitudes.
 
 # Largest number of cells of a map.
 MAX_CELLS = 700_000
@@ -45,7 +45,7 @@ _MAX_CELL_M = 240.0
 # Largest side of a cell, pixels of the elevation file, if that is more.
 _MAX_CELL_PIXELS = 8
 # Margin of the map around the places and the flight, m.
-AROUND = 3000.0
+MAP_MARGIN_M = 3000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class GlideMap:
 
     west, south: m, center of the first cell.  cell: its side, m.
     ground: (n, e) ground altitude at the centers, m, NaN if unknown.
-    floor: (n, e) least altitude in a cell: its highest ground plus the margin, m; NaN if unknown.
+    floor: (n, e) minimum altitude in a cell: its highest ground plus the margin, m; NaN if unknown.
     sphere_bottoms, sphere_tops: (n, e) altitudes between which a cell lies in kill spheres, m; inf and -inf if in none.
     """
 
@@ -77,7 +77,7 @@ class GlideMap:
 
 
 def glide_map(
-    terrain: Terrain, positions: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = AROUND
+    terrain: Terrain, positions: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = MAP_MARGIN_M
 ) -> GlideMap | None:
     """Make the map around positions (p, 2), m; return None if its cells would be too coarse for its extent.
 
@@ -114,9 +114,9 @@ def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
     Each cell is checked at its point nearest to the sphere's center.
     """
     row, column = grid.cell_at(float(center[0]), float(center[1]))
-    steps = math.ceil(radius / grid.cell) + 1
-    rows = slice(max(0, row - steps), max(0, row + steps + 1))
-    columns = slice(max(0, column - steps), max(0, column + steps + 1))
+    cell_reach = math.ceil(radius / grid.cell) + 1
+    rows = slice(max(0, row - cell_reach), max(0, row + cell_reach + 1))
+    columns = slice(max(0, column - cell_reach), max(0, column + cell_reach + 1))
     shape = grid.floor[rows, columns].shape
     norths = grid.south + grid.cell * (rows.start + np.arange(shape[0]))
     easts = grid.west + grid.cell * (columns.start + np.arange(shape[1]))
@@ -131,11 +131,11 @@ def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
 
 
 # Side of the square that a landing place needs, m.
-PATCH = 150.0
+LANDING_SQUARE_M = 150.0
 # Largest gradient of the plane that fits the square best, m per m.
-STEEPEST = 0.05
+MAX_LANDING_GRADIENT = 0.05
 # Largest root-mean-square deviation of the square's ground from that plane, m.
-ROUGHEST = 1.5
+MAX_LANDING_ROUGHNESS_M = 1.5
 
 
 def landable_cells(grid: GlideMap) -> Flags:
@@ -143,34 +143,40 @@ def landable_cells(grid: GlideMap) -> Flags:
 
     The ground comes from the elevation file, which has no trees, houses or water.
     """
-    half_count = max(1, math.ceil(0.5 * (PATCH / grid.cell - 1.0) - 1e-9))
+    half_count = max(1, math.ceil(0.5 * (LANDING_SQUARE_M / grid.cell - 1.0) - 1e-9))
     offsets = np.arange(-half_count, half_count + 1)
     count = offsets.size**2
     ground = grid.ground
     # Heights relative to a mean, so that their squares keep their digits.
-    z = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
+    relative_heights = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
     unit_weights = np.ones(offsets.size)
-    sums, squares = _patch_sums(z, unit_weights, unit_weights), _patch_sums(z * z, unit_weights, unit_weights)
+    height_sums, squared_height_sums = (
+        _square_sums(relative_heights, unit_weights, unit_weights),
+        _square_sums(relative_heights * relative_heights, unit_weights, unit_weights),
+    )
     distances = np.asarray(offsets * grid.cell, dtype=np.float64)
-    east_moments, north_moments = _patch_sums(z, unit_weights, distances), _patch_sums(z, distances, unit_weights)
-    spread = offsets.size * float((offsets**2).sum()) * grid.cell**2
-    residuals = squares - sums**2 / count - (east_moments**2 + north_moments**2) / spread
-    is_flat = np.hypot(east_moments, north_moments) / spread <= STEEPEST
-    is_flat &= np.sqrt(np.maximum(0.0, residuals) / count) <= ROUGHEST
+    east_moments, north_moments = (
+        _square_sums(relative_heights, unit_weights, distances),
+        _square_sums(relative_heights, distances, unit_weights),
+    )
+    offset_moment = offsets.size * float((offsets**2).sum()) * grid.cell**2
+    residuals = squared_height_sums - height_sums**2 / count - (east_moments**2 + north_moments**2) / offset_moment
+    is_flat = np.hypot(east_moments, north_moments) / offset_moment <= MAX_LANDING_GRADIENT
+    is_flat &= np.sqrt(np.maximum(0.0, residuals) / count) <= MAX_LANDING_ROUGHNESS_M
     return np.asarray(is_flat & ~((grid.sphere_bottoms < grid.floor) & (grid.floor < grid.sphere_tops)))
 
 
-def _patch_sums(values: Floats, by_row: Floats, by_column: Floats) -> Floats:
+def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) -> Floats:
     """Return weighted sums (n, e) over the square around each cell; NaN if the square leaves the map."""
     sums = values
-    for axis, weights in ((0, by_row), (1, by_column)):
+    for axis, weights in ((0, row_weights), (1, column_weights)):
         half_count = weights.size // 2
-        padded = np.pad(
+        padded_sums = np.pad(
             sums, [(half_count, half_count) if k == axis else (0, 0) for k in range(2)], constant_values=math.nan
         )
         length = values.shape[axis]
-        parts = [np.take(padded, range(k, k + length), axis=axis) for k in range(weights.size)]
-        sums = np.sum([weight * part for weight, part in zip(weights, parts, strict=True)], axis=0)
+        shifted_sums = [np.take(padded_sums, range(k, k + length), axis=axis) for k in range(weights.size)]
+        sums = np.sum([weight * shifted for weight, shifted in zip(weights, shifted_sums, strict=True)], axis=0)
     return np.asarray(sums)
 
 
@@ -203,12 +209,12 @@ def _exclude_zone(
 
 # Steps in cells in the octant from east to north-east; the other seven octants are mirrored.
 _OCTANT_STEPS = ((1, 0), (4, 1), (2, 1), (3, 2), (1, 1))
-# A step: its offset in cells, its course (rad), its length in cells, and its range of cells in `_BETWEEN`.
+# A step: its offset in cells, its course (rad), its length in cells, and its range of `_CROSSED_CELL` records.
 STEP = record_dtype(
     ("east", np.int64), ("north", np.int64), "course", "length", ("first", np.int64), ("last", np.int64)
 )
 # A cell crossed by a step: its offset from the step's end, and the fraction of the step between the end and the cell.
-_BETWEEN = record_dtype(("east", np.int64), ("north", np.int64), "share")
+_CROSSED_CELL = record_dtype(("east", np.int64), ("north", np.int64), "fraction")
 
 
 def steps() -> tuple[Records, Records]:
@@ -222,34 +228,36 @@ def steps() -> tuple[Records, Records]:
     for major, minor in _OCTANT_STEPS:
         offsets |= {(x * i, y * j) for x, y in ((major, minor), (minor, major)) for i in (-1, 1) for j in (-1, 1)}
     records: Records = np.zeros(len(offsets), STEP)
-    between: list[tuple[int, int, float]] = []
+    crossed_cells: list[tuple[int, int, float]] = []
     for step, (east, north) in zip(records, sorted(offsets), strict=True):
         step.east, step.north = east, north
-        step.course, step.length, step.first = math.atan2(east, north), math.hypot(east, north), len(between)
-        fraction_of_cell: dict[tuple[int, int], float] = {}
+        step.course, step.length, step.first = math.atan2(east, north), math.hypot(east, north), len(crossed_cells)
+        fraction_by_cell: dict[tuple[int, int], float] = {}
         for k in range(1, 64):
             fraction = k / 64.0
             # From the end backwards; corners, which are touched and not crossed, are assigned to either side.
             cell = (-round(fraction * east), -round(fraction * north))
-            fraction_of_cell.setdefault(cell, fraction)
+            fraction_by_cell.setdefault(cell, fraction)
         ends = ((0, 0), (-east, -north))
-        between += [(cell[0], cell[1], fraction) for cell, fraction in fraction_of_cell.items() if cell not in ends]
-        step.last = len(between)
-    cells: Records = np.zeros(len(between), _BETWEEN)
-    for cell, row in zip(cells, between, strict=True):
-        cell.east, cell.north, cell.share = row
-    return records, cells
+        crossed_cells += [
+            (cell[0], cell[1], fraction) for cell, fraction in fraction_by_cell.items() if cell not in ends
+        ]
+        step.last = len(crossed_cells)
+    cell_records: Records = np.zeros(len(crossed_cells), _CROSSED_CELL)
+    for cell, row in zip(cell_records, crossed_cells, strict=True):
+        cell.east, cell.north, cell.fraction = row
+    return records, cell_records
 
 
 class GlideSlopes(NamedTuple):
     """Height lost per metre over the ground, by course and altitude.
 
-    low, pitch: first altitude, and altitude step, m.
+    first_altitude, altitude_step: first altitude, and altitude step, m.
     table: (c, h) m per m, for the courses of `steps`; inf if no progress is made.
     """
 
-    low: float
-    pitch: float
+    first_altitude: float
+    altitude_step: float
     table: Floats
 
 
@@ -295,13 +303,13 @@ class GlideAltitudes:
 
     grid: the map.
     min_altitude: (n, e) minimum altitude from which a glide reaches one of them, m AMSL; inf if none.
-    origin: (n, e) cell of the place that is reached, numbered through all rows; -1 if none.
+    destination: (n, e) cell of the place that is reached, numbered through all rows; -1 if none.
     next_step: (n, e) the next step of the glide, an index of `steps`; -1 at the place itself.
     """
 
     grid: GlideMap
     min_altitude: Floats
-    origin: Codes
+    destination: Codes
     next_step: Codes
 
 
@@ -311,7 +319,7 @@ def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, ma
     Cells off the map, and cells with unknown ground, reach nothing.
     """
     min_altitude: Floats = np.full_like(grid.floor, math.inf)
-    origin: Codes = np.full(min_altitude.shape, -1, dtype=np.int32)
+    destination: Codes = np.full(min_altitude.shape, -1, dtype=np.int32)
     next_step: Codes = np.full(min_altitude.shape, -1, dtype=np.int32)
     rows, columns = grid.floor.shape
     row, column = cells[:, 0], cells[:, 1]
@@ -323,34 +331,34 @@ def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, ma
         (sphere_bottoms < floor_altitudes) & (floor_altitudes < sphere_tops), sphere_tops, floor_altitudes
     )
     min_altitude[~(min_altitude <= max_altitude)] = math.inf
-    origin[row, column] = row * columns + column
-    origin[np.isinf(min_altitude)] = -1
-    step_records, between = steps()
-    finite = slopes.table[np.isfinite(slopes.table) & (slopes.table > 0.0)]
-    if np.isfinite(min_altitude).any() and finite.size:
-        band = float(finite.min()) * grid.cell
+    destination[row, column] = row * columns + column
+    destination[np.isinf(min_altitude)] = -1
+    step_records, crossed_cells = steps()
+    finite_slopes = slopes.table[np.isfinite(slopes.table) & (slopes.table > 0.0)]
+    if np.isfinite(min_altitude).any() and finite_slopes.size:
+        band = float(finite_slopes.min()) * grid.cell
         first_altitude = float(min_altitude.min())
-        heads: Codes = np.full(max(1, math.ceil((max_altitude - first_altitude) / band) + 2), -1, dtype=np.int32)
+        band_heads: Codes = np.full(max(1, math.ceil((max_altitude - first_altitude) / band) + 2), -1, dtype=np.int32)
         _settle_cells(
             grid.floor,
             grid.sphere_bottoms,
             grid.sphere_tops,
             min_altitude,
-            origin,
+            destination,
             next_step,
             step_records,
-            between,
+            crossed_cells,
             slopes.table,
-            slopes.low,
-            slopes.pitch,
+            slopes.first_altitude,
+            slopes.altitude_step,
             grid.cell,
             first_altitude,
             band,
             max_altitude,
-            heads,
+            band_heads,
             np.full((min_altitude.size, 2), -1, dtype=np.int32),
         )
-    return GlideAltitudes(grid, min_altitude, origin, next_step)
+    return GlideAltitudes(grid, min_altitude, destination, next_step)
 
 
 @compiled
@@ -359,55 +367,69 @@ def _settle_cells(
     sphere_bottoms: Floats,
     sphere_tops: Floats,
     min_altitude: Floats,
-    origin: Codes,
+    destination: Codes,
     next_step: Codes,
-    moves: Records,
-    between: Records,
+    step_records: Records,
+    crossed_cells: Records,
     slopes: Floats,
-    slopes_low: float,
+    slopes_first_altitude: float,
     altitude_step: float,
     cell: float,
     first_altitude: float,
     band: float,
     max_altitude: float,
-    heads: Codes,
+    band_heads: Codes,
     links: Codes,
 ) -> None:
-    """Fill `need`, `origin` and `onward` by settling cells in order of altitude, band after band.
+    """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude, band after band.
 
-    heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) a cell's neighbours in its band.
+    band_heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) a cell's neighbours in its band.
     """
     rows, columns = min_altitude.shape
-    flat = min_altitude.ravel()
-    for k in range(flat.size):
-        if flat[k] <= max_altitude:
-            _insert(k, int((flat[k] - first_altitude) / band), heads, links)
-    for b in range(heads.size):
-        while heads[b] >= 0:
-            k = heads[b]
-            _remove(k, b, heads, links)
+    flat_altitudes = min_altitude.ravel()
+    for k in range(flat_altitudes.size):
+        if flat_altitudes[k] <= max_altitude:
+            _insert_into_band(k, int((flat_altitudes[k] - first_altitude) / band), band_heads, links)
+    for b in range(band_heads.size):
+        while band_heads[b] >= 0:
+            k = band_heads[b]
+            _remove_from_band(k, b, band_heads, links)
             row, column = k // columns, k % columns
-            altitude = flat[k]
-            x = min(slopes.shape[1] - 1.001, max(0.0, (altitude - slopes_low) / altitude_step))
-            h = int(x)
-            for m in range(moves.shape[0]):
-                move = moves[m]
-                i, j = row - move.north, column - move.east
+            altitude = flat_altitudes[k]
+            altitude_position = min(
+                slopes.shape[1] - 1.001, max(0.0, (altitude - slopes_first_altitude) / altitude_step)
+            )
+            altitude_index = int(altitude_position)
+            for step_index in range(step_records.shape[0]):
+                step = step_records[step_index]
+                i, j = row - step.north, column - step.east
                 if not (0 <= i < rows and 0 <= j < columns):
                     continue
-                loss = cell * move.length * (slopes[m, h] + (x - h) * (slopes[m, h + 1] - slopes[m, h]))
-                if not altitude + loss < min_altitude[i, j]:
+                altitude_loss = (
+                    cell
+                    * step.length
+                    * (
+                        slopes[step_index, altitude_index]
+                        + (altitude_position - altitude_index)
+                        * (slopes[step_index, altitude_index + 1] - slopes[step_index, altitude_index])
+                    )
+                )
+                if not altitude + altitude_loss < min_altitude[i, j]:
                     continue
                 start_altitude = _step_start_altitude(
-                    floor, sphere_bottoms, sphere_tops, between, move, row, column, altitude, loss
+                    floor, sphere_bottoms, sphere_tops, crossed_cells, step, row, column, altitude, altitude_loss
                 )
                 if not (start_altitude < min_altitude[i, j] and start_altitude <= max_altitude):
                     continue
                 neighbour = i * columns + j
                 if min_altitude[i, j] <= max_altitude:
-                    _remove(neighbour, int((min_altitude[i, j] - first_altitude) / band), heads, links)
-                min_altitude[i, j], origin[i, j], next_step[i, j] = start_altitude, origin[row, column], m
-                _insert(neighbour, int((start_altitude - first_altitude) / band), heads, links)
+                    _remove_from_band(neighbour, int((min_altitude[i, j] - first_altitude) / band), band_heads, links)
+                min_altitude[i, j], destination[i, j], next_step[i, j] = (
+                    start_altitude,
+                    destination[row, column],
+                    step_index,
+                )
+                _insert_into_band(neighbour, int((start_altitude - first_altitude) / band), band_heads, links)
 
 
 @inner
@@ -415,20 +437,20 @@ def _step_start_altitude(
     floor: Floats,
     sphere_bottoms: Floats,
     sphere_tops: Floats,
-    between: Records,
-    move: Record,
+    crossed_cells: Records,
+    step: Record,
     row: int,
     column: int,
     end_altitude: float,
-    loss: float,
+    altitude_loss: float,
 ) -> float:
     """Return the minimum start altitude with which a step into a cell clears all cells between, m, or NaN."""
-    start_altitude = end_altitude + loss
-    for k in range(move.first, move.last):
-        cell = between[k]
+    start_altitude = end_altitude + altitude_loss
+    for k in range(step.first, step.last):
+        cell = crossed_cells[k]
         i, j = row + cell.north, column + cell.east
         # Height lost from the step's start to this cell.
-        altitude_lost = (1.0 - cell.share) * loss
+        altitude_lost = (1.0 - cell.fraction) * altitude_loss
         altitude = _raise_above_spheres(
             max(start_altitude - altitude_lost, floor[i, j]), sphere_bottoms[i, j], sphere_tops[i, j]
         )
@@ -436,7 +458,7 @@ def _step_start_altitude(
         if not floor[i, j] <= altitude:
             return math.nan
         start_altitude = altitude + altitude_lost
-    i, j = row - move.north, column - move.east
+    i, j = row - step.north, column - step.east
     if not floor[i, j] <= math.inf:
         return math.nan
     start_altitude = _raise_above_spheres(max(start_altitude, floor[i, j]), sphere_bottoms[i, j], sphere_tops[i, j])
@@ -450,23 +472,23 @@ def _raise_above_spheres(altitude: float, bottom: float, top: float) -> float:
 
 
 @inner
-def _insert(cell: int, band: int, heads: Codes, links: Codes) -> None:
+def _insert_into_band(cell: int, band: int, band_heads: Codes, links: Codes) -> None:
     """Insert a cell at the head of a band."""
-    first = heads[band]
+    first = band_heads[band]
     links[cell, 0], links[cell, 1] = -1, first
     if first >= 0:
         links[first, 0] = cell
-    heads[band] = cell
+    band_heads[band] = cell
 
 
 @inner
-def _remove(cell: int, band: int, heads: Codes, links: Codes) -> None:
+def _remove_from_band(cell: int, band: int, band_heads: Codes, links: Codes) -> None:
     """Remove a cell from a band if the band contains it."""
     previous, next_cell = links[cell, 0], links[cell, 1]
     if previous >= 0:
         links[previous, 1] = next_cell
-    elif heads[band] == cell:
-        heads[band] = next_cell
+    elif band_heads[band] == cell:
+        band_heads[band] = next_cell
     if next_cell >= 0:
         links[next_cell, 0] = previous
     links[cell, 0], links[cell, 1] = -1, -1

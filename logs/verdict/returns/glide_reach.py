@@ -31,15 +31,15 @@ _TURN_STEP_RAD = math.radians(10.0)
 _MAX_TURN_STEPS = 40
 # Number of steps along the path ahead after which its course is measured.
 _LOOKAHEAD_STEPS = 6
-# State at the end of a turn: m, and rad.
-_TURNING = record_dtype("east", "north", "up", "course")
-# The glider, for compiled code: equivalent airspeed, m/s, and bank, rad.
+# State of the aircraft in a turn: position, m, and course, rad.
+_TURN_STATE = record_dtype("east", "north", "up", "course")
+# The glider and the map's grid, for compiled code: equivalent airspeed, m/s, bank, rad, and the grid, m.
 _GLIDER = record_dtype("airspeed", "bank", "west", "south", "cell")
 
 
 def glide_altitudes_left(
     starts: Records,
-    needs: GlideAltitudes,
+    glide_altitudes: GlideAltitudes,
     aircraft: PointMass,
     environment: ReturnEnvironment,
     airspeed: float,
@@ -54,18 +54,18 @@ def glide_altitudes_left(
     map, numbered through all rows, as in `logs.verdict.returns.glide_map.GlideAltitudes`.
     """
     altitude_left, reached_cells = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
-    grid = needs.grid
+    grid = glide_altitudes.grid
     glider: Record = np.zeros(1, _GLIDER)[0]
     glider.airspeed, glider.bank = airspeed, bank
     glider.west, glider.south, glider.cell = grid.west, grid.south, grid.cell
-    _fill_reach(
+    _fill_altitudes_left(
         starts,
         environment.spheres,
         environment.radii,
         grid.floor,
-        needs.min_altitude,
-        needs.origin,
-        needs.next_step,
+        glide_altitudes.min_altitude,
+        glide_altitudes.destination,
+        glide_altitudes.next_step,
         steps()[0],
         glider,
         aircraft.record,
@@ -83,25 +83,25 @@ def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
 
 
 @compiled
-def _fill_reach(
+def _fill_altitudes_left(
     starts: Records,
     spheres: Floats,
     radii: Floats,
     floor: Floats,
     min_altitude: Floats,
-    origin: Codes,
+    destination: Codes,
     next_step: Codes,
-    moves: Records,
+    step_records: Records,
     glider: Record,
     aircraft: Record,
-    excess: Floats,
+    excess_table: Floats,
     altitude_left: Floats,
     reached_cells: Codes,
 ) -> None:
-    """Fill `left` and `reached` for each start, with the better of a left and a right turn."""
-    turnings = np.zeros(1, _TURNING)
-    state = turnings[0]
-    max_speed = aircraft.slowest + (excess.shape[1] - 1) * aircraft.speed_step
+    """Fill `altitude_left` and `reached_cells` for each start, with the better of a left and a right turn."""
+    state_array = np.zeros(1, _TURN_STATE)
+    state = state_array[0]
+    max_speed = aircraft.slowest + (excess_table.shape[1] - 1) * aircraft.speed_step
     for n in range(starts.shape[0]):
         start = starts[n]
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
@@ -110,17 +110,19 @@ def _fill_reach(
         min_speed = glider.airspeed * true_by_equivalent(start.up)
         speed = max(min_speed, math.hypot(air_east, air_north))
         bank = min(glider.bank, load_factor_roll_limit(speed, min_speed, MIN_ROLL_LIMIT_RAD))
-        tilt = math.tan(bank)
-        level_sink = -excess_power(excess, 0.0, speed, start.up, aircraft)
+        tan_bank = math.tan(bank)
+        level_sink = -excess_power(excess_table, 0.0, speed, start.up, aircraft)
         # The turn is flown at the same angle of attack: the load makes it faster, but no faster than the airspeed
         # limit.
         turn_speed = max(speed, min(speed / math.sqrt(math.cos(bank)), max_speed))
-        turn_sink = aircraft.induced / turn_speed * tilt * tilt - excess_power(
-            excess, 0.0, turn_speed, start.up, aircraft
+        turn_sink = aircraft.induced / turn_speed * tan_bank * tan_bank - excess_power(
+            excess_table, 0.0, turn_speed, start.up, aircraft
         )
-        step_duration = _TURN_STEP_RAD * turn_speed / (GRAVITY * tilt)
+        step_duration = _TURN_STEP_RAD * turn_speed / (GRAVITY * tan_bank)
         # Height loss to the center of a neighbouring cell, whatever the course.
-        center_slope = -excess_power(excess, 0.0, min_speed, start.up, aircraft) / max(1.0, 0.95 * min_speed - wind)
+        center_slope = -excess_power(excess_table, 0.0, min_speed, start.up, aircraft) / max(
+            1.0, 0.95 * min_speed - wind
+        )
         for turn_sign in (-1.0, 1.0):
             yaw = math.atan2(air_east, air_north)
             state.east = start.east + ENGINE_FAILURE_REACTION_S * start.velocity_east
@@ -137,7 +139,7 @@ def _fill_reach(
                     break
                 cell_altitude_left, i, j = _best_cell(state, min_altitude, center_slope, glider)
                 remaining_turn = (
-                    _remaining_turn(state, i, j, turn_sign, next_step, moves, glider)
+                    _remaining_turn(state, i, j, turn_sign, next_step, step_records, glider)
                     if cell_altitude_left > -math.inf
                     else previous_turn
                 )
@@ -151,15 +153,15 @@ def _fill_reach(
                     and (has_passed or -_TURN_STEP_RAD <= remaining_turn <= 0.5 * _TURN_STEP_RAD)
                 ):
                     if cell_altitude_left > altitude_left[n]:
-                        altitude_left[n], reached_cells[n] = cell_altitude_left, origin[i, j]
+                        altitude_left[n], reached_cells[n] = cell_altitude_left, destination[i, j]
                     break
                 previous_turn = remaining_turn
                 state.east += step_duration * ground_east
                 state.north += step_duration * ground_north
                 state.up -= step_duration * turn_sink
                 yaw += turn_sign * _TURN_STEP_RAD
-    # Compiled code frees an array after its last use, and use of a record of it does not keep it alive.
-    if turnings.size != 1:
+    # Compiled code frees an array after its last use, and the use of one of its records does not keep it alive.
+    if state_array.size != 1:
         altitude_left[:] = math.nan
 
 
@@ -170,12 +172,12 @@ def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glid
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:
         return False
     for m in range(spheres.shape[0]):
-        offset_east, offset_north, offset_up = (
+        east_offset, north_offset, up_offset = (
             state.east - spheres[m, 0],
             state.north - spheres[m, 1],
             state.up - spheres[m, 2],
         )
-        if offset_east * offset_east + offset_north * offset_north + offset_up * offset_up < radii[m] * radii[m]:
+        if east_offset * east_offset + north_offset * north_offset + up_offset * up_offset < radii[m] * radii[m]:
             return False
     return True
 
@@ -200,17 +202,17 @@ def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record
 
 @inner
 def _remaining_turn(
-    state: Record, i: int, j: int, turn_sign: float, next_step: Codes, moves: Records, glider: Record
+    state: Record, i: int, j: int, turn_sign: float, next_step: Codes, step_records: Records, glider: Record
 ) -> float:
     """Return the turn that remains to the path's course at a cell, rad; negative if overshot, 0 at its end."""
     for _ in range(_LOOKAHEAD_STEPS):
-        m = next_step[i, j]
-        if m < 0:
+        step_index = next_step[i, j]
+        if step_index < 0:
             break
-        i += moves[m].north
-        j += moves[m].east
-    away_east = glider.west + j * glider.cell - state.east
-    away_north = glider.south + i * glider.cell - state.north
-    if math.hypot(away_east, away_north) < 2.0 * glider.cell:
+        i += step_records[step_index].north
+        j += step_records[step_index].east
+    east_offset = glider.west + j * glider.cell - state.east
+    north_offset = glider.south + i * glider.cell - state.north
+    if math.hypot(east_offset, north_offset) < 2.0 * glider.cell:
         return 0.0
-    return turn_sign * wrap(math.atan2(away_east, away_north) - state.course)
+    return turn_sign * wrap(math.atan2(east_offset, north_offset) - state.course)

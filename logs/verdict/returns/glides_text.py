@@ -79,10 +79,10 @@ def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
         if glide_range.count == 1
         else f"{glide_range.first:.0f} to {glide_range.last:.0f} s"
     )
-    return f"{time_text}: {_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide)}"
+    return f"{time_text}: {_range_reach_text(glide_range, glides)}{_own_return_text(glide_range.lowest_glide)}"
 
 
-def _reach_text(glide_range: GlideRange, glides: Glides) -> str:
+def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
     glide = glide_range.lowest_glide
     altitude_left = glides.altitude_left(glide)
     time_text = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"

@@ -49,8 +49,8 @@ REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
 # Outcome of ArduPlane's own return without thrust: at its target; at its target, but lower above ground than `MARGIN`;
 # ground impact; in a kill sphere; off the elevation data; or not simulated, because it would follow the terrain.
 EngineOutEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
-# Why nothing is judged: there is no elevation file; the model has no trim with the throttle closed; or the mission
-# is too large for a map.
+# Reason why nothing is judged: there is no elevation file; the model has no trim with the throttle closed; or the
+# mission is too large for a map.
 NotJudged = Literal["", "terrain", "trim", "far"]
 
 
@@ -132,7 +132,7 @@ class Glides:
     airspeed: equivalent airspeed of the glides, m/s.
     cell: side of the map's cells, m.
     fuel: True if the engine burns fuel: the drag of the stopped engine is unknown.
-    not_judged: why nothing is judged.
+    not_judged: reason why nothing is judged; "" if glides are judged.
     footprint: the map used for the glides; None if nothing is judged.
     """
 
@@ -229,35 +229,42 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
     slopes = glide_slopes(world.aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
 
-    def search_from(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        needs = search_glide_altitudes(grid, cells, slopes, max_altitude)
-        return *glide_altitudes_left(rows, needs, world.aircraft, environment, airspeed, bank), needs.min_altitude
+    def search_from_cells(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
+        glide_altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
+        return *glide_altitudes_left(
+            rows, glide_altitudes, world.aircraft, environment, airspeed, bank
+        ), glide_altitudes.min_altitude
 
-    site_results = [search_from(np.array([grid.cell_at(site.east, site.north)])) for site in sites]
-    altitudes_left = [result[0] for result in site_results]
-    landable_cells = _flat_ground(world, grid)
-    flat_altitudes_left, flat_cells, _ = search_from(np.argwhere(landable_cells))
+    site_results = [search_from_cells(np.array([grid.cell_at(site.east, site.north)])) for site in sites]
+    altitudes_left = [site_result[0] for site_result in site_results]
+    is_landable = _flat_ground(world, grid)
+    flat_altitudes_left, flat_cells, _ = search_from_cells(np.argwhere(is_landable))
     is_known = np.isfinite(terrain.height(rows["east"], rows["north"]))
-    each = []
+    glides = []
     for k, row in enumerate(rows):
         site_altitudes_left = tuple(float(altitudes[k]) for altitudes in altitudes_left)
-        flat_place = cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NO_POSITION
+        flat_position = cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NO_POSITION
         start = (float(row["east"]), float(row["north"]), float(row["up"]))
         reach = _best_reach(site_altitudes_left, float(flat_altitudes_left[k])) if is_known[k] else "unknown"
-        each.append(
+        glides.append(
             Glide(
                 float(starts.time[k]),
                 start,
                 own_returns[k],
                 site_altitudes_left,
                 float(flat_altitudes_left[k]),
-                flat_place,
+                flat_position,
                 reach,
             )
         )
-    site_needs = np.minimum.reduce([result[2] for result in site_results])
+    site_min_altitudes = np.minimum.reduce([site_result[2] for site_result in site_results])
     return Glides(
-        tuple(each), sites, airspeed, grid.cell, burns_fuel, footprint=GlideFootprint(grid, site_needs, landable_cells)
+        tuple(glides),
+        sites,
+        airspeed,
+        grid.cell,
+        burns_fuel,
+        footprint=GlideFootprint(grid, site_min_altitudes, is_landable),
     )
 
 

@@ -3,8 +3,8 @@
 If RTL_AUTOLAND, or a battery failsafe, leads to a landing sequence of the mission, the path to it is judged.
 
 A return is simulated with a point mass (`flight.autopilots.arduplane.rtl_point_mass`), in the mean wind.  Returns whose
-simulation could be wrong are flown again in JSBSim if the caller provides that.  The result replaces the point mass for
-the return that was flown again, and if it is worse, for all similar returns.
+simulation could be wrong are flown again in JSBSim if the caller provides that.  The JSBSim result replaces the result
+of the point mass for that return, and if it is worse, for all similar returns.
 """
 
 import math
@@ -80,9 +80,9 @@ TURN_HEIGHT_LOSS_M = 2.0
 _LOW_START_FRACTION = 0.5
 # Least height above ground from which returns in a take-off or a landing are judged, m: nothing turns below it.
 MIN_JUDGED_HEIGHT_M = 10.0
-# A return from a greater height is omitted if, within this run, m, it hits the ground or gets low, and loses more than
-# that fraction of its starting height.
-_SINK_RUN_M = 500.0
+# A return from a greater height is omitted if, within this horizontal distance, m, it hits the ground or gets low, and
+# loses more than that fraction of its starting height.
+_SINK_DISTANCE_M = 500.0
 # Bank beyond which a JSBSim flight cannot begin at a start, rad, because it approaches the start straight.
 _MAX_START_BANK_RAD = math.radians(10.0)
 
@@ -146,30 +146,31 @@ NoReturnKind = Literal["never", "later", "at once", "battery", "used", "power", 
 
 
 class PointOfNoReturn(NamedTuple):
-    """Last place from which a return leaves the reserve, in the given wind.
+    """Last place from which a return leaves the energy reserve, in the given wind.
 
-    kind: whether there is such a point, or why it is unknown.
+    kind: kind of the point, or the reason why it is unknown.
     time: time of that place, s; NaN if there is no point of no return, or it is unknown.
-    left: energy left after the return from that place, or the least left after any return if there is none, Wh.
-    skipped: number of earlier returns that do not arrive, so that their energy is unknown.
+    remaining_energy: energy left after the return from that place, or without such a place the minimum after any
+        return, Wh.
+    skipped_count: number of earlier returns that do not arrive, so that their energy is unknown.
     """
 
     kind: NoReturnKind
     time: float = math.nan
-    left: float = math.nan
-    skipped: int = 0
+    remaining_energy: float = math.nan
+    skipped_count: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Returns:
     """Returns from all starts on the path.
 
-    each: in order of time.  interval: time between two, s.
+    each: the returns in order of time.  interval: time between two starts, s.
     causes: events that can take the aircraft off its mission, and the action on each.
-    limit: least height above ground that is required, m.
+    limit: required minimum height above ground, m.
     airspace: the zones.
     reserve: energy that has to be left, Wh.
-    flown: True if they begin on a flown track, False for the planned path.
+    flown: True if the returns begin on a flown track, False for the planned path.
     jsbsim_differences: for each return flown again in JSBSim, its clearance minus the clearance of the point mass, m.
     stands_in: True if ArduPlane's law stands in for an autopilot without a return law.
     unjudged_parts: parts that are not judged.
@@ -221,7 +222,7 @@ class Returns:
     @property
     def point_of_no_return(self) -> PointOfNoReturn:
         """Point of no return by energy, for RTL; returns that do not arrive are ignored."""
-        last_time, least_left, skipped_count = math.nan, math.inf, 0
+        last_time, min_energy_left, skipped_count = math.nan, math.inf, 0
         if not self.each or all(math.isnan(ret.energy_left) for ret in self.each):
             return PointOfNoReturn("battery")
         if any(ret.kind == "power" for ret in self.each) and not any(ret.kind == "energy" for ret in self.each):
@@ -236,23 +237,21 @@ class Returns:
                 skipped_count += 1
             elif ret.energy_left < self.reserve:
                 return PointOfNoReturn(
-                    "at once" if math.isnan(last_time) else "later", last_time, least_left, skipped_count
+                    "at once" if math.isnan(last_time) else "later", last_time, min_energy_left, skipped_count
                 )
             else:
-                last_time, least_left = ret.time, min(least_left, ret.energy_left)
-        return PointOfNoReturn("arrives" if math.isnan(last_time) else "never", math.nan, least_left, skipped_count)
+                last_time, min_energy_left = ret.time, min(min_energy_left, ret.energy_left)
+        return PointOfNoReturn(
+            "arrives" if math.isnan(last_time) else "never", math.nan, min_energy_left, skipped_count
+        )
 
     @property
     def ranges(self) -> tuple[ReturnRange, ...]:
         """All returns in time ranges, the worst first."""
         ranges = []
         for _, group in groupby(self.each, _report_key):
-            group_returns = list(group)
-            ranges.append(
-                ReturnRange(
-                    group_returns[0].time, group_returns[-1].time, len(group_returns), min(group_returns, key=badness)
-                )
-            )
+            returns = list(group)
+            ranges.append(ReturnRange(returns[0].time, returns[-1].time, len(returns), min(returns, key=badness)))
         return tuple(sorted(ranges, key=lambda return_range: (*badness(return_range.worst), return_range.first)))
 
 
@@ -263,16 +262,14 @@ def _report_key(ret: SimulatedReturn) -> tuple[object, ...]:
 
 
 def badness(ret: SimulatedReturn) -> tuple[int, float]:
-    """Return a sort key that sorts the worst return first."""
-    measure = (
-        ret.sphere_distance if ret.kind == "threat" else ret.energy_left if ret.kind == "energy" else ret.clearance
-    )
-    return KINDS.index(ret.kind), math.inf if math.isnan(measure) else measure
+    """Return the sort key of a return, with which the worst return comes first."""
+    margin = ret.sphere_distance if ret.kind == "threat" else ret.energy_left if ret.kind == "energy" else ret.clearance
+    return KINDS.index(ret.kind), math.inf if math.isnan(margin) else margin
 
 
 @dataclass(frozen=True, slots=True)
 class ReturnWorld:
-    """Data on which the result of returns depends, except their starts.
+    """Data that determine the outcome of returns, except their starts.
 
     parameters: ArduPlane's parameters.  home, rally: places on the map.
     aircraft: point-mass model.  environment: ground and spheres.
@@ -298,7 +295,7 @@ class ReturnWorld:
 
     @property
     def limit(self) -> float:
-        """Least height above ground, m."""
+        """Required minimum height above ground, m."""
         return self.setup.limits.min_clearance
 
     @property
@@ -384,7 +381,7 @@ def _has_return_path(setup: FlightSetup) -> bool:
 
 
 def return_world(setup: FlightSetup) -> ReturnWorld:
-    """Collect the data that decides the returns of a setup's mission.
+    """Collect the data that determine the returns of a setup's mission.
 
     The control law is ArduPlane's, with the setup's parameters if it has any, otherwise with the aircraft's parameters.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
@@ -413,11 +410,11 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
     )
 
 
-# Callable that flies a return in JSBSim: least height above ground and least distance outside a kill sphere, m; None if
-# it cannot be flown.
+# Function that flies a return in JSBSim and returns the minimum height above ground and the minimum distance outside a
+# kill sphere, m; None if the return cannot be flown.
 FlyAgain = Callable[[ReturnWorld, Record], tuple[float, float] | None]
-# Largest number of returns that are flown again.
-MAX_AGAIN = 4
+# Maximum number of returns that are flown again in JSBSim.
+MAX_JSBSIM_FLIGHTS = 4
 
 
 def judge_returns(
@@ -425,7 +422,7 @@ def judge_returns(
     starts: ReturnStarts,
     interval: float,
     fly_again: FlyAgain | None = None,
-    max_flights: int = MAX_AGAIN,
+    max_flights: int = MAX_JSBSIM_FLIGHTS,
     advance: Callable[[float, float], None] = lambda done, total: None,
 ) -> Returns:
     """Simulate and judge the return from each start.
@@ -443,7 +440,7 @@ def judge_returns(
         if "terrain" in world.unjudged_parts or ("landing" in world.unjudged_parts and ending == "straight to land"):
             continue
         targets = [world.target(row, ending) for row in starts.rows]
-        results, paths = fly_home(world, starts, targets)
+        results, paths = simulate_returns(world, starts, targets)
         min_heights = required_heights(world, starts)
         judged_returns = []
         for k, row in enumerate(results):
@@ -482,7 +479,7 @@ def judge_returns(
 
 
 def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
-    """Return True if an RTL from a low start in a take-off or landing only sinks to the ground.
+    """Return True if an RTL from a low start in a take-off or landing sinks to the ground before it can return.
 
     Its path is then not at fault.
 
@@ -496,13 +493,13 @@ def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
     is_sinking = (
         height < MIN_JUDGED_HEIGHT_M or ret.start[2] - ret.lowest_position[2] >= (1.0 - _LOW_START_FRACTION) * height
     )
-    return ret.kind in ("ground", "low", "unsure") and is_sinking and distance <= _SINK_RUN_M
+    return ret.kind in ("ground", "low", "unsure") and is_sinking and distance <= _SINK_DISTANCE_M
 
 
 _NO_PATH: Floats = np.zeros((0, 3))
 
 
-def fly_home(
+def simulate_returns(
     world: ReturnWorld,
     starts: ReturnStarts,
     targets: Sequence[ReturnTarget],
@@ -510,10 +507,10 @@ def fly_home(
     *,
     keep_paths: bool = False,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns from starts to their targets: (n,) of `RETURN_FLOWN`, and their paths if there are zones.
+    """Simulate returns from starts to their targets: (n,) of `RETURN_RESULT`, and their paths if there are zones.
 
-    limits: parameter ``least`` of `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
-    keep_paths: True to return the paths in any case.
+    limits: the argument ``least`` of `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
+    keep_paths: True to return the paths also without zones.
     """
     radius = ArduPlane(world.parameters).return_rules.radius
     circles = [
@@ -572,8 +569,8 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
     if result["ended"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
         return "unknown"
     battery = world.setup.battery
-    max_used = (battery - energy_left) * math.exp(UNDECIDED_FRACTION * world.setup.envelope.power_sd)
-    return "power" if max_used > (1.0 - ENERGY_RESERVE_FRACTION) * battery else "safe"
+    max_energy_used = (battery - energy_left) * math.exp(UNDECIDED_FRACTION * world.setup.envelope.power_sd)
+    return "power" if max_energy_used > (1.0 - ENERGY_RESERVE_FRACTION) * battery else "safe"
 
 
 def _judge_return(
@@ -640,21 +637,25 @@ def _recheck_in_jsbsim(
     max_flights: int,
 ) -> tuple[list[SimulatedReturn], list[float]]:
     """Fly the most doubtful return of each group of successive doubtful returns in JSBSim, and correct the group."""
-    corrected, differences = list(returns), []
+    corrected_returns, differences = list(returns), []
     doubtful_groups = groupby(range(len(returns)), lambda k: distance_to_limit(returns[k]) < POINT_MASS_ERROR_M)
     groups = [
-        [k for k in group if is_steady(world, starts.rows[k])] for is_unsure, group in doubtful_groups if is_unsure
+        [k for k in group if is_reachable_start(world, starts.rows[k])]
+        for is_doubtful, group in doubtful_groups
+        if is_doubtful
     ]
     ranked_groups = sorted((min(distance_to_limit(returns[k]) for k in group), group) for group in groups if group)
     for _, group in ranked_groups[:max_flights]:
         k = min(group, key=lambda k: distance_to_limit(returns[k]))
-        result = fly_again(world, starts.rows[k])
-        if result is None:
+        jsbsim_minima = fly_again(world, starts.rows[k])
+        if jsbsim_minima is None:
             continue
         # Differences in clearance and in distance outside spheres, m; 0 if there is nothing to compare.
         offsets = [
             new_value - old_value
-            for new_value, old_value in zip(result, (returns[k].clearance, returns[k].sphere_distance), strict=True)
+            for new_value, old_value in zip(
+                jsbsim_minima, (returns[k].clearance, returns[k].sphere_distance), strict=True
+            )
         ]
         height_offset, distance_offset = (offset if math.isfinite(offset) else 0.0 for offset in offsets)
         if math.isfinite(offsets[0]):
@@ -664,41 +665,46 @@ def _recheck_in_jsbsim(
             < returns[k].required_height + _DECISIVE_MARGIN_M
         )
         is_close = min(returns[k].sphere_distance, returns[k].sphere_distance + distance_offset) < _DECISIVE_MARGIN_M
-        disagrees = (is_low and abs(height_offset) > POINT_MASS_ERROR_M) or (
+        simulations_disagree = (is_low and abs(height_offset) > POINT_MASS_ERROR_M) or (
             is_close and abs(distance_offset) > POINT_MASS_ERROR_M
         )
-        corrected[k] = _with_offsets(world, returns[k], results[k], height_offset, distance_offset)
-        if disagrees and corrected[k].kind not in ("ground", "threat"):
-            corrected[k] = replace(corrected[k], kind="unsure")
+        corrected_returns[k] = _with_offsets(world, returns[k], results[k], height_offset, distance_offset)
+        if simulations_disagree and corrected_returns[k].kind not in ("ground", "threat"):
+            corrected_returns[k] = replace(corrected_returns[k], kind="unsure")
         for j in group:
-            if j != k and disagrees and returns[j].kind in ("low", "safe"):
-                corrected[j] = replace(returns[j], kind="unsure")
-            elif j != k and not disagrees:
+            if j != k and simulations_disagree and returns[j].kind in ("low", "safe"):
+                corrected_returns[j] = replace(returns[j], kind="unsure")
+            elif j != k and not simulations_disagree:
                 # The flight of one return never improves another one.
-                corrected[j] = _with_offsets(
+                corrected_returns[j] = _with_offsets(
                     world, returns[j], results[j], min(0.0, height_offset), min(0.0, distance_offset)
                 )
-    return corrected, differences
+    return corrected_returns, differences
 
 
 def _with_offsets(
     world: ReturnWorld, ret: SimulatedReturn, result: Record, height_offset: float, distance_offset: float
 ) -> SimulatedReturn:
     """Return a copy of a return with offsets added to its clearance and its distance outside spheres, m."""
-    corrected = result.copy()
-    corrected["clearance"] += height_offset
-    corrected["outside"] += distance_offset
-    if corrected["clearance"] <= 0.0:
-        corrected["ended"] = RETURN_GROUND_IMPACT
-    elif corrected["ended"] == RETURN_GROUND_IMPACT:
-        # It was simulated on from where it grazed the ground: energy and zones cover the whole path.
-        corrected["ended"] = RETURN_TIMEOUT if math.isnan(ret.time_to_loiter) else RETURN_ARRIVED
-    kind = classify_return(world, corrected, ret.zone, ret.energy_left, ret.required_height)
-    return replace(ret, clearance=float(corrected["clearance"]), sphere_distance=float(corrected["outside"]), kind=kind)
+    corrected_result = result.copy()
+    corrected_result["clearance"] += height_offset
+    corrected_result["outside"] += distance_offset
+    if corrected_result["clearance"] <= 0.0:
+        corrected_result["ended"] = RETURN_GROUND_IMPACT
+    elif corrected_result["ended"] == RETURN_GROUND_IMPACT:
+        # The simulation continued after it grazed the ground: energy and zones cover the whole path.
+        corrected_result["ended"] = RETURN_TIMEOUT if math.isnan(ret.time_to_loiter) else RETURN_ARRIVED
+    kind = classify_return(world, corrected_result, ret.zone, ret.energy_left, ret.required_height)
+    return replace(
+        ret,
+        clearance=float(corrected_result["clearance"]),
+        sphere_distance=float(corrected_result["outside"]),
+        kind=kind,
+    )
 
 
-def is_steady(world: ReturnWorld, row: Record) -> bool:
-    """Return True if a JSBSim flight can be brought to a start: its bank is small, and its airspeed fast enough."""
+def is_reachable_start(world: ReturnWorld, row: Record) -> bool:
+    """Return True if a JSBSim flight can be brought to a start: the bank is small, and the airspeed high enough."""
     wind = world.scenario.wind
     wind_speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
     east = float(row["velocity_east"]) + wind_speed * math.sin(wind.from_course)

@@ -18,7 +18,7 @@ from world.kernels import Records
 # Time over which velocities are computed for a track without velocities, s.
 _VELOCITY_WINDOW_S = 1.0
 # Height that a return from a final approach with its motor off loses before it climbs, m.
-SINKING = 10.0
+SINK_HEIGHT_LOSS_M = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class ReturnStarts:
     energy_used: (n,) energy used before the return, Wh; NaN if unknown.
     is_flown: True for a flown track, False for the planned path.
     is_low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance
-        plus `SINKING`.
+        plus `SINK_HEIGHT_LOSS_M`.
     grounded_count: number of further places where the aircraft is too slow to fly: on its launch, or landed.
     """
 
@@ -72,12 +72,12 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     # Take the nearest row, except in a pause of the log.
     sampled_rows = usable_rows[np.unique(np.searchsorted(time, sample_times - 1e-9).clip(0, len(usable_rows) - 1))]
     is_low, is_slow = _low_and_slow_rows(setup, track, sampled_rows)
-    rows, is_low_start = sampled_rows[~is_slow], is_low[~is_slow]
-    velocity = _ground_velocities(track, rows)
-    roll = track.attitude[rows, ROLL].astype(np.float64)
-    energy = track.energy[rows].astype(np.float64)
-    records = _start_records(track.position[rows], velocity, np.nan_to_num(roll))
-    return ReturnStarts(track.time[rows], records, energy, True, is_low_start, int(is_slow.sum()))
+    start_rows, is_low_start = sampled_rows[~is_slow], is_low[~is_slow]
+    velocity = _ground_velocities(track, start_rows)
+    roll = track.attitude[start_rows, ROLL].astype(np.float64)
+    energy = track.energy[start_rows].astype(np.float64)
+    records = _start_records(track.position[start_rows], velocity, np.nan_to_num(roll))
+    return ReturnStarts(track.time[start_rows], records, energy, True, is_low_start, int(is_slow.sum()))
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
@@ -85,14 +85,14 @@ def _empty_starts(*, is_flown: bool) -> ReturnStarts:
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Flag the rows that are low in a flown take-off or landing, and those also too slow to fly, (n,) each."""
+    """Flag the rows that are low in a flown take-off or landing, and the low rows too slow to fly, (n,) each."""
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
     if terrain is None or not procedures:
         return is_ground_phase, is_ground_phase.copy()
     height_above_ground = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    is_low = is_ground_phase & (height_above_ground < setup.limits.min_clearance + SINKING)
+    is_low = is_ground_phase & (height_above_ground < setup.limits.min_clearance + SINK_HEIGHT_LOSS_M)
     min_airspeed = setup.envelope.level_speeds(float(setup.route.waypoints[0, 2]))[0]
     return is_low, is_low & (track.airspeed[rows] < min_airspeed)
 
@@ -101,8 +101,8 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
     """Return ground velocities at some rows, m/s, (n, 3), computed from positions where the track has none."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
-        rows_near = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
-        first, last = (rows_near[0], rows_near[-1]) if rows_near.size else (rows[k], rows[k])
+        window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
+        first, last = (window_rows[0], window_rows[-1]) if window_rows.size else (rows[k], rows[k])
         duration = float(track.time[last] - track.time[first])
         velocity[k] = (track.position[last] - track.position[first]) / duration if duration > 0.0 else 0.0
     return np.asarray(np.nan_to_num(velocity))

@@ -124,28 +124,32 @@ def headline(returns: Returns) -> str:
     reasons = "; ".join(_UNJUDGED_PART_TEXTS[reason] for reason in returns.unjudged_parts)
     if not returns.each:
         return f"not judged: {reasons}" if reasons else "no place to return from"
-    landing = "; the landing is not judged" if returns.lands else ""
-    left_out_text = (
+    landing_suffix = "; the landing is not judged" if returns.lands else ""
+    omitted_text = (
         f"; {returns.omitted_count} on or near the ground during take-off and landing omitted"
         if returns.omitted_count
         else ""
     )
-    return (f"not judged in full ({reasons}): " if reasons else "") + _judged_text(returns) + left_out_text + landing
+    return (
+        (f"not judged in full ({reasons}): " if reasons else "") + _judged_text(returns) + omitted_text + landing_suffix
+    )
 
 
 def _judged_text(returns: Returns) -> str:
-    total, failures = len(returns.each), counts_text(returns)
-    if failures:
+    total, failure_counts = len(returns.each), counts_text(returns)
+    if failure_counts:
         safe_count = returns.count("safe")
-        return f"of {total} returns {failures}; {safe_count} {'is' if safe_count == 1 else 'are'} safe"
+        return f"of {total} returns {failure_counts}; {safe_count} {'is' if safe_count == 1 else 'are'} safe"
     # Returns that begin below the limit, as after a take-off, say nothing about the path home.
     high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
     lowest_return = min(high_returns, key=lambda ret: ret.clearance)
-    least_left = min((ret.energy_left for ret in returns.each if not math.isnan(ret.energy_left)), default=math.nan)
-    energy_text = "" if math.isnan(least_left) else f", and at least {least_left:.0f} Wh are left"
-    until_text = " up to their landing" if returns.lands else ""
+    min_energy_left = min(
+        (ret.energy_left for ret in returns.each if not math.isnan(ret.energy_left)), default=math.nan
+    )
+    energy_text = "" if math.isnan(min_energy_left) else f", and at least {min_energy_left:.0f} Wh are left"
+    landing_suffix = " up to their landing" if returns.lands else ""
     return (
-        f"all {total} returns are safe{until_text}: never lower than {lowest_return.clearance:.0f} m above"
+        f"all {total} returns are safe{landing_suffix}: never lower than {lowest_return.clearance:.0f} m above"
         f" ground{energy_text}"
     )
 
@@ -172,18 +176,18 @@ def point_of_no_return_text(returns: Returns) -> str:
         case "later":
             text = f"{name}: {point.time:.0f} s; a return that starts later does not leave {reserve}"
         case "never":
-            text = f"{name}: none, because every return leaves {reserve} (at least {point.left:.0f} Wh)"
-    verb = "does" if point.skipped == 1 else "do"
-    return text + (f"; {point.skipped} that {verb} not arrive are ignored" if point.skipped else "")
+            text = f"{name}: none, because every return leaves {reserve} (at least {point.remaining_energy:.0f} Wh)"
+    verb = "does" if point.skipped_count == 1 else "do"
+    return text + (f"; {point.skipped_count} that {verb} not arrive are ignored" if point.skipped_count else "")
 
 
-def causes_text(causes: tuple[Cause, ...]) -> list[str]:
+def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     """List the events that make the aircraft return, and those that do not, in one line each.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(FS_GCS_ENABL=1, FS_LONG_ACTN=1)
-    >>> for line in causes_text(failsafe_causes(made, has_fence=False)):
+    >>> for line in describe_causes(failsafe_causes(made, has_fence=False)):
     ...     print(line)
     it returns: the pilot's RTL, the mission's end, RC lost (FS_LONG_ACTN 1), station lost (FS_LONG_ACTN 1)
     it does not: battery low (BATT_FS_LOW_ACT 0), battery critical (BATT_FS_CRT_ACT 0): continues its mission
@@ -204,12 +208,12 @@ def causes_text(causes: tuple[Cause, ...]) -> list[str]:
     return lines
 
 
-def landing_text(returns: Returns) -> list[str]:
+def describe_landing(returns: Returns) -> list[str]:
     """Describe the effect of RTL_AUTOLAND and the landing sequence, in lines.
 
     Return [] for another autopilot.
 
-    >>> landing_text(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
+    >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return stays in its circle']
     """
     if returns.autoland is None:

@@ -1,8 +1,8 @@
 """Suggest what makes every return safe: RTL_ALTITUDE, a climb before the turn, or rally points.
 
-The least altitude, and the fewest points.  Each is simulated from all places, like judged returns.  Plain set cover
-does not work for rally points: the autopilot goes to the nearest point and not to the best, so a set is rated by the
-autopilot's choice, and an added point may take returns away from a point that was good for them.
+The altitude is the lowest one, and the rally points are the fewest.  Each suggestion is simulated from all places, like
+judged returns.  Plain set cover does not work for rally points: the autopilot goes to the nearest point and not to the
+best, so a set is rated by the autopilot's choice, and an added point may take returns away from a better point.
 """
 
 import math
@@ -20,10 +20,10 @@ from logs.verdict.returns.judge_returns import (
     TURN_HEIGHT_LOSS_M,
     Returns,
     ReturnWorld,
-    fly_home,
     heights_above_ground,
     most_violated_zone,
     required_heights,
+    simulate_returns,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
@@ -61,18 +61,18 @@ def is_improvement(before: Returns, after: Returns) -> bool:
 
     Only "low" and "safe" returns may become more frequent.
     """
-    is_more_frequent = any(after.count(kind) > before.count(kind) for kind in KINDS if kind not in ("low", "safe"))
-    is_lower = after.count("low") > before.count("low") and len(after.unsafe) >= len(before.unsafe)
+    has_more_failures = any(after.count(kind) > before.count(kind) for kind in KINDS if kind not in ("low", "safe"))
+    has_more_low_returns = after.count("low") > before.count("low") and len(after.unsafe) >= len(before.unsafe)
     return (
-        not is_more_frequent
-        and not is_lower
+        not has_more_failures
+        and not has_more_low_returns
         and (len(after.unsafe) < len(before.unsafe) or after.count("safe") > before.count("safe"))
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _ReturnLimits:
-    """Requirements on the return from each start: clearance and distance outside spheres (n,), m."""
+    """Required clearance and distance outside spheres of the return from each start, (n,) m."""
 
     clearance: Floats
     sphere_distance: Floats
@@ -82,7 +82,7 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return the limits plus a margin, or each start's own values less the turn's height loss if they are smaller."""
+    """Return the limits plus a margin, or each start's own values minus the turn's height loss if they are smaller."""
     rows = starts.rows
     sphere_distances = np.full(len(starts), math.inf)
     start_heights = np.nan_to_num(heights_above_ground(world, starts), nan=math.inf)
@@ -102,7 +102,7 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
-    """Flag each RTL return that keeps within the limits, without margin, by only the point-mass simulation, (n,)."""
+    """Flag each RTL return that keeps within the limits, without margin, in the point-mass simulation, (n,)."""
     return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all)
 
 
@@ -137,7 +137,7 @@ def _meets_criterion(
     criterion: Criterion,
 ) -> Flags:
     sphere_distances = limits.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
-    results, paths = fly_home(world, starts, targets, (limits.clearance, sphere_distances))
+    results, paths = simulate_returns(world, starts, targets, (limits.clearance, sphere_distances))
     is_met = criterion(world, results, limits)
     if criterion is not _meets_all:
         return is_met
@@ -150,7 +150,7 @@ def _meets_criterion(
 
 
 class _ReturnTrial:
-    """Trial of a world from all starts, beginning with the starts that failed before."""
+    """Trial of returns from all starts, beginning with the starts that failed before."""
 
     def __init__(self, starts: ReturnStarts, limits: _ReturnLimits) -> None:
         self._starts, self._limits = starts, limits
@@ -214,10 +214,10 @@ def _suggest_climbs(world: ReturnWorld, trial: _ReturnTrial, altitude: float | N
     candidates = [{"RTL_CLIMB_MIN": climb} for climb in _CLIMBS_M] + [{"FLIGHT_OPTIONS": options}]
     if altitude is not None:
         candidates += [candidate | {"RTL_ALTITUDE": altitude} for candidate in candidates]
-    passing = first_that_passes(
+    passing_candidate = first_that_passes(
         candidates, lambda candidate: trial.passes(world.with_parameters(**candidate), _meets_all)
     )
-    return [] if passing is None else [Remedy(passing)]
+    return [] if passing_candidate is None else [Remedy(passing_candidate)]
 
 
 # ----------------------------------------------------------------------
@@ -232,38 +232,38 @@ _MAX_CANDIDATES = 320
 # Least grid spacing of candidates, m.
 _GRID_SPACING_M = 600.0
 # Number of nearest candidates to which returns are simulated from each start.
-_FLOWN_CANDIDATES = 60
+_SIMULATED_CANDIDATES = 60
 # Greatest distance of such a candidate, m.
-_MAX_FLOWN_DISTANCE_M = 4500.0
+_MAX_SIMULATED_DISTANCE_M = 4500.0
 # Radius around a candidate within which the ground is checked, m: the width of ArduPlane's smallest loiters.
 _LOITER_RADIUS_M = 280.0
 # Largest number of rally points in a set.
 _MAX_POINTS = 10
 # Number of searches, each including starts that the previous search left unsafe.
-_ROUNDS = 4
+_SEARCH_ROUNDS = 4
 # Number of candidate grids, each finer near unsafe starts.
-_GRIDS = 3
+_GRID_COUNT = 3
 # Number of best single points that are paired with every other point.
-_PAIR_SEEDS = 30
+_PAIR_SEED_COUNT = 30
 
 
 def suggest_rally_points(world: ReturnWorld, starts: ReturnStarts) -> Remedy | None:
-    """Suggest the fewest rally points that make as many returns safe as possible, or None if no point is_improvement.
+    """Suggest the fewest rally points that make most returns safe, or None if no point improves the returns.
 
     Add points greedily, given the autopilot's own choice between them, then swap points, then remove superfluous ones.
     """
     limits, start_count = _return_limits(world, starts), len(starts)
     # Without the mission's own rally points, all returns go home.
-    home_is_good = _rtls_meet_criterion(world.with_rally(()), starts, limits, _meets_all)
-    if home_is_good.all() or not start_count or world.ending == "straight to land":
+    is_good_from_home = _rtls_meet_criterion(world.with_rally(()), starts, limits, _meets_all)
+    if is_good_from_home.all() or not start_count or world.ending == "straight to land":
         return None
     searched_starts = np.unique(np.linspace(0, start_count - 1, min(start_count, _MAX_STARTS)).round().astype(int))
-    best_set: tuple[int, tuple[ReturnPoint, ...]] = (int(home_is_good.sum()), ())
+    best_set: tuple[int, tuple[ReturnPoint, ...]] = (int(is_good_from_home.sum()), ())
     candidates = _rally_candidates(world, starts, _GRID_SPACING_M, _MAX_PATH_DISTANCE_M)
-    for _ in range(_GRIDS):
+    for _ in range(_GRID_COUNT):
         if not candidates:
             break
-        search = _RallySearch(world, starts, limits, candidates, home_is_good)
+        search = _RallySearch(world, starts, limits, candidates, is_good_from_home)
         good_count, points, unsafe_starts = _search_in_rounds(
             search, world, starts, limits, searched_starts, len(best_set[1])
         )
@@ -294,19 +294,19 @@ def _search_in_rounds(
     Returns the number of good returns, the points, and the starts that remain unsafe.
     """
     best_result: tuple[int, tuple[ReturnPoint, ...], NDArray[np.intp]] = (-1, (), np.zeros(0, dtype=np.intp))
-    for _ in range(_ROUNDS):
+    for _ in range(_SEARCH_ROUNDS):
         points = tuple(
-            search.places[candidate] for candidate in search.find(searched_starts, list(range(initial_count)))
+            search.candidates[candidate] for candidate in search.find(searched_starts, list(range(initial_count)))
         )
         is_good = _rtls_meet_criterion(world.with_rally(points), starts, limits, _meets_all)
         unsafe_starts = np.flatnonzero(~is_good)
         if int(is_good.sum()) > best_result[0]:
             best_result = int(is_good.sum()), points, unsafe_starts
-        unsearched = np.setdiff1d(unsafe_starts, searched_starts)
-        if not unsearched.size:
+        unsearched_starts = np.setdiff1d(unsafe_starts, searched_starts)
+        if not unsearched_starts.size:
             break
-        # A few of each run are enough.
-        searched_starts = np.union1d(searched_starts, unsearched[:: max(1, len(unsearched) // 20)])
+        # A few of each sequence of starts are enough.
+        searched_starts = np.union1d(searched_starts, unsearched_starts[:: max(1, len(unsearched_starts) // 20)])
     return best_result
 
 
@@ -369,55 +369,66 @@ class _RallySearch:
     """
 
     def __init__(
-        self, world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, places: list[ReturnPoint], home: Flags
+        self,
+        world: ReturnWorld,
+        starts: ReturnStarts,
+        limits: _ReturnLimits,
+        candidates: list[ReturnPoint],
+        is_good_from_home: Flags,
     ) -> None:
-        self._world, self._starts, self._limits, self.places, self._home = world, starts, limits, places, home
-        positions = np.array([(place.east, place.north) for place in places])
+        self._world, self._starts, self._limits, self.candidates, self._is_good_from_home = (
+            world,
+            starts,
+            limits,
+            candidates,
+            is_good_from_home,
+        )
+        positions = np.array([(place.east, place.north) for place in candidates])
         rows = starts.rows
         self._distances = np.hypot(
             rows["east"][:, None] - positions[None, :, 0], rows["north"][:, None] - positions[None, :, 1]
         )
-        self._to_home = np.hypot(rows["east"] - world.home.east, rows["north"] - world.home.north)
+        self._home_distances = np.hypot(rows["east"] - world.home.east, rows["north"] - world.home.north)
         limit = world.parameters.rally_limit
-        self._limit = limit if limit > 0.0 else math.inf
+        self._max_rally_distance = limit if limit > 0.0 else math.inf
         self._is_good = np.zeros(self._distances.shape, dtype=np.bool_)
         self._is_simulated = np.zeros(len(starts), dtype=np.bool_)
 
-    def find(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+    def find(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
         """Find the set of candidates that is good for most searched starts.  point_set: the initial set."""
-        self._simulate_candidates(searched[~self._is_simulated[searched]])
-        while len(point_set) < _MAX_POINTS and self._count_good(searched, point_set) < len(searched):
-            extended = self._with_best_addition(searched, point_set)
-            if self._count_good(searched, extended) <= self._count_good(searched, point_set):
+        self._simulate_candidates(searched_starts[~self._is_simulated[searched_starts]])
+        while len(point_set) < _MAX_POINTS and self._count_good(searched_starts, point_set) < len(searched_starts):
+            extended_set = self._with_best_addition(searched_starts, point_set)
+            if self._count_good(searched_starts, extended_set) <= self._count_good(searched_starts, point_set):
                 break
-            point_set = self._with_swaps(searched, extended)
-        return self._without_superfluous(searched, point_set)
+            point_set = self._with_swaps(searched_starts, extended_set)
+        return self._without_superfluous_points(searched_starts, point_set)
 
-    def _with_best_addition(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+    def _with_best_addition(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
         """Add the best point to a set, or the best pair if no single point is an improvement."""
-        candidates = range(len(self.places))
-        counts = [self._count_good(searched, [*point_set, candidate]) for candidate in candidates]
-        if max(counts) > self._count_good(searched, point_set):
+        candidates = range(len(self.candidates))
+        counts = [self._count_good(searched_starts, [*point_set, candidate]) for candidate in candidates]
+        if max(counts) > self._count_good(searched_starts, point_set):
             return [*point_set, int(np.argmax(counts))]
-        best_singles = np.argsort(counts, kind="stable")[::-1][:_PAIR_SEEDS].tolist()
+        best_single_points = np.argsort(counts, kind="stable")[::-1][:_PAIR_SEED_COUNT].tolist()
         return max(
-            ([*point_set, single, candidate] for single in best_singles for candidate in candidates),
-            key=lambda extended: self._count_good(searched, extended),
+            ([*point_set, point, candidate] for point in best_single_points for candidate in candidates),
+            key=lambda extended_set: self._count_good(searched_starts, extended_set),
         )
 
-    def _simulate_candidates(self, searched: NDArray[np.intp]) -> None:
+    def _simulate_candidates(self, searched_starts: NDArray[np.intp]) -> None:
         """Simulate returns from starts to their nearest candidates; all other candidates are rated as bad."""
         pairs = [
             (start, int(candidate))
-            for start in searched
-            for candidate in np.argsort(self._distances[start])[:_FLOWN_CANDIDATES]
-            if self._distances[start, candidate] < _MAX_FLOWN_DISTANCE_M
+            for start in searched_starts
+            for candidate in np.argsort(self._distances[start])[:_SIMULATED_CANDIDATES]
+            if self._distances[start, candidate] < _MAX_SIMULATED_DISTANCE_M
         ]
-        self._is_simulated[searched] = True
+        self._is_simulated[searched_starts] = True
         if not pairs:
             return
         start_indices, candidate_indices = (np.array(column) for column in zip(*pairs, strict=True))
-        candidate_places = (self.places[candidate] for candidate in candidate_indices.tolist())
+        candidate_places = (self.candidates[candidate] for candidate in candidate_indices.tolist())
         targets = [
             self._world.with_landing(ReturnTarget(place[:3], "", "", 0.0, place.base)) for place in candidate_places
         ]
@@ -426,38 +437,40 @@ class _RallySearch:
             self._world, starts, targets, limits, _meets_all
         )
 
-    def _count_good(self, searched: NDArray[np.intp], point_set: list[int]) -> int:
+    def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:
         """Count the good returns with these rally points, each to the point that the autopilot chooses."""
         if not point_set:
-            return int(self._home[searched].sum())
-        distances = self._distances[np.ix_(searched, np.array(point_set))]
+            return int(self._is_good_from_home[searched_starts].sum())
+        distances = self._distances[np.ix_(searched_starts, np.array(point_set))]
         nearest_indices = np.argmin(distances, axis=1)
-        min_distances = distances[np.arange(len(searched)), nearest_indices]
-        goes_home = min_distances > self._limit
+        min_distances = distances[np.arange(len(searched_starts)), nearest_indices]
+        goes_home = min_distances > self._max_rally_distance
         if self._world.parameters.rally_includes_home > 0.0:
-            goes_home |= self._to_home[searched] <= min_distances
+            goes_home |= self._home_distances[searched_starts] <= min_distances
         is_good = np.where(
-            goes_home, self._home[searched], self._is_good[searched, np.array(point_set)[nearest_indices]]
+            goes_home,
+            self._is_good_from_home[searched_starts],
+            self._is_good[searched_starts, np.array(point_set)[nearest_indices]],
         )
         return int(is_good.sum())
 
-    def _with_swaps(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+    def _with_swaps(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
         """Swap points for better ones until no swap is an improvement."""
-        best_count, has_improved = self._count_good(searched, point_set), True
+        best_count, has_improved = self._count_good(searched_starts, point_set), True
         while has_improved:
             has_improved = False
             for position in range(len(point_set)):
-                for candidate in range(len(self.places)):
+                for candidate in range(len(self.candidates)):
                     swapped_set = [*point_set[:position], candidate, *point_set[position + 1 :]]
-                    count = self._count_good(searched, swapped_set)
+                    count = self._count_good(searched_starts, swapped_set)
                     if count > best_count:
                         best_count, point_set, has_improved = count, swapped_set, True
         return point_set
 
-    def _without_superfluous(self, searched: NDArray[np.intp], point_set: list[int]) -> list[int]:
+    def _without_superfluous_points(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
         """Remove superfluous points from a set."""
         for candidate in list(point_set):
             smaller_set = [other for other in point_set if other != candidate]
-            if self._count_good(searched, smaller_set) >= self._count_good(searched, point_set):
+            if self._count_good(searched_starts, smaller_set) >= self._count_good(searched_starts, point_set):
                 point_set = smaller_set
         return point_set

@@ -85,7 +85,9 @@ class _Obstacles(NamedTuple):
 def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
     """Return the nominal and the certain maximum climb slope on a course (rad) at an altitude (m AMSL), m per m."""
     speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
-    max_slope, certain_slope = (limit_set.slopes(course, amsl, speed)[0] for limit_set in (limits, limits.surely()))
+    max_slope, certain_slope = (
+        limit_set.slopes(course, amsl, speed)[0] for limit_set in (limits, limits.with_margin())
+    )
     return math.tan(max_slope), math.tan(certain_slope)
 
 

@@ -185,7 +185,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     envelope = requirements.setup.envelope
     if not envelope.fastest_sd:
         return ""
-    certain_envelope = envelope.surely()
+    certain_envelope = envelope.with_margin()
     altitudes = requirements.points[leg : leg + 2, 2].tolist()
     if commanded <= min(certain_envelope.level_speeds(altitude)[1] for altitude in altitudes):
         return ""

@@ -157,9 +157,9 @@ def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZon
         return MapZone(name, geographic_parts, folder="the glide's footprint", role=role)
 
     shapes = [
-        shape(f"home or another chosen place in reach from {band.up_to:.0f} m above ground", role, band.parts)
+        shape(f"home or another chosen place in reach from {band.max_height:.0f} m above ground", role, band.parts)
         for band in footprint.bands()
-        for role in [BAND_ROLES[band.up_to]]
+        for role in [BAND_ROLES[band.max_height]]
     ]
     flat_parts = footprint.landings()
     return [

@@ -37,7 +37,7 @@ def searching(airframe: Airframe, asked: list[int]) -> Callable[[Scenario], Plan
 
     def search(scenario: Scenario) -> Plan:
         asked.append(scenario.planner.waypoints)
-        return plan_path(scenario, airframe.limits.surely(), seed=SEED)
+        return plan_path(scenario, airframe.limits.with_margin(), seed=SEED)
 
     return search
 
@@ -46,7 +46,7 @@ def searching(airframe: Airframe, asked: list[int]) -> Callable[[Scenario], Plan
 def test_plans_of_calmer_air_and_of_who_flies_on_are_as_they_were(turbulence: str, autopilot: str) -> None:
     scenario = scenario_of(turbulence, autopilot)
     airframe, asked = load_airframe(scenario), list[int]()
-    plan = plan_path(scenario, airframe.limits.surely(), seed=SEED)
+    plan = plan_path(scenario, airframe.limits.with_margin(), seed=SEED)
     assert plan.safe
     assert limit_waypoint_orbits(plan, airframe, searching(airframe, asked)) is plan
     assert not asked
@@ -100,7 +100,7 @@ def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
     """22 m below the maximum height a level way has too little against updrafts; what is found then is settled too."""
     scenario = scenario_of("moderate", limits={"min_clearance_m": 50.0, "max_height_m": 172.0})
     airframe = load_airframe(scenario)
-    limits = airframe.limits.surely()
+    limits = airframe.limits.with_margin()
     first = limit_waypoint_orbits(plan_path(scenario, limits, seed=SEED), airframe, searching(airframe, []))
     assert first.safe
     assert find_shortfalls(first, airframe)
@@ -112,7 +112,7 @@ def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
 def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -> None:
     """With a NAV_FW_ALT_RAD of 5 m nothing leads past a zone; 5 m less than the value that it names do not help."""
     scenario = scenario_of("moderate")
-    found = plan_path(scenario, airframe_of_x8.limits.surely(), seed=SEED)
+    found = plan_path(scenario, airframe_of_x8.limits.with_margin(), seed=SEED)
     tight = Px4(airframe_of_x8.autopilot.with_parameters(NAV_FW_ALT_RAD=5.0).parameters)  # type: ignore[arg-type]
     airframe = replace(airframe_of_x8, autopilot=tight)
     plan = limit_waypoint_orbits(found, airframe)
@@ -130,7 +130,7 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
     """Of 30 m, less 8 m for gusts: atan(300 / 4000) twice turns by 9 degrees, atan(2000 / 4000) twice by 53."""
     wide = {"name": "city", "kind": "exclusion", "east_m": 4000.0, "north_m": 0.0, "radius_m": 1600.0}
     scenario = scenario_of("moderate", zones=[wide])
-    found = plan_path(scenario, airframe_of_x8.limits.surely(), seed=SEED)
+    found = plan_path(scenario, airframe_of_x8.limits.with_margin(), seed=SEED)
     assert found.safe
     corner = replace(found, waypoints=np.array([scenario.start, [4000.0, aside, 150.0], scenario.destination]))
     assert expected_orbits(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MAX_EXPECTED_ORBITS
@@ -147,7 +147,7 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
 
 def plan_of(airframe: Airframe, waypoints: np.ndarray) -> Plan:
     scenario = scenario_of("moderate")
-    found = plan_path(scenario, airframe.limits.surely(), seed=SEED)
+    found = plan_path(scenario, airframe.limits.with_margin(), seed=SEED)
     return replace(found, waypoints=waypoints)
 
 

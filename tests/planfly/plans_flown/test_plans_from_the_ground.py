@@ -47,7 +47,7 @@ def heights_over_ground(
     scenario: Scenario, airframe: Airframe, course: float, amsl: float, speed: float
 ) -> tuple[float, float]:
     """Steepest climb and descent over the ground on a course, m per m: the wind's triangle, by hand."""
-    climb, dive = airframe.limits.surely().envelope.air_angles(speed, amsl)
+    climb, dive = airframe.limits.with_margin().envelope.air_angles(speed, amsl)
     east, north = scenario.wind.at(amsl)
     along, across = (
         east * math.sin(course) + north * math.cos(course),

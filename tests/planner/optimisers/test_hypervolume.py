@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from planner.optimisers.hypervolume import PROBES, SEED, covering_order, hypervolume
+from planner.optimisers.hypervolume import PROBE_COUNT, SEED, covering_order, hypervolume
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ def test_each_choice_adds_most_probes_as_counted_anew_for_all(axes: int) -> None
     points[30:40] = points[20:30]
     inside = np.flatnonzero((points < 0.9).all(axis=1))
     best = points[inside].min(axis=0)
-    probes = best + np.random.default_rng(SEED).random((PROBES, axes)) * (0.9 - best)
+    probes = best + np.random.default_rng(SEED).random((PROBE_COUNT, axes)) * (0.9 - best)
     covered = (points[inside][:, None] <= probes[None]).all(axis=2)
     order = [int(np.argmin(points[inside, k])) for k in range(axes)]
     while len(order) < 20:

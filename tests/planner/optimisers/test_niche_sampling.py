@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from planner.optimisers.niche_sampling import CLEARING, MIN_SELECTED, NicheSampling
+from planner.optimisers.niche_sampling import CLEARING_RADIUS_RATIO, MIN_SELECTED_COUNT, NicheSampling
 from world.arrays import Flags, Floats, Ints
 
 LOWER, UPPER = np.array([[0.0, -10.0], [5.0, -20.0]]), np.array([[5.0, 10.0], [10.0, 20.0]])
@@ -51,8 +51,10 @@ def test_rows_that_are_not_allowed_are_drawn_again() -> None:
 
 def test_the_best_that_lie_apart_are_kept_behind_the_elite() -> None:
     deviation = np.array([1.0, 1.0])
-    near = 0.9 * CLEARING
-    group = np.array([[2.0, 0.0], [2.0 + near, near], [2.0 + 1.1 * CLEARING, 0.0], [4.0, 5.0], [1.0, -9.0]])
+    near = 0.9 * CLEARING_RADIUS_RATIO
+    group = np.array(
+        [[2.0, 0.0], [2.0 + near, near], [2.0 + 1.1 * CLEARING_RADIUS_RATIO, 0.0], [4.0, 5.0], [1.0, -9.0]]
+    )
     rows = np.stack([group, group + np.array([5.0, 0.0])])
     costs = np.array([[1.0, 2.0, 3.0, 4.0, np.inf]] * 2)
     elite = np.array([[0.5, 0.5], [9.5, 9.5]])
@@ -72,7 +74,7 @@ def test_a_row_that_costs_too_much_is_kept_only_to_have_a_few() -> None:
     group = np.column_stack([np.linspace(0.5, 4.5, 10), np.linspace(-9.0, 8.0, 10)])
     rows, costs = np.stack([group, group + np.array([5.0, 0.0])]), np.tile(np.arange(10.0), (2, 1))
     elite = np.array([[2.5, 9.0], [7.5, 9.0]])
-    for most, kept in ((6.0, 8), (1.0, MIN_SELECTED)):
+    for most, kept in ((6.0, 8), (1.0, MIN_SELECTED_COUNT)):
         out = sampling().next(rows, costs, 30, np.array([0.1, 0.1]), most, elite)
         same = [sum((row == old).all() for old in group) for row in out[0]]
         assert sum(same) == kept - 1

@@ -87,7 +87,7 @@ def test_the_climb_is_flown_from_the_ground_at_seven_tenths_of_the_steepest() ->
     assert climb.home.tolist() == [0.0, 0.0, BASE]
     # 30 m of clearance, 5 m that the certificate keeps, and 2 m: below the 40 m that a take-off climbs at the least.
     assert climb.up == BASE + 40.0
-    steepest = math.tan(limits().surely().slopes(climb.course, 300.0)[0])
+    steepest = math.tan(limits().with_margin().slopes(climb.course, 300.0)[0])
     assert climb.gradient <= 0.7 * steepest + 1e-9
     way = np.concatenate([climb.home[None], climb.waypoints, PATH[:1]])
     assert degrees(float(leg_courses(way)[0])) == pytest.approx(degrees(climb.course), abs=1e-6)
@@ -160,7 +160,7 @@ def test_out_of_a_ring_the_launch_leads_through_its_gap_and_without_one_the_plan
 
 
 def test_a_wall_just_under_the_climb_is_passed_and_one_just_into_it_is_not() -> None:
-    steepest = math.tan(limits().surely().slopes(0.0, 300.0)[0])
+    steepest = math.tan(limits().with_margin().slopes(0.0, 300.0)[0])
     # Of the height that was climbed half is to be left.
     clear = BASE + 0.5 * 0.7 * steepest * 255.0
     for top, free in ((clear - 2.0, True), (clear + 3.0, False)):

@@ -203,7 +203,7 @@ def test_no_two_slices_of_work_are_done_without_a_question(number: int, monkeypa
     """Among zones and below a greatest height, with no safe path where the numbers are larger: nearly all there is."""
     scenario = fresh_scenario(number)
     work = Work(monkeypatch)
-    plan_path(scenario, load_airframe(scenario).limits.surely(), seed=number + 1, stop=work.ask)
+    plan_path(scenario, load_airframe(scenario).limits.with_margin(), seed=number + 1, stop=work.ask)
     assert work.most["continue_airspace_route"] == 1
     # Fitting and its rounds, which together are a few milliseconds.
     assert work.most.pop("_choose") <= 5
@@ -234,7 +234,7 @@ def test_a_search_without_a_result_goes_on_for_some_pauses(
 
 def test_among_zones_a_stop_ends_a_search_whenever_it_comes() -> None:
     scenario = fresh_scenario(4001)
-    limits = load_airframe(scenario).limits.surely()
+    limits = load_airframe(scenario).limits.with_margin()
     asked: list[int] = []
 
     def end(after: int) -> str:

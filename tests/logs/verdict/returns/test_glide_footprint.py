@@ -27,7 +27,7 @@ def test_a_band_is_the_ring_of_its_heights() -> None:
     """30 m + r / 10 up to 150, 300 and 600 m: discs of 1.2, 2.7 and 5.7 km."""
     for ground in (0.0, 700.0):
         bands = cone(ground, half=90).bands()
-        assert [band.up_to for band in bands] == list(BANDS)
+        assert [band.max_height for band in bands] == list(BANDS)
         inner = 0.0
         for band, outer in zip(bands[:2], (1200.0, 2700.0), strict=True):
             area = shape(band.parts).area

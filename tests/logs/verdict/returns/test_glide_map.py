@@ -155,7 +155,9 @@ def test_beyond_the_data_and_above_the_top_it_leads_nowhere() -> None:
     assert math.isfinite(need_at(capped, 1500.0, 0.0))
     assert math.isinf(need_at(capped, 2500.0, 0.0))
     assert (
-        search_glide_altitudes(made, np.array([(-5, 3)]), glide_slopes(glider(), AIRSPEED, 0.0, TOP), TOP).origin.max()
+        search_glide_altitudes(
+            made, np.array([(-5, 3)]), glide_slopes(glider(), AIRSPEED, 0.0, TOP), TOP
+        ).destination.max()
         == -1
     )
 
@@ -166,7 +168,7 @@ def test_each_cell_knows_its_nearest_place() -> None:
     found = search_glide_altitudes(made, np.array(ends), glide_slopes(glider(), AIRSPEED, 0.0, TOP), TOP)
     columns = made.floor.shape[1]
     for east, end in ((-2500.0, 0), (-200.0, 0), (200.0, 1), (4000.0, 1)):
-        assert found.origin[made.cell_at(east, 300.0)] == ends[end][0] * columns + ends[end][1]
+        assert found.destination[made.cell_at(east, 300.0)] == ends[end][0] * columns + ends[end][1]
     assert found.next_step[ends[0]] == -1
 
 

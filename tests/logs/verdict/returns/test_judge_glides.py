@@ -249,7 +249,7 @@ def test_the_point_of_no_return_is_the_last_with_the_reserve(tmp_path: Path) -> 
     never = no_return(plenty, RTL_ALTITUDE=600.0)
     assert never.kind == "never"
     assert math.isnan(never.time)
-    assert never.left == pytest.approx(100.0 - 10.0 + min(one.energy_left for one in each))
+    assert never.remaining_energy == pytest.approx(100.0 - 10.0 + min(one.energy_left for one in each))
 
 
 def test_more_wind_against_the_way_back_brings_it_nearer(tmp_path: Path) -> None:
@@ -274,7 +274,7 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     # From behind the hill, into it: what does not arrive is left out.
     found = no_return(setup)
     assert found.kind == "never"
-    assert found.skipped > 0
+    assert found.skipped_count > 0
     starts = planned_starts(setup, 20.0)
     starts.energy_used[:] = 0.0
     deep = starts.subset(np.flatnonzero(starts.rows["east"] > 6000.0))

@@ -8,7 +8,7 @@ import pytest
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
-from logs.verdict.returns.returns_text import causes_text, headline, landing_text
+from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 
 EVERY = 4.0
@@ -45,7 +45,7 @@ def test_it_flies_straight_to_the_landing_sequence_over_what_is_between(tmp_path
     assert reaches(found, "ground") == pytest.approx(6000.0 - 5130.0, abs=150.0)
     assert reaches(found, "low") == pytest.approx(6000.0 - 4664.0, abs=150.0)
     assert all(one.safe for one in found.each if one.start[0] > 1500.0)
-    assert landing_text(found)[0] == "RTL_AUTOLAND 2: a return flies straight to the landing sequence at item 4"
+    assert describe_landing(found)[0] == "RTL_AUTOLAND 2: a return flies straight to the landing sequence at item 4"
     assert not found.safe
     assert headline(found).endswith("are safe; the landing is not judged")
 
@@ -72,12 +72,12 @@ def test_it_goes_on_from_its_circle_to_the_landing_sequence(tmp_path: Path) -> N
 def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path, value: int) -> None:
     alone, found = judged(tmp_path, WAY), judged(tmp_path, WAY, RTL_AUTOLAND=value)
     assert [(one.kind, one.target) for one in found.each] == [(one.kind, one.target) for one in alone.each]
-    assert landing_text(found)[0].startswith(f"RTL_AUTOLAND {value}: ")
+    assert describe_landing(found)[0].startswith(f"RTL_AUTOLAND {value}: ")
     assert not found.unjudged_parts
 
 
 def test_what_each_value_says(tmp_path: Path) -> None:
-    said = [landing_text(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
+    said = [describe_landing(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
     assert "ArduPlane does not arm" in said[0]
     assert said[1].endswith("from its circle a return continues to the landing sequence at item 4")
     assert "for go-arounds only" in said[3]
@@ -119,13 +119,13 @@ def test_a_battery_that_lands_goes_another_way_than_rtl(tmp_path: Path) -> None:
     kinds = {name: {one.kind for one in both.each if one.target.name == name} for name in names}
     assert kinds["home"] == {"safe"}
     assert "ground" in kinds["the landing sequence at item 4"]
-    lines = causes_text(both.causes)
+    lines = describe_causes(both.causes)
     assert "it lands: battery low (BATT_FS_LOW_ACT 2): lands by its landing sequence" in lines
     assert "the mission's end: has landed" in lines[-1]
     # Nothing triggers it, and it is not flown.
     unset = judged(tmp_path, RTL_AUTOLAND=0, BATT_FS_LOW_ACT=2, BATT_MONITOR=0)
     assert {one.target.name for one in unset.each} == {"home"}
-    assert "battery low (BATT_FS_LOW_ACT 2): set, but no threshold triggers it" in causes_text(unset.causes)[-1]
+    assert "battery low (BATT_FS_LOW_ACT 2): set, but no threshold triggers it" in describe_causes(unset.causes)[-1]
 
 
 def test_mode_autoland_is_not_judged(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from flight.mission.return_path import ReturnTarget
 from logs.verdict.returns.judge_glides import judge_glides
 from logs.verdict.returns.judge_returns import Kind, SimulatedReturn, judge_returns, return_world, sinks_to_ground
-from logs.verdict.returns.return_starts import SINKING, flown_starts
+from logs.verdict.returns.return_starts import SINK_HEIGHT_LOSS_M, flown_starts
 from logs.verdict.returns.returns_text import headline
 from logs.views.report.tables import flight_sentence
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
@@ -60,7 +60,7 @@ def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> Non
     # Low are the climb to the take-off's height and the final, none between them.
     low = starts.time[starts.is_low]
     # The ground is level, at 0 m.
-    assert (starts.rows["up"][starts.is_low] < flown.setup.limits.min_clearance + SINKING).all()
+    assert (starts.rows["up"][starts.is_low] < flown.setup.limits.min_clearance + SINK_HEIGHT_LOSS_M).all()
     between = (starts.time > 20.0) & (track.leg[np.searchsorted(track.time, starts.time)] < flown.approach.leg)
     assert not starts.is_low[between].any()
     assert low[0] < 5.0
