@@ -1,10 +1,10 @@
 """Find reference paths of fresh instances: screen all sides of a fine lattice, and polish the best paths.
 
 `benchmarks.planning.lattice_search.lattice_routes` proposes hundreds of combinations of sides of the missiles
-(the planner: some 15), without a frame, without stages and with all heights; then the paths found are cut and joined with each other.
-Each is shortened in a millisecond or two, by the planner's own shortening but with the certificate's margins, which are
-smaller than the margins of the planner's search.  If limits are in degrees, the shortest are polished by SciPy's SLSQP
-(`benchmarks.planning.smooth_search`), which shares nothing with the planner.
+(the planner: some 15), without a frame, without stages and with all heights; then the paths found are cut and joined
+with each other.  Each is shortened in a millisecond or two, by the planner's own shortening but with the
+certificate's margins, which are smaller than the margins of the planner's search. If limits are in degrees, the
+shortest are polished by SciPy's SLSQP (`benchmarks.planning.smooth_search`), which shares nothing with the planner.
 """
 
 import math
