@@ -165,7 +165,8 @@ FIGURES = (
         ),
         alternative=lambda subject: (
             "Heights along the path: terrain, required clearance, "
-            f"{subject.text_if_flown('planned and flown', 'planned')} heights, the ceiling, and the missile and radar spheres that stand over the path."
+            f"{subject.text_if_flown('planned and flown', 'planned')} heights, the ceiling, "
+            "and the missile and radar spheres that stand over the path."
         ),
         caption=lambda subject: (
             subject.text_if_flown("Flown heights are plotted at the flight's progress along the planned path. ")
