@@ -60,12 +60,12 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
             duration = float(track.time[-1] - track.time[0])
         interval = max(1.0, duration / _SUMMARY_RETURNS)
         starts = return_starts(setup, track, interval)
-        judged_returns = judge_returns(world, starts, interval)
+        returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
     names_stand_in = world.stands_in and not world.has_other_law
     stands_in = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if names_stand_in else ""
-    return ReturnSummary(headline(judged_returns) + stands_in, world, starts, judged_returns)
+    return ReturnSummary(headline(returns) + stands_in, world, starts, returns)
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:

@@ -117,13 +117,13 @@ class ProgramReturns:
         comparison += f"; {worse_count} worse than simulated, where the simulation errs" if worse_count else ""
         return f"by {self.program} itself: {len(self.flown_pairs)} of the worst flown, {comparison}"
 
-    def lines(self, judged_returns: Returns, scenario: Scenario) -> list[str]:
+    def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
         """Return a line on each return, with its start, both outcomes, and their agreement."""
         texts = []
         for pair in self.pairs:
             east, north, _ = pair.simulated.start
             start_text = f"{pair.simulated.time:.0f} s, from {east:.0f} m east, {north:.0f} m north"
-            simulated_text = measured_text(pair.simulated, judged_returns.limit, scenario)
+            simulated_text = measured_text(pair.simulated, returns.limit, scenario)
             if pair.flown is None:
                 texts.append(f"{start_text}: simulated {simulated_text}; not flown by the program: {pair.reason}")
                 continue
@@ -134,17 +134,17 @@ class ProgramReturns:
                 if pair.worse
                 else "the simulated outcome applies, because it is worse"
             )
-            program_text = measured_text(pair.flown, judged_returns.limit, scenario)
+            program_text = measured_text(pair.flown, returns.limit, scenario)
             texts.append(f"{start_text}: simulated {simulated_text}; by the program {program_text}: {agreement}")
         return texts
 
-    def with_worse_results(self, judged_returns: Returns) -> Returns:
+    def with_worse_results(self, returns: Returns) -> Returns:
         """Replace each simulated result by the program's result if the program's result is worse."""
         worse_results = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
         return replace(
-            judged_returns,
+            returns,
             each=tuple(
-                worse_results.get(id(simulated_return)) or simulated_return for simulated_return in judged_returns.each
+                worse_results.get(id(simulated_return)) or simulated_return for simulated_return in returns.each
             ),
         )
 
@@ -158,7 +158,7 @@ def check_is_arduplane(program: Path) -> None:
 
 
 def worst_separated_returns(
-    world: ReturnWorld, starts: ReturnStarts, judged_returns: Returns, points: int
+    world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[SimulatedReturn, int]]:
     """Choose at most `points` of the worst returns that can be flown, the worst first, with the index of each start.
 
@@ -170,7 +170,7 @@ def worst_separated_returns(
     min_distance = 0.5 * float(np.hypot(*np.diff(positions, axis=0).T).sum()) / points if len(starts) > 1 else 0.0
     numbers = {float(time): start_index for start_index, time in enumerate(starts.time)}
     chosen_returns: list[tuple[SimulatedReturn, int]] = []
-    for candidate in sorted(judged_returns.each, key=_worst_first_key):
+    for candidate in sorted(returns.each, key=_worst_first_key):
         start_index = numbers[candidate.time]
         is_near = any(
             np.hypot(*(positions[start_index] - positions[chosen_number])) < min_distance
@@ -206,7 +206,7 @@ def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
 
 
 def fly_by_program(
-    world: ReturnWorld, starts: ReturnStarts, judged_returns: Returns, program: Path, points: int, folder: Path | None
+    world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
 ) -> ProgramReturns:
     """Fly at most `points` of the worst returns by the ArduPlane program, in the mean wind, with exact navigation.
 
@@ -215,7 +215,7 @@ def fly_by_program(
     """
     program_returns, version = [], ""
     for number, (simulated_return, start_index) in enumerate(
-        worst_separated_returns(world, starts, judged_returns, points), 1
+        worst_separated_returns(world, starts, returns, points), 1
     ):
         log = None if folder is None else folder / f"worst-return-{number}.mcap"
         with stage(f"flying return {number} of {points} by the program", "flying a return by a program") as advance:

@@ -435,7 +435,7 @@ def judge_returns(
     max_flights: maximum number of JSBSim flights.
     advance: called with the number judged and the total; an exception that it raises ends the work.
     """
-    simulated_returns: list[SimulatedReturn] = []
+    returns: list[SimulatedReturn] = []
     differences: list[float] = []
     omitted_count, total_count = 0, len(world.endings) * len(starts)
     for number, ending in enumerate(world.endings):
@@ -463,9 +463,9 @@ def judge_returns(
             if not (starts.is_low[k] and sinks_to_ground(ret, float(start_heights[k])))
         ]
         omitted_count += starts.grounded_count + len(judged_returns) - len(reported_returns)
-        simulated_returns += reported_returns
+        returns += reported_returns
     return Returns(
-        each=tuple(simulated_returns),
+        each=tuple(returns),
         interval=interval,
         causes=world.causes,
         limit=world.limit,
@@ -634,58 +634,49 @@ def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
 def _recheck_in_jsbsim(
     world: ReturnWorld,
     starts: ReturnStarts,
-    simulated_returns: list[SimulatedReturn],
+    returns: list[SimulatedReturn],
     results: Records,
     fly_again: FlyAgain,
     max_flights: int,
 ) -> tuple[list[SimulatedReturn], list[float]]:
     """Fly the most doubtful return of each group of successive doubtful returns in JSBSim, and correct the group."""
-    corrected, differences = list(simulated_returns), []
-    doubtful_groups = groupby(
-        range(len(simulated_returns)), lambda k: distance_to_limit(simulated_returns[k]) < POINT_MASS_ERROR_M
-    )
+    corrected, differences = list(returns), []
+    doubtful_groups = groupby(range(len(returns)), lambda k: distance_to_limit(returns[k]) < POINT_MASS_ERROR_M)
     groups = [
         [k for k in group if is_steady(world, starts.rows[k])] for is_unsure, group in doubtful_groups if is_unsure
     ]
-    ranked_groups = sorted(
-        (min(distance_to_limit(simulated_returns[k]) for k in group), group) for group in groups if group
-    )
+    ranked_groups = sorted((min(distance_to_limit(returns[k]) for k in group), group) for group in groups if group)
     for _, group in ranked_groups[:max_flights]:
-        k = min(group, key=lambda k: distance_to_limit(simulated_returns[k]))
+        k = min(group, key=lambda k: distance_to_limit(returns[k]))
         result = fly_again(world, starts.rows[k])
         if result is None:
             continue
         # Differences in clearance and in distance outside spheres, m; 0 if there is nothing to compare.
         offsets = [
             new_value - old_value
-            for new_value, old_value in zip(
-                result, (simulated_returns[k].clearance, simulated_returns[k].sphere_distance), strict=True
-            )
+            for new_value, old_value in zip(result, (returns[k].clearance, returns[k].sphere_distance), strict=True)
         ]
         height_offset, distance_offset = (offset if math.isfinite(offset) else 0.0 for offset in offsets)
         if math.isfinite(offsets[0]):
             differences.append(height_offset)
         is_low = (
-            min(simulated_returns[k].clearance, simulated_returns[k].clearance + height_offset)
-            < simulated_returns[k].required_height + _DECISIVE_MARGIN_M
+            min(returns[k].clearance, returns[k].clearance + height_offset)
+            < returns[k].required_height + _DECISIVE_MARGIN_M
         )
-        is_close = (
-            min(simulated_returns[k].sphere_distance, simulated_returns[k].sphere_distance + distance_offset)
-            < _DECISIVE_MARGIN_M
-        )
+        is_close = min(returns[k].sphere_distance, returns[k].sphere_distance + distance_offset) < _DECISIVE_MARGIN_M
         disagrees = (is_low and abs(height_offset) > POINT_MASS_ERROR_M) or (
             is_close and abs(distance_offset) > POINT_MASS_ERROR_M
         )
-        corrected[k] = _with_offsets(world, simulated_returns[k], results[k], height_offset, distance_offset)
+        corrected[k] = _with_offsets(world, returns[k], results[k], height_offset, distance_offset)
         if disagrees and corrected[k].kind not in ("ground", "threat"):
             corrected[k] = replace(corrected[k], kind="unsure")
         for j in group:
-            if j != k and disagrees and simulated_returns[j].kind in ("low", "safe"):
-                corrected[j] = replace(simulated_returns[j], kind="unsure")
+            if j != k and disagrees and returns[j].kind in ("low", "safe"):
+                corrected[j] = replace(returns[j], kind="unsure")
             elif j != k and not disagrees:
                 # The flight of one return never improves another one.
                 corrected[j] = _with_offsets(
-                    world, simulated_returns[j], results[j], min(0.0, height_offset), min(0.0, distance_offset)
+                    world, returns[j], results[j], min(0.0, height_offset), min(0.0, distance_offset)
                 )
     return corrected, differences
 
