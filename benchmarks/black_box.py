@@ -165,11 +165,11 @@ def by_bearing(rows: Floats, ground: Floats) -> Floats:
 
 def by_offset(rows: Floats, ground: Floats) -> Floats:
     """Decode paths (n, 12, 3) from offsets to the left of the straight line, at equal steps, and heights (n, 20)."""
-    start, way = np.array(START), np.array(END) - np.array(START)
-    left = np.array([-way[1], way[0]]) / math.hypot(way[0], way[1])
+    start, displacement = np.array(START), np.array(END) - np.array(START)
+    left = np.array([-displacement[1], displacement[0]]) / math.hypot(displacement[0], displacement[1])
     paths = np.empty((len(rows), NODES + 2, 3))
     paths[:, 0], paths[:, -1] = START, END
-    along = start[:2] + np.linspace(0.0, 1.0, NODES + 2)[1:-1, None] * way[:2]
+    along = start[:2] + np.linspace(0.0, 1.0, NODES + 2)[1:-1, None] * displacement[:2]
     paths[:, 1:-1, :2] = np.clip(along + rows[:, :NODES, None] * left, 1.0, (ground.shape[1], ground.shape[0]))
     paths[:, 1:-1, 2] = rows[:, NODES:]
     return paths
@@ -177,8 +177,8 @@ def by_offset(rows: Floats, ground: Floats) -> Floats:
 
 def path_boxes() -> dict[str, tuple[Callable[[Floats, Floats], Floats], Floats, Floats]]:
     """Return the decoder of a path and the box of its variables, by name of the encoding."""
-    way = np.array(END[:2]) - np.array(START[:2])
-    ahead, reach = math.atan2(way[1], way[0]), 2.0 * math.hypot(*way) / NODES
+    displacement = np.array(END[:2]) - np.array(START[:2])
+    ahead, reach = math.atan2(displacement[1], displacement[0]), 2.0 * math.hypot(*displacement) / NODES
     distance, quarter = (np.zeros(NODES), np.full(NODES, reach)), np.full(NODES, 0.25 * math.pi)
     low, high = (distance[0], ahead - quarter), (distance[1], ahead + quarter)
     offset = np.full(NODES, 450.0)

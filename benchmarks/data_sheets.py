@@ -93,8 +93,8 @@ def route(aircraft: Aircraft, random: np.random.Generator, climb: float, descent
     courses = random.uniform(0.0, 2.0 * math.pi) + np.cumsum(turns)
     slopes = random.uniform(-SLOPE * descent, SLOPE * climb, legs)
     steps = np.column_stack([runs * np.sin(courses), runs * np.cos(courses), runs * np.tan(slopes)])
-    way: Floats = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]) + np.array([0.0, 0.0, AMSL])
-    return way
+    waypoints: Floats = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]) + np.array([0.0, 0.0, AMSL])
+    return waypoints
 
 
 def fly_both(aircraft: Aircraft, seed: int) -> dict[str, tuple[str, float, float]]:

@@ -96,9 +96,9 @@ def _most(values: NDArray[Any]) -> float:
 def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: float = 0.8, **more: Any) -> FlightSetup:
     """Make the standard mission in a wind from the seed's direction, with slopes scaled to the model's limits."""
     from_deg = float(np.random.default_rng(seed).uniform(0.0, 360.0))
-    way = standard()
-    setup = maker()(way, wind=(speed, from_deg), turbulence=turbulence, seed=seed, **more)
-    steps = np.diff(way, axis=0)
+    waypoints = standard()
+    setup = maker()(waypoints, wind=(speed, from_deg), turbulence=turbulence, seed=seed, **more)
+    steps = np.diff(waypoints, axis=0)
     for step in steps:
         climb, descent = setup.envelope.air_angles(25.0, 500.0)
         run = float(np.hypot(step[0], step[1]))
@@ -108,7 +108,7 @@ def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: f
             for air in (climb, -abs(descent))
         )
         step[2] = run * min(most, max(least, step[2] / run))
-    route = replace(setup.route, waypoints=way[0] + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]))
+    route = replace(setup.route, waypoints=waypoints[0] + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]))
     return replace(setup, route=route)
 
 
@@ -159,12 +159,12 @@ def flown_with(gains: Gains) -> Iterator[None]:
 
 def straight_rms(setup: FlightSetup, flown: SimulatedFlight, clear: float = CLEAR) -> float:
     """Return the RMS distance (m) of the true track from the legs, more than ``clear`` from their corners."""
-    way, track, found = setup.route.waypoints, flown.track, []
-    for leg in range(len(way) - 1):
-        step = (way[leg + 1] - way[leg])[:2]
+    waypoints, track, found = setup.route.waypoints, flown.track, []
+    for leg in range(len(waypoints) - 1):
+        step = (waypoints[leg + 1] - waypoints[leg])[:2]
         run = float(np.hypot(*step))
         east, north = step / run
-        away = track.position[:, :2] - way[leg, :2]
+        away = track.position[:, :2] - waypoints[leg, :2]
         along = away @ np.array([east, north])
         found.append(
             (away[:, 0] * north - away[:, 1] * east)[(track.leg == leg) & (along > clear) & (along < run - clear)]

@@ -77,9 +77,11 @@ class Limit:
 
 def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: float) -> FlightSetup:
     """Make a flight through points at cruise over flat ground, in a steady wind (m/s, rad that it blows from)."""
-    way = np.array(points, dtype=np.float64)
-    low, high = way.min(axis=0) - 3000.0, way.max(axis=0) + 3000.0
-    ends = [dict(zip(("east_m", "north_m", "amsl_m"), map(float, p), strict=True)) for p in (way[0], way[-1])]
+    waypoints = np.array(points, dtype=np.float64)
+    low, high = waypoints.min(axis=0) - 3000.0, waypoints.max(axis=0) + 3000.0
+    ends = [
+        dict(zip(("east_m", "north_m", "amsl_m"), map(float, p), strict=True)) for p in (waypoints[0], waypoints[-1])
+    ]
     spec: dict[str, Any] = {
         "name": "limits",
         "terrain": {"kind": "flat", "amsl_m": 0.0},
@@ -93,9 +95,9 @@ def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: fl
         "flight": {"aircraft": aircraft.name},
         "wind": {"speed_mps": wind, "from_deg": math.degrees(wind_from)},
     }
-    count = len(way)
+    count = len(waypoints)
     speeds = np.full(count - 1, aircraft.airspeed)
-    route = Route(way, speeds, np.zeros(count), np.zeros(count, dtype=bool), np.arange(count), "")
+    route = Route(waypoints, speeds, np.zeros(count), np.zeros(count, dtype=bool), np.arange(count), "")
     battery = aircraft.battery_energy / 3600.0
     scenario = from_spec(spec, "limits", external=True)
     return FlightSetup(
@@ -164,12 +166,12 @@ def _held(track: Track, airspeed: float, direction: float) -> bool:
 def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0, wind_from: float = 0.0) -> Limit:
     """Find the shortest leg between two turns (rad each), in the same or opposite directions, at 30 degrees of bank."""
     courses = np.array([COURSE, COURSE + turn, COURSE + (2.0 * turn if same_way else 0.0)])
-    ways = np.array([[math.sin(course), math.cos(course), 0.0] for course in courses])
+    directions = np.array([[math.sin(course), math.cos(course), 0.0] for course in courses])
     straight = 60.0 * aircraft.airspeed
 
     def points(leg: float) -> Floats:
         runs = np.array([straight, leg, straight])[:, None]
-        return np.array([0.0, 0.0, AMSL]) + np.vstack([np.zeros(3), np.cumsum(runs * ways, axis=0)])
+        return np.array([0.0, 0.0, AMSL]) + np.vstack([np.zeros(3), np.cumsum(runs * directions, axis=0)])
 
     def fly(leg: float) -> Track | None:
         with flown_with(replace(load_gains(aircraft), arc_slowing_max=0.0)):
@@ -205,8 +207,8 @@ def calm_limits(*, whole: bool) -> list[Limit]:
     """Measure slopes and shortest legs of the Aerosonde in calm air; fewer of them unless ``whole``."""
     aircraft = load_aircraft("aerosonde")
     found = [slope_limit(aircraft, side) for side in ((1.0, -1.0) if whole else (1.0,))]
-    turns = [(turn, way) for turn in (60.0, 30.0, 45.0, 90.0, 120.0) for way in (False, True)]
-    found += [leg_limit(aircraft, math.radians(turn), way) for turn, way in (turns if whole else turns[:1])]
+    turns = [(turn, same_way) for turn in (60.0, 30.0, 45.0, 90.0, 120.0) for same_way in (False, True)]
+    found += [leg_limit(aircraft, math.radians(turn), same_way) for turn, same_way in (turns if whole else turns[:1])]
     return found
 
 
@@ -217,6 +219,10 @@ def wind_limits(*, whole: bool) -> list[Limit]:
     found = []
     for side in sides:
         found += [slope_limit(aircraft, 1.0, 10.0, side), slope_limit(aircraft, -1.0, 10.0, side)]
-        turns = [(turn, way) for turn in (60.0, 90.0, 120.0) for way in (False, True)] if whole else [(60.0, False)]
-        found += [leg_limit(aircraft, math.radians(turn), way, 10.0, side) for turn, way in turns]
+        turns = (
+            [(turn, same_way) for turn in (60.0, 90.0, 120.0) for same_way in (False, True)]
+            if whole
+            else [(60.0, False)]
+        )
+        found += [leg_limit(aircraft, math.radians(turn), same_way, 10.0, side) for turn, same_way in turns]
     return found

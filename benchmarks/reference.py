@@ -137,24 +137,24 @@ def _brute(
     counts, objectives = np.zeros((number, 4), dtype=np.int64), np.zeros((number, 4))
     point = np.empty(3)
     for n in range(number):
-        way = paths[n]
+        path = paths[n]
         for i in range(count):
-            if (way[i] < low).any() or (way[i] > high).any():
+            if (path[i] < low).any() or (path[i] > high).any():
                 counts[n, 3] += 1
         for i in range(count - 1):
-            ux, uy, rise = way[i + 1, 0] - way[i, 0], way[i + 1, 1] - way[i, 1], way[i + 1, 2] - way[i, 2]
+            ux, uy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
             run = math.hypot(ux, uy)
             if rise > limits.climb * run or -rise > limits.dive * run:
                 counts[n, 1] += 1
             objectives[n, 0] += math.sqrt(ux * ux + uy * uy + rise * rise) / limits.straight
             if i > 0:
-                bx, by = way[i, 0] - way[i - 1, 0], way[i, 1] - way[i - 1, 1]
+                bx, by = path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1]
                 if math.atan2(abs(bx * uy - by * ux), bx * ux + by * uy + 0.0) > limits.max_turn:
                     counts[n, 0] += 1
             for j in range(POINTS + (i == count - 2)):
                 f = j / POINTS
                 for axis in range(3):
-                    point[axis] = way[i, axis] + f * (way[i + 1, axis] - way[i, axis])
+                    point[axis] = path[i, axis] + f * (path[i + 1, axis] - path[i, axis])
                 col = cols[n, i] + f * (cols[n, i + 1] - cols[n, i])
                 row = rows[n, i] + f * (rows[n, i + 1] - rows[n, i])
                 ground = _bilinear_at(heights, col, row)

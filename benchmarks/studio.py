@@ -138,14 +138,14 @@ def _long_mission(count: int) -> Mission:
     return Mission(Home(on_grid(float(lat[0])), on_grid(float(lon[0])), 300.0), tuple(items))
 
 
-def _zones(way: np.ndarray) -> str:
+def _zones(path: np.ndarray) -> str:
     """Make a thousand square exclusions, up to above the flight, all over the map except near its path."""
     scenario, rng = load_scenario(SCENARIO), np.random.default_rng(38)
     features: list[dict[str, Any]] = []
     while len(features) < 1_000:
         number = len(features)
         east, north = rng.uniform(-10_000.0, 10_000.0, 2)
-        if _distance(np.array([east, north]), way) < 250.0:
+        if _distance(np.array([east, north]), path) < 250.0:
             continue
         corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * 90.0 + [east, north]
         lat, lon = to_geo(scenario.origin, corners[:, 0], corners[:, 1])
@@ -157,11 +157,11 @@ def _zones(way: np.ndarray) -> str:
     return json.dumps({"type": "FeatureCollection", "features": features})
 
 
-def _distance(point: np.ndarray, way: np.ndarray) -> float:
+def _distance(point: np.ndarray, path: np.ndarray) -> float:
     """Return the distance of a point (2,) from a path (n, 2), m."""
-    along = np.diff(way, axis=0)
-    shares = np.clip(((point - way[:-1]) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-    return float(np.hypot(*(way[:-1] + shares[:, None] * along - point).T).min())
+    along = np.diff(path, axis=0)
+    shares = np.clip(((point - path[:-1]) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return float(np.hypot(*(path[:-1] + shares[:, None] * along - point).T).min())
 
 
 @contextlib.contextmanager
@@ -213,8 +213,8 @@ def measure_drags(folder: Path, missions: dict[str, tuple[str, ...]]) -> list[di
             count = int(browser.value("document.querySelectorAll('.mark').length"))
             moves = timed(browser.value(DRAG % {"mark": count // 2, "moves": MOVES}))
             browser.wait_for("document.getElementById('flown').dataset.state !== 'checking'")
-            way = [2, -2]
-            flown = [browser.value(RELEASE % {"mark": count // 2, "way": way[k % 2]}) for k in range(RELEASES)]
+            step = [2, -2]
+            flown = [browser.value(RELEASE % {"mark": count // 2, "way": step[k % 2]}) for k in range(RELEASES)]
         row = {"mission": name, "p50": share(moves, 0.5), "p95": share(moves, 0.95), "max": max(moves), "n": len(moves)}
         rows.append(row | {"flown": statistics.median(flown)})
         print(

@@ -35,7 +35,7 @@ ZONES = 1000
 CORNERS = 50
 
 
-def way(hours: float) -> np.ndarray:
+def flown_path(hours: float) -> np.ndarray:
     """Return lanes (w, 3) of ten legs to the north and back, 1,500 m apart, for some hours at 25 m/s, m."""
     count = math.ceil(hours * 3600.0 * SPEED / LEG)
     points, north, lane, heading = [(0.0, 0.0)], 0.0, 0.0, 1.0
@@ -79,7 +79,7 @@ def setup_of(hours: float, zones: list[dict[str, Any]], points: np.ndarray) -> F
 
 def run(count: int = ZONES, corners: int = CORNERS, hours: float = 1.0) -> dict[str, float]:
     """Measure, print, and return seconds by name."""
-    points = way(hours)
+    points = flown_path(hours)
     tables = zone_tables(points, count, corners)
     record: dict[str, float] = {}
     with tempfile.TemporaryDirectory() as folder:

@@ -185,7 +185,7 @@ def _gentlest(data: ProblemArrays) -> tuple[float, float]:
     return climb, dive
 
 
-def lattice_ways(task: Task, most: int = WAYS) -> list[Floats]:
+def lattice_routes(task: Task, most: int = WAYS) -> list[Floats]:
     """Return routes (n, 3) world m on different sides of the missiles, shortest first.
 
     Empty if the lattice is closed.
@@ -206,14 +206,14 @@ def lattice_ways(task: Task, most: int = WAYS) -> list[Floats]:
     places = np.flatnonzero(through <= LONGER * through.min())
     places = places[np.argsort(through[places], kind="stable")]
     _, firsts = np.unique(trees[0].classes[places] + trees[1].classes[places], return_index=True)
-    ways = []
+    routes = []
     for place in places[np.sort(firsts)[:most]]:
         before, after = (_trace(tree.parents, place) for tree in trees)
         cells = np.unravel_index(np.concatenate([before[::-1], after[1:]]), lattice.open.shape)
-        way = first + pitch * np.column_stack(cells)
-        way[0], way[-1] = data.start, data.destination
-        ways.append(way)
-    return ways
+        route = first + pitch * np.column_stack(cells)
+        route[0], route[-1] = data.start, data.destination
+        routes.append(route)
+    return routes
 
 
 def lattice_search(task: Task) -> tuple[float, Floats | None]:
@@ -221,8 +221,8 @@ def lattice_search(task: Task) -> tuple[float, Floats | None]:
     data, encoding = task.problem.search, task.encoding
     frame = rotated_frame(data.start, data.destination)
     best: tuple[float, Floats | None] = (math.inf, None)
-    for way in lattice_ways(task):
-        points = frame.rotate(way)
+    for route in lattice_routes(task):
+        points = frame.rotate(route)
         # The encoding cannot represent a route that turns back, so that such parts are flattened.
         points[:, 0] = np.maximum.accumulate(points[:, 0])
         path = fit_waypoints(data, frame, points, encoding.waypoints)

@@ -1,10 +1,10 @@
 """Find reference paths of fresh instances: screen all sides of a fine lattice, and polish the best paths.
 
-`benchmarks.planning.lattice_search.lattice_ways` proposes sides of the missiles, hundreds compared with some 15 of the
-planner, without a frame, without stages and with all heights; then the paths found are cut and joined with each other.
-Each is shortened in a millisecond or two, by the planner's own shortening but with the certificate's margins, which are
-smaller than the margins of the planner's search.  If limits are in degrees, the shortest are polished by SciPy's SLSQP
-(`benchmarks.planning.smooth_search`), which shares nothing with the planner.
+`benchmarks.planning.lattice_search.lattice_routes` proposes hundreds of combinations of sides of the missiles
+(the planner: some 15), without a frame, without stages and with all heights; then the paths found are cut and joined
+with each other.  Each is shortened in a millisecond or two, by the planner's own shortening but with the
+certificate's margins, which are smaller than the margins of the planner's search. If limits are in degrees, the
+shortest are polished by SciPy's SLSQP (`benchmarks.planning.smooth_search`), which shares nothing with the planner.
 """
 
 import math
@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.planning.lattice_search import lattice_ways
+from benchmarks.planning.lattice_search import lattice_routes
 from benchmarks.planning.smooth_search import Programme
 from benchmarks.task import Task, is_safe
 from planner.evaluation.problem import SEARCH_KILL_MARGIN_M
@@ -40,10 +40,12 @@ NEAR = 300.0
 def reference_search(task: Task) -> tuple[float, Floats | None]:
     """Return length ratio and waypoints (w, 3) of the best certified path; inf and None without one."""
     task = _with_least_margins(task)
-    pool = [found for way in lattice_ways(task, WAYS) if (found := _screened(task, way)) is not None]
+    pool = [found for route in lattice_routes(task, WAYS) if (found := _screened(task, route)) is not None]
     for _ in range(ROUNDS):
         pool = _distinct(pool)[:POOL]
-        joined = [found for way in _joined([path for _, path in pool]) if (found := _screened(task, way)) is not None]
+        joined = [
+            found for route in _joined([path for _, path in pool]) if (found := _screened(task, route)) is not None
+        ]
         if not joined or min(joined, key=lambda item: item[0])[0] >= pool[0][0]:
             break
         pool += joined
@@ -75,10 +77,10 @@ def _with_least_margins(task: Task) -> Task:
     return replace(task, problem=replace(problem, search=tight))
 
 
-def _screened(task: Task, way: Floats) -> tuple[float, Floats] | None:
+def _screened(task: Task, route: Floats) -> tuple[float, Floats] | None:
     """Shorten a route (k, 3); return length ratio and waypoints, or None if the result is not safe."""
     for margin in MARGINS:
-        path = resample(way, task.encoding.waypoints)
+        path = resample(route, task.encoding.waypoints)
         for _ in range(2):
             path, _ = shorten_path(task.problem.search, path, extra_margin=margin)
             if is_safe(task.certificate(path)):

@@ -1,6 +1,6 @@
 """Find shortest safe paths with a lattice and SciPy's SLSQP, as a reference independent of the planner's search.
 
-Routes on different sides of the missiles are from `benchmarks.planning.lattice_search.lattice_ways`, Dijkstra's
+Routes on different sides of the missiles are from `benchmarks.planning.lattice_search.lattice_routes`, Dijkstra's
 algorithm over the whole map.  Each is then shortened as a nonlinear programme over the positions of all waypoints, with
 derivatives: lengths of legs, distances of legs to spheres, slopes, turns, heights above ground.  Waypoints are not
 bound to a frame or to intervals, and neither the pattern search nor the dynamic programme of the planner is used.  The
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize
 
-from benchmarks.planning.lattice_search import lattice_ways
+from benchmarks.planning.lattice_search import lattice_routes
 from benchmarks.task import Task, is_safe
 from planner.search.plan_path import plan_path
 from world.arrays import Floats, Ints
@@ -185,11 +185,11 @@ class Programme:
         return self.path(x)
 
 
-def evenly(way: Floats, count: int) -> Floats:
+def evenly(route: Floats, count: int) -> Floats:
     """Return waypoints (count, 3) at equal distances along a route (k, 3)."""
-    runs = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(way, axis=0) ** 2).sum(axis=1)))])
+    runs = np.concatenate([[0.0], np.cumsum(np.sqrt((np.diff(route, axis=0) ** 2).sum(axis=1)))])
     at = np.linspace(0.0, runs[-1], count)
-    return np.column_stack([np.interp(at, runs, way[:, axis]) for axis in range(3)])
+    return np.column_stack([np.interp(at, runs, route[:, axis]) for axis in range(3)])
 
 
 def smooth_search(task: Task, ways: int = WAYS, plans: int = PLANS) -> tuple[float, Floats | None]:
@@ -201,8 +201,8 @@ def smooth_search(task: Task, ways: int = WAYS, plans: int = PLANS) -> tuple[flo
     programme, count = Programme(task), task.encoding.waypoints
     rng = np.random.default_rng(1)
     starts = []
-    for way in lattice_ways(task)[:ways]:
-        even = evenly(way, count)
+    for route in lattice_routes(task)[:ways]:
+        even = evenly(route, count)
         uneven = even.copy()
         uneven[1:-1, :2] += rng.normal(0.0, BESIDE, (count - 2, 2))
         starts += [even, uneven]

@@ -74,10 +74,10 @@ def shortest_on_map(scenario: Scenario) -> Floats:
     _, before = dijkstra(csr_array(table, shape=(free.size, free.size)), indices=first, return_predecessors=True)
     if before[last] < 0:
         return np.empty((0, 2))
-    way = [last]
-    while way[-1] != first:
-        way.append(int(before[way[-1]]))
-    points = grid.reshape(-1, 2)[way[::-1]]
+    path = [last]
+    while path[-1] != first:
+        path.append(int(before[path[-1]]))
+    points = grid.reshape(-1, 2)[path[::-1]]
     points[0], points[-1] = start, destination
     return _taut(scenario, points)
 
@@ -124,7 +124,7 @@ def map_length(points: Floats) -> float:
     return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
 
 
-def climbing_length(scenario: Scenario, way: Floats, climb: float, margin: float = 0.0) -> float:
+def climbing_length(scenario: Scenario, path: Floats, climb: float, margin: float = 0.0) -> float:
     """Return the smallest length on the map of a route (k, 2) that climbs no more than `climb` (a tangent).
 
     The ground at each place must be cleared when it is reached; a missing height is gained by a longer path before it.
@@ -132,30 +132,30 @@ def climbing_length(scenario: Scenario, way: Floats, climb: float, margin: float
     """
     terrain = scenario.terrain
     assert terrain is not None
-    count = max(2, math.ceil(map_length(way) / SAMPLE))
-    runs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
+    count = max(2, math.ceil(map_length(path) / SAMPLE))
+    runs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
     at = np.linspace(0.0, runs[-1], count)
-    places = np.column_stack([np.interp(at, runs, way[:, axis]) for axis in range(2)])
+    places = np.column_stack([np.interp(at, runs, path[:, axis]) for axis in range(2)])
     lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m + margin
     need = (lowest - scenario.start[2]) / climb
-    return map_length(way) + max(0.0, float((need - at).max()))
+    return map_length(path) + max(0.0, float((need - at).max()))
 
 
-def length_within(scenario: Scenario, limits: Limits, way: Floats) -> float:
+def length_within(scenario: Scenario, limits: Limits, path: Floats) -> float:
     """Return the smallest length on the map of a route (k, 2) within the slopes and the clearance of certificates.
 
     The slope is the harmonic mean of the slopes from the altitude of the start to the highest place on the route.
     """
     terrain, data = scenario.terrain, make_problem(scenario, limits).certified
     assert terrain is not None
-    places = np.concatenate([np.linspace(a, b, 100) for a, b in pairwise(way)])
+    places = np.concatenate([np.linspace(a, b, 100) for a, b in pairwise(path)])
     highest = float(terrain.height(places[:, 0], places[:, 1]).max()) + data.clearance + data.buffer
     level, ahead = np.array([0.0, 0.0, 0.0]), np.array([1000.0, 0.0, 0.0])
     slopes = []
     for amsl in np.linspace(scenario.start[2], max(highest, scenario.start[2]), 50):
         level[2] = ahead[2] = amsl
         slopes.append(math.tan(slope_limits(data, level, ahead)[0]))
-    return climbing_length(scenario, way, 1.0 / float(np.mean(1.0 / np.array(slopes))), data.buffer)
+    return climbing_length(scenario, path, 1.0 / float(np.mean(1.0 / np.array(slopes))), data.buffer)
 
 
 def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
@@ -173,12 +173,12 @@ def measure(autopilot: str, seed: int = 1) -> dict[str, float]:
         scenario = replace(scenario, flight=scenario.flight.model_copy(update={"autopilot": autopilot}))
         limits = load_airframe(scenario).limits
         plan = plan_path(scenario, limits, seed=seed)
-        way = shortest_on_map(scenario)
+        path = shortest_on_map(scenario)
         level = 0.5 * (scenario.start[2] + scenario.ceiling)
         climb = max(limits.slopes(course, level)[0] for course in np.linspace(0.0, 2.0 * math.pi, 16))
-        reference = climbing_length(scenario, way, math.tan(climb))
+        reference = climbing_length(scenario, path, math.tan(climb))
         ratios[name] = map_length(plan.waypoints) / reference
-        length, within = map_length(plan.waypoints), length_within(scenario, limits, way)
+        length, within = map_length(plan.waypoints), length_within(scenario, limits, path)
         print(
             f"  {autopilot:<11}{name:<13}{'safe' if plan.safe else 'NOT SAFE':<9}{length:8.0f} m"
             f"{reference:8.0f} m  {ratios[name]:.3f}  {length / within:.3f}"

@@ -207,13 +207,13 @@ def print_errors(name: str, found: Sequence[Errors]) -> None:
 
 def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, fresh: Sequence[Case]) -> None:
     """Print how the gains fly missions that the search has not seen: the standard mission and fresh random ones."""
-    way = standard() * np.array([1.0, 1.0, 1.0])
-    way[:, :2] *= (aircraft.airspeed / 25.0) ** 2
+    waypoints = standard() * np.array([1.0, 1.0, 1.0])
+    waypoints[:, :2] *= (aircraft.airspeed / 25.0) ** 2
     if aircraft.name != "aerosonde":
         # Half the slopes, as the standard mission is made for the Aerosonde.
-        way[:, 2] = 500.0 + 0.5 * (aircraft.airspeed / 25.0) ** 2 * (way[:, 2] - 500.0)
+        waypoints[:, 2] = 500.0 + 0.5 * (aircraft.airspeed / 25.0) ** 2 * (waypoints[:, 2] - 500.0)
     winds: list[dict[str, Any]] = [{}] + [{"wind": (10.0, 45.0 * k), "turbulence": "moderate"} for k in range(8)]
-    known = [Case(make(way, speeds=aircraft.airspeed, **wind), None, True) for wind in winds]
+    known = [Case(make(waypoints, speeds=aircraft.airspeed, **wind), None, True) for wind in winds]
     print("reported on (median RMS / 95th percentile of the largest):")
     print_errors("standard mission, calm", [errors_of(fly(aircraft, gains, item)) for item in known[:1]])
     print_errors("standard mission, windy", [errors_of(fly(aircraft, gains, item)) for item in known[1:]])

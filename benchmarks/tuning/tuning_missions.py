@@ -101,11 +101,11 @@ def _way(courses: Floats, slopes: Floats, runs: Floats, climb: float) -> Floats:
 
     Below `LOW` legs climb (rad, at most), to stay above the ground.
     """
-    way = [np.array([0.0, 0.0, START_AMSL])]
+    waypoints = [np.array([0.0, 0.0, START_AMSL])]
     for course, slope, run in zip(courses, slopes, runs, strict=True):
-        up = min(abs(slope), climb) if way[-1][2] < LOW else slope
-        way.append(way[-1] + run * np.array([math.sin(course), math.cos(course), math.tan(up)]))
-    return np.array(way)
+        up = min(abs(slope), climb) if waypoints[-1][2] < LOW else slope
+        waypoints.append(waypoints[-1] + run * np.array([math.sin(course), math.cos(course), math.tan(up)]))
+    return np.array(waypoints)
 
 
 def _variations(aircraft: Aircraft) -> tuple[Variation | None, ...]:

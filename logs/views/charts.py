@@ -222,9 +222,9 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     blocks = column[np.minimum(rows, column.size - 1)]
     is_known = (rows < block_ends[:, None]) & np.isfinite(blocks)
     # A block without known values keeps its first row.
-    lowest = starts + np.where(is_known, blocks, np.inf).argmin(axis=1)
-    highest = starts + np.where(is_known, blocks, -np.inf).argmax(axis=1)
-    return np.unique(np.concatenate([[0, column.size - 1], lowest, highest]))
+    min_rows = starts + np.where(is_known, blocks, np.inf).argmin(axis=1)
+    max_rows = starts + np.where(is_known, blocks, -np.inf).argmax(axis=1)
+    return np.unique(np.concatenate([[0, column.size - 1], min_rows, max_rows]))
 
 
 def nice_step(span: float, max_count: int) -> float:

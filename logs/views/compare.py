@@ -132,11 +132,11 @@ def refly_charts(again: Reflight) -> dict[str, Chart]:
     marks = leg_marks(again.first + np.searchsorted(again.ends, again.distance, side="right"), along)
     charts = {}
     for file, name, title, unit, factor, span in _REFLOWN:
-        flown, model = factor * getattr(again.flown, name), factor * getattr(again.model, name)
-        if not np.isfinite(flown).any():
+        flown_values, simulated_values = factor * getattr(again.flown, name), factor * getattr(again.model, name)
+        if not np.isfinite(flown_values).any():
             continue
-        lines = (series("flown", "flown", along, flown), series("simulated", "other", along, model))
-        difference = (filled_series("flown less simulated", "difference", along, flown - model),)
+        lines = (series("flown", "flown", along, flown_values), series("simulated", "other", along, simulated_values))
+        difference = (filled_series("flown less simulated", "difference", along, flown_values - simulated_values),)
         panels = (
             Panel(title, unit, lines, min_span=span),
             Panel("difference", unit, difference, limits=(("", 0.0),), min_span=0.5 * span),

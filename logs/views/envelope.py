@@ -77,9 +77,9 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
             line_name = f"steepest {name} at {line.amsl} m"
             slopes.append(Layer("line", line_name, role, line.airspeed, angle, dashed=dashed))
     if track is not None and len(track):
-        flown = flown_moments(track)
-        slopes.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.angle))
-        banks.append(Layer("dots", "flown, moment by moment", "moment", flown.airspeed, flown.bank))
+        moments = flown_moments(track)
+        slopes.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.angle))
+        banks.append(Layer("dots", "flown, moment by moment", "moment", moments.airspeed, moments.bank))
     leg_slopes_deg, commanded_speeds = np.degrees(leg_slopes(setup.shown_waypoints)), np.asarray(setup.route.airspeed)
     slopes.append(Layer("dots", "legs as planned (over the ground)", "planned-leg", commanded_speeds, leg_slopes_deg))
     min_speed, max_speed = float(setup.envelope.airspeed[0]), float(setup.envelope.airspeed[-1])

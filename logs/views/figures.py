@@ -53,9 +53,11 @@ class Subject:
         """Text that lists ground, threats and paths."""
         legs, threats = self.setup.route.legs, len(self.setup.scenario.threats)
         ground = "shaded terrain" if self.setup.scenario.terrain is not None else "no terrain"
-        return f"{ground}, {threats} threats, the planned path of {legs} legs{self.flown(' and the flown track')}."
+        return (
+            f"{ground}, {threats} threats, the planned path of {legs} legs{self.text_if_flown(' and the flown track')}."
+        )
 
-    def flown(self, flight_text: str, plan_text: str = "") -> str:
+    def text_if_flown(self, flight_text: str, plan_text: str = "") -> str:
         """Return ``flight_text`` for a flight, and ``plan_text`` for a plan that was not flown."""
         return flight_text if self.track is not None else plan_text
 
@@ -142,7 +144,7 @@ def _map_caption(subject: Subject) -> str:
     flight_text = "The broad line is the plan, and the thin line on it is the flight." + (
         arc_text if subject.setup.source is None else ""
     )
-    return subject.flown(flight_text, "Nothing was flown: the line is the plan.")
+    return subject.text_if_flown(flight_text, "Nothing was flown: the line is the plan.")
 
 
 # In the page's order.
@@ -162,11 +164,12 @@ FIGURES = (
             subject.setup.scenario, **_path_arguments(subject), above_ground=subject.setup.route.above_ground
         ),
         alternative=lambda subject: (
-            f"Heights along the path: terrain, required clearance, {subject.flown('planned and flown', 'planned')} "
-            "heights, the ceiling, and the missile and radar spheres that stand over the path."
+            "Heights along the path: terrain, required clearance, "
+            f"{subject.text_if_flown('planned and flown', 'planned')} heights, the ceiling, "
+            "and the missile and radar spheres that stand over the path."
         ),
         caption=lambda subject: (
-            subject.flown("Flown heights are plotted at the flight's progress along the planned path. ")
+            subject.text_if_flown("Flown heights are plotted at the flight's progress along the planned path. ")
             + (
                 "A sphere appears where the path passes above or below it, or through it; the path "
                 "is within reach only where its line is inside the sphere."

@@ -85,7 +85,7 @@ def _item_or_none(item: int) -> int | None:
 def aircraft_model() -> dict[str, Any]:
     """Return the aircraft model: coloured triangles with corners forward, left, up, one unit wide."""
 
-    def rounded(values: NDArray[np.float32]) -> Any:
+    def rounded_list(values: NDArray[np.float32]) -> Any:
         return np.round(values.astype(np.float64), 4).tolist()
 
-    return {"corners": rounded(model_corners() / MODEL_SPAN_M), "colours": rounded(model_colours()[:, :3])}
+    return {"corners": rounded_list(model_corners() / MODEL_SPAN_M), "colours": rounded_list(model_colours()[:, :3])}

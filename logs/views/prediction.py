@@ -27,13 +27,13 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
     for band in bands:
         if not np.isfinite(band.flown).any():
             continue
-        along, low, high, flown = _with_gaps(factor * band.along, band.low, band.high, band.flown)
+        axis_values, low, high, flown_values = _with_gaps(factor * band.along, band.low, band.high, band.flown)
         layers = (
-            Layer("band", "band of 95 %", "band", along, high, low),
-            Layer("line", "flown", "flown", along, flown),
+            Layer("band", "band of 95 %", "band", axis_values, high, low),
+            Layer("line", "flown", "flown", axis_values, flown_values),
         )
-        top = float(np.nanmax([high, flown]))
-        share = Label(f"{100.0 * band.inside:.0f} % inside", float(along[0]), top, "end", prefer=(1, -1))
+        top = float(np.nanmax([high, flown_values]))
+        share = Label(f"{100.0 * band.inside:.0f} % inside", float(axis_values[0]), top, "end", prefer=(1, -1))
         panels.append(Panel(band.name, band.unit.replace("deg", "°"), layers, min_span=1.0, labels=(share,)))
     along_name, unit = ("time of the log", "s") if by_time else ("along the legs", "km")
     return Chart(title, along_name, unit, tuple(panels), page_height=170, print_height=1.3)

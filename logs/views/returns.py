@@ -212,8 +212,8 @@ def _path_positions(drawn_returns: DrawnReturns, track: Track | None) -> tuple[F
         rows = rows[:: max(1, len(rows) // _GROUND_POINTS)]
         if rows.size:
             return track.time[rows], track.position[rows]
-    returns = [ret for _, group in drawn_returns.segments_by_outcome for ret in group]
-    return np.array([ret.time for ret in returns]), np.array([ret.start for ret in returns])
+    judged_returns = [ret for _, group in drawn_returns.segments_by_outcome for ret in group]
+    return np.array([ret.time for ret in judged_returns]), np.array([ret.start for ret in judged_returns])
 
 
 def _glide_margin_panel(glides: Glides) -> Panel:

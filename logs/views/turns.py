@@ -42,10 +42,10 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
     for finding in findings:
         place = finding.place
         if finding.rule == rule and place.kind in ("leg", "waypoint") and place.index is not None:
-            planned, flown, limit = (
+            planned_value, flown_value, limit_value = (
                 math.nan if value is None else value for value in (finding.planned, finding.flown, finding.limit)
             )
-            place_rows.append(PlaceValue(place.index, planned, flown, limit, finding.ok))
+            place_rows.append(PlaceValue(place.index, planned_value, flown_value, limit_value, finding.ok))
     return sorted(place_rows, key=lambda value: value.number)
 
 
@@ -69,21 +69,21 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
 
 def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
     numbers = np.array([value.number for value in values], dtype=np.float64)
-    planned, flown, limit = (
+    planned_values, flown_values, limit_values = (
         np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")
     )
     failed = np.array([value.ok is False for value in values])
     layers = [
-        Layer("bars", "planned", "planned", numbers, planned),
-        Layer("dashes", "limit", "limit", numbers, limit),
-        Layer("dots", "flown", "flown", numbers, flown),
+        Layer("bars", "planned", "planned", numbers, planned_values),
+        Layer("dashes", "limit", "limit", numbers, limit_values),
+        Layer("dots", "flown", "flown", numbers, flown_values),
     ]
     if failed.any():
-        marked_values = np.where(np.isfinite(flown), flown, planned)
+        marked_values = np.where(np.isfinite(flown_values), flown_values, planned_values)
         layers.append(Layer("rings", "fails", "fail", numbers[failed], marked_values[failed], quiet=True))
-    known_values = np.concatenate([[0.0], planned, flown])
+    known_values = np.concatenate([[0.0], planned_values, flown_values])
     known_values = known_values[np.isfinite(known_values)]
-    limits = limit[np.isfinite(limit)]
+    limits = limit_values[np.isfinite(limit_values)]
     shown_limits = limits[_is_shown_limit(limits, rule, float(np.abs(known_values).max()))]
     min_value, max_value = float(min([*known_values, *shown_limits])), float(max([*known_values, *shown_limits]))
     margin = _MARGIN * ((max_value - min_value) or 1.0)

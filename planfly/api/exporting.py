@@ -187,10 +187,10 @@ def _needs_kml(targets: tuple[Path, ...]) -> bool:
 def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | None) -> _SourceContent:
     """Add returns and glides from a few points of the flight or path, if they can be judged."""
     with stage("flying returns for the map"):
-        returns = return_summary(setup, track).data_for_pictures()
-    if returns is None:
+        drawn_returns = return_summary(setup, track).data_for_pictures()
+    if drawn_returns is None:
         return source
-    return replace(source, returns=return_lines(setup, returns), footprint=glide_shapes(setup, returns))
+    return replace(source, returns=return_lines(setup, drawn_returns), footprint=glide_shapes(setup, drawn_returns))
 
 
 def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:

@@ -157,7 +157,7 @@ def identify_aircraft(
 def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
-    climb, sink, power = _intervals(identified)
+    climb, sink, power = _performance_intervals(identified)
     return IdentifiedAircraft(
         aircraft=aircraft,
         estimate=identified.estimate,
@@ -273,7 +273,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
         (title, unit, *interval)
         for (title, unit), interval in zip(
             (("climb at full throttle", "°"), ("sink at idle", "°"), ("power in level flight", "W")),
-            _intervals(identified),
+            _performance_intervals(identified),
             strict=True,
         )
     )
@@ -288,7 +288,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideNumber, ...]:
-    _, sink, power = _intervals(identified)
+    _, sink, power = _performance_intervals(identified)
     return wide_numbers(sink, power, with_current=identified.estimate.with_current)
 
 
@@ -296,7 +296,7 @@ def _find_wide_numbers(identified: Identified) -> tuple[WideNumber, ...]:
 Interval = tuple[float, float, float]
 
 
-def _intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
+def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, Interval]:
     """Return climb and sink, degrees, and power, W, each as lower end, estimate and upper end (95 %)."""
     best, samples = identified.performance()
 

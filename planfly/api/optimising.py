@@ -100,7 +100,7 @@ class Optimiser:
             raise ValueError("values, violations: other numbers of columns than before")
         if not self._levels:
             self._violation_count = violation_values.shape[1]
-            self._levels = _levels(violation_values.shape[1], objective_values.shape[1])
+            self._levels = _priority_levels(violation_values.shape[1], objective_values.shape[1])
             self._scores = np.empty((0, scores.shape[1]))
         self.evaluations += len(points)
         self._update_front(points, scores)
@@ -222,7 +222,7 @@ def optimise(
     return Optimiser(lower_bounds, upper_bounds, model, population, np.random.default_rng(seed), first_points)
 
 
-def _levels(violations: int, objectives: int) -> tuple[Level, ...]:
+def _priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
     """Return the priority levels: first the constraints with the goal 0, then the objectives without goals."""
     values = Level(tuple(range(violations, violations + objectives)), (NO_GOAL,) * objectives)
     return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)

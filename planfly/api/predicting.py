@@ -284,10 +284,10 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
 
 def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
     """Return the band of each quantity over the distance along the legs."""
-    flown, bands = flights[0].flown, []
+    flown_profile, bands = flights[0].flown, []
     for field, (name, unit, factor) in _PROFILE_QUANTITIES.items():
         low, high = band_limits(np.stack([factor * getattr(flight.model, field) for flight in flights]))
-        bands.append(Band(name, unit, flights[0].distance, low, high, factor * getattr(flown, field)))
+        bands.append(Band(name, unit, flights[0].distance, low, high, factor * getattr(flown_profile, field)))
     return tuple(bands)
 
 

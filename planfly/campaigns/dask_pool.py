@@ -80,7 +80,7 @@ class DaskPool:
         with contextlib.suppress(OSError):
             self._client.unregister_worker_plugin(self._name)
 
-    def _threads(self) -> int:
+    def _max_parallel_flights(self) -> int:
         """Return the number of flights that the workers can fly at the same time, at least 1."""
         threads: dict[str, int] = self._client.nthreads()
         return max(1, sum(threads.values()))
@@ -102,7 +102,10 @@ class DaskPool:
             finished.add(self._client.submit(fly_task, self._name, request, key=key, pure=False))
 
         def send_requests() -> None:
-            while len(flying) < min(_TASK_NAME_COUNT, self._threads()) and (request := next_request()) is not None:
+            while (
+                len(flying) < min(_TASK_NAME_COUNT, self._max_parallel_flights())
+                and (request := next_request()) is not None
+            ):
                 send(request)
 
         try:

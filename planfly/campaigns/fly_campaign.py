@@ -128,7 +128,7 @@ class _ProgressReport:
         self.start_timing(stored_tally)
         if advance is not None:
             # Report before the workers start, because the start takes seconds.
-            total = self._total(stored_tally)
+            total = self._min_total_flights(stored_tally)
             remark = f"{stored_tally.flown} of {total} flights" + (" at least" if goal.stops else "")
             advance(float(stored_tally.flown), float(total), remark)
 
@@ -136,7 +136,7 @@ class _ProgressReport:
         """Start to measure the rate of flights, because the workers are ready."""
         self._rate = FlightRate(stored_tally.flown)
 
-    def _total(self, tally: Tally) -> int:
+    def _min_total_flights(self, tally: Tally) -> int:
         """Return the minimum possible total number of flights."""
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
@@ -149,7 +149,7 @@ class _ProgressReport:
             return
         estimate = self._estimator.estimate(tally)
         flights_per_second = self._rate.flights_per_second(tally.flown)
-        total = self._total(tally)
+        total = self._min_total_flights(tally)
         seconds_left = (total - tally.flown) / flights_per_second if flights_per_second > 0.0 else 0.0
         remark = (
             f"{tally.flown} flights, P {tally.share:.4f} ({estimate.lower:.4f} to {estimate.upper:.4f}),"

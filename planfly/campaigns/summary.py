@@ -84,7 +84,7 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
         deciding=deciding,
         low_margin=low_margin,
         unit=next((margin.unit for row in worst_rows for rule, margin in row.margins if rule == deciding), ""),
-        sensitivities=_sensitivities(base, store, deciding),
+        sensitivities=_rule_sensitivities(base, store, deciding),
         worst=worst_rows,
         dispersions=base.dispersions.to_json(),
         made_of=store.made_of,
@@ -118,7 +118,7 @@ def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str
     return rule, low_margins[rule]
 
 
-def _sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
+def _rule_sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
     """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first."""
     if not rule:
         return ()

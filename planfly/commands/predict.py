@@ -60,11 +60,11 @@ def predict(args: argparse.Namespace) -> int:
     print("\n".join(result.lines))
     for file in result.files:
         print(f"predicted {file}")
-    write_json_if_requested(args, lambda: _answer(result))
+    write_json_if_requested(args, lambda: _prediction_answer(result))
     return FLYABLE
 
 
-def _answer(result: "Predicted") -> object:
+def _prediction_answer(result: "Predicted") -> object:
     from planfly.terminal.answers import PredictAnswer, PredictedQuantity
 
     def known(value: float) -> float | None:

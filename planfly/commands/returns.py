@@ -136,24 +136,24 @@ def _json_answer(source: str, result: "ReturnsFound", code: int) -> object:
         suggestion_entry,
     )
 
-    returns, no_return = result.returns, result.returns.point_of_no_return
+    judged_returns, no_return = result.returns, result.returns.point_of_no_return
     return ReturnsAnswer(
         exit_code=code,
         what=source,
         headline=result.headline,
         safe=result.safe,
         conditions=setup_conditions(result.setup),
-        every_s=returns.interval,
-        least_clearance_m=returns.limit,
+        every_s=judged_returns.interval,
+        least_clearance_m=judged_returns.limit,
         causes=[
             CauseEntry(name=cause.name, does=cause.does, parameter=cause.parameter, value=cause.value)
-            for cause in returns.causes
+            for cause in judged_returns.causes
         ],
-        rtl_autoland=returns.autoland,
-        not_judged=list(returns.unjudged_parts),
-        ranges=[return_entry(result, return_range) for return_range in returns.ranges],
+        rtl_autoland=judged_returns.autoland,
+        not_judged=list(judged_returns.unjudged_parts),
+        ranges=[return_entry(result, return_range) for return_range in judged_returns.ranges],
         by_program=program_entry(result),
-        left_out=returns.omitted_count,
+        left_out=judged_returns.omitted_count,
         no_return=no_return.kind,
         no_return_s=None if math.isnan(no_return.time) else round(no_return.time, 2),
         engine_out=glides_entry(result),

@@ -87,7 +87,7 @@ def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
     """Return True if few enough orbits are expected, and the aircraft stays in the corridor at every corner."""
     if expected_orbits(plan, airframe.autopilot, airframe.limits.with_margin()) > MAX_EXPECTED_ORBITS:
         return False
-    return max(_excursions(plan, airframe), default=0.0) <= _plan_corridor_half_width(plan, airframe)
+    return max(_corner_excursions(plan, airframe), default=0.0) <= _plan_corridor_half_width(plan, airframe)
 
 
 def _plan_corridor_half_width(plan: Plan, airframe: Airframe) -> float:
@@ -95,7 +95,7 @@ def _plan_corridor_half_width(plan: Plan, airframe: Airframe) -> float:
     return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.acceptance_radius)
 
 
-def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
+def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
     """Return the distance from the legs at each corner in gusts, m; empty if unknown."""
     limits = airframe.limits
     if (tracking := limits.tracking) is None:
@@ -109,7 +109,7 @@ def _excursions(plan: Plan, airframe: Airframe) -> list[float]:
 
 def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
     """Return a line on the corner at which the aircraft leaves the corridor."""
-    excursions = _excursions(plan, airframe)
+    excursions = _corner_excursions(plan, airframe)
     max_excursion = max(excursions)
     return (
         f"in {plan.scenario.wind.turbulence} turbulence {airframe.autopilot.title} is {max_excursion:.0f} m off"

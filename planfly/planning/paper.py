@@ -227,7 +227,7 @@ def make_table(plans: Sequence[SeededPlan]) -> list[TableRow]:
 
 def _table_row(group: list[SeededPlan]) -> TableRow:
     lengths = [seeded_plan.objectives.length_ratio for seeded_plan in group if seeded_plan.safe]
-    kills = _column(group, lambda seeded_plan: seeded_plan.objectives.kill_exposure)
+    kills = _seed_values(group, lambda seeded_plan: seeded_plan.objectives.kill_exposure)
     return TableRow(
         threats=group[0].threats,
         algorithm=group[0].algorithm,
@@ -238,15 +238,15 @@ def _table_row(group: list[SeededPlan]) -> TableRow:
         length_worst=max(lengths) if lengths else None,
         kill_median=float(np.median(kills)),
         kill_worst=float(kills.max()),
-        kill_probability_worst=float(_column(group, lambda seeded_plan: seeded_plan.kill_probability).max()),
+        kill_probability_worst=float(_seed_values(group, lambda seeded_plan: seeded_plan.kill_probability).max()),
         detection_median=float(
-            np.median(_column(group, lambda seeded_plan: seeded_plan.objectives.detection_exposure))
+            np.median(_seed_values(group, lambda seeded_plan: seeded_plan.objectives.detection_exposure))
         ),
-        seconds_median=float(np.median(_column(group, lambda seeded_plan: seeded_plan.seconds))),
+        seconds_median=float(np.median(_seed_values(group, lambda seeded_plan: seeded_plan.seconds))),
     )
 
 
-def _column(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
+def _seed_values(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
     return np.array([value(seeded_plan) for seeded_plan in group])
 
 

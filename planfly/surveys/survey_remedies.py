@@ -183,7 +183,7 @@ class _Trials:
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
-    def _fly(self, mission: Mission, airframe: Airframe, description: str) -> _TrialFlight | None:
+    def _fly_trial(self, mission: Mission, airframe: Airframe, description: str) -> _TrialFlight | None:
         """Fly a mission; return None if it has no valid route."""
         description = self._change_prefix + description
         self._on_trial(description)
@@ -214,9 +214,9 @@ class _Trials:
                 setup = self._changed_setup(mission, self._airframe)
             except PlanflyError:
                 return None
-        return self._fly(mission, self._airframe, description)
+        return self._fly_trial(mission, self._airframe, description)
 
-    def _passes(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
+    def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
         """Return True if all lines are usable, no further rule fails, and no failure is noticeably worse."""
         return (
             flight is not None
@@ -245,7 +245,9 @@ class _Trials:
             SurveyLayout(self._current_turn_around, backwards=True), "the lines from the other side"
         )
         return (
-            SurveyRemedy("side", "", 0.0, 1.0, "", *flight, self._current_turn_around) if self._passes(flight) else None
+            SurveyRemedy("side", "", 0.0, 1.0, "", *flight, self._current_turn_around)
+            if self._is_remedy(flight)
+            else None
         )
 
     def find_stride(self, max_turn_around: float) -> SurveyRemedy | None:
@@ -288,7 +290,7 @@ class _Trials:
 
         shortest_length = least_change(turn_arounds, is_long_enough)
         flight = None if shortest_length is None else flights[shortest_length]
-        if shortest_length is None or not self._passes(flight):
+        if shortest_length is None or not self._is_remedy(flight):
             return None
         if stride == 1:
             return SurveyRemedy(
@@ -307,7 +309,7 @@ class _Trials:
             flight = self._fly_layout(
                 SurveyLayout(self._current_turn_around, 1, course), f"lines on course {degrees:.0f}°"
             )
-            if self._passes(flight):
+            if self._is_remedy(flight):
                 remedies.append(
                     SurveyRemedy("course", "", current_degrees, degrees, "deg", *flight, self._current_turn_around)
                 )
@@ -319,10 +321,10 @@ class _Trials:
 
         def passes_with(autopilot: Autopilot) -> bool:
             airframe = replace(self._airframe, autopilot=autopilot)
-            flight = self._fly(self._setup.mission, airframe, "another parameter of the autopilot")
-            if self._passes(flight):
+            flight = self._fly_trial(self._setup.mission, airframe, "another parameter of the autopilot")
+            if self._is_remedy(flight):
                 passed_flights.append(flight)
-            return self._passes(flight)
+            return self._is_remedy(flight)
 
         deciding = find_passing_parameter(self._airframe.autopilot, self._verdict.findings, passes_with)
         if deciding is None:
@@ -334,8 +336,8 @@ class _Trials:
     def find_airspeed(self) -> SurveyRemedy | None:
         """Find the highest reduced airspeed that passes; None if the mission sets its own airspeed."""
         for speed, airframe in self._slower_airspeeds():
-            flight = self._fly(self._setup.mission, airframe, f"{speed:g} m/s")
-            if self._passes(flight):
+            flight = self._fly_trial(self._setup.mission, airframe, f"{speed:g} m/s")
+            if self._is_remedy(flight):
                 return SurveyRemedy("airspeed", "", self._airframe.airspeed, speed, "m/s", *flight)
         return None
 

@@ -417,11 +417,13 @@ class _Lines:
                 )
             elif total > 0.0 and not knew_total:
                 # The first line was printed before the total was known.
-                self._print(
+                self._print_and_note_time(
                     f"{self._title}: {_join_nonempty('' if _states_time_left(remark) else remark, estimate_at_start)}"
                 )
             elif estimate and self._time_left.is_due():
-                self._print(f"{self._title}: {_join_nonempty(remark, '' if _states_time_left(remark) else estimate)}")
+                self._print_and_note_time(
+                    f"{self._title}: {_join_nonempty(remark, '' if _states_time_left(remark) else estimate)}"
+                )
 
     def refresh(self) -> None:
         """Print the first line of a stage that reports nothing, and then its elapsed time at intervals."""
@@ -431,15 +433,15 @@ class _Lines:
             if not self._has_started:
                 self._print_first_line(self._time_left.initial_estimate(0.0))
             elif self._time_left.elapsed() - self._printed_at >= _MAX_REPORT_INTERVAL_S:
-                self._print(
+                self._print_and_note_time(
                     f"{self._title}: {_join_nonempty(self._remark, f'{self._time_left.elapsed():.0f} s so far')}"
                 )
 
     def _print_first_line(self, estimate: str) -> None:
         self._has_started = True
-        self._print(f"{self._title} ... ({estimate})")
+        self._print_and_note_time(f"{self._title} ... ({estimate})")
 
-    def _print(self, line: str) -> None:
+    def _print_and_note_time(self, line: str) -> None:
         self._printed_at = self._time_left.elapsed()
         _print_line(line)
 

@@ -215,7 +215,7 @@ STATED_CLIMB = math.radians(1.5)
 STATED_DRAG = 0.15
 
 
-def _uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty, Draws]:
+def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty, Draws]:
     """Return standard deviations of the factors, and of climb, descent, top speed and power at cruise, with draws.
 
     The factors are independent but for the thrust, which a draw sets such that the climb has its own deviation: an
@@ -424,7 +424,7 @@ def _make_files(
     (folder / f"{name}.toml").write_text(metadata, encoding="utf-8")
     aircraft = read_aircraft(folder)
     fdm = Fdm(aircraft, tried=True)
-    uncertainty, draws = _uncertainty(sized, aircraft)
+    uncertainty, draws = _make_uncertainty(sized, aircraft)
     return {
         f"{name}.xml": model,
         f"{name}.toml": metadata,

@@ -156,8 +156,8 @@ def go_around_findings(
     """
     requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
     setup = requirements.setup
-    returns, terrain, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
-    is_required = returns is not None and "go_around" in returns.require
+    return_requirements, terrain, home = setup.scenario.returns, setup.scenario.terrain, setup.mission.home
+    is_required = return_requirements is not None and "go_around" in return_requirements.require
     landing_place = (
         landing_item(requirements)
         if has_ground_paths(requirements) and terrain is not None and home is not None

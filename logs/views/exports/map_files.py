@@ -188,7 +188,7 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
     _add_element(document, "name", title)
     folders = _Folders(document)
     for line in lines:
-        folder = folders.named(line.folder) if line.folder else folders.new(line.name)
+        folder = folders.shared_folder(line.folder) if line.folder else folders.new(line.name)
         mark = _add_element(folder, "Placemark")
         _add_element(mark, "name", line.name)
         _add_style(mark, line.role)
@@ -211,7 +211,7 @@ class _Folders:
 
     def __init__(self, document: ElementTree.Element) -> None:
         self._document = document
-        self._named: dict[str, ElementTree.Element] = {}
+        self._folder_by_name: dict[str, ElementTree.Element] = {}
 
     def new(self, name: str) -> ElementTree.Element:
         """Add a folder to the document."""
@@ -219,11 +219,11 @@ class _Folders:
         _add_element(folder, "name", name)
         return folder
 
-    def named(self, name: str) -> ElementTree.Element:
-        """Return the shared folder of a name."""
-        if name not in self._named:
-            self._named[name] = self.new(name)
-        return self._named[name]
+    def shared_folder(self, name: str) -> ElementTree.Element:
+        """Return the folder that all lines and zones with this folder name share."""
+        if name not in self._folder_by_name:
+            self._folder_by_name[name] = self.new(name)
+        return self._folder_by_name[name]
 
 
 def _add_style(mark: ElementTree.Element, role: str) -> None:
@@ -241,7 +241,7 @@ def _add_style(mark: ElementTree.Element, role: str) -> None:
 
 def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
     for zone in zones:
-        mark = _add_element(folders.named(zone.folder), "Placemark")
+        mark = _add_element(folders.shared_folder(zone.folder), "Placemark")
         _add_element(mark, "name", zone.name)
         _add_style(mark, zone.role)
         geometry = _add_element(mark, "MultiGeometry")

@@ -128,12 +128,12 @@ class _MovingParts:
         rotation = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
         self._aircraft.set_marker(MarkerStyle(_PLANE, transform=rotation))
         self._aircraft.set_data(track.position[k : k + 1, 0], track.position[k : k + 1, 1])
-        self._text.set_text(self._caption(k))
+        self._text.set_text(self._caption_text(k))
         for artist in (self._trail, self._aircraft):
             self._axes.draw_artist(artist)
         self._figure.draw_artist(self._text)
 
-    def _caption(self, k: int) -> str:
+    def _caption_text(self, k: int) -> str:
         track = self._track
         roll, _, _ = track.attitude[k].tolist()
         parts = [

@@ -50,7 +50,7 @@ def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> In
     >>> [round(bound, 4) for bound in clopper_pearson(299, 299)]
     [0.9877, 1.0]
     """
-    return _interval(successes, trials, confidence, "exact")
+    return _binomial_interval(successes, trials, confidence, "exact")
 
 
 def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
@@ -59,7 +59,7 @@ def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
     >>> [round(bound, 4) for bound in wilson(8, 10)]
     [0.4902, 0.9433]
     """
-    return _interval(successes, trials, confidence, "wilson")
+    return _binomial_interval(successes, trials, confidence, "wilson")
 
 
 def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
@@ -84,7 +84,7 @@ def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
     return clopper_pearson(tally.flyable + tally.lost, tally.flown, 2.0 * confidence - 1.0).high
 
 
-def _interval(successes: int, trials: int, confidence: float, method: str) -> Interval:
+def _binomial_interval(successes: int, trials: int, confidence: float, method: str) -> Interval:
     from scipy.stats import binomtest
 
     if not trials:
@@ -143,17 +143,17 @@ class StoppingBound:
         scale, min_failures, max_failures = float(self.min_flights), 0.0, 1.0
         for _ in range(_BISECTIONS):
             failures = 0.5 * (min_failures + max_failures)
-            evidence = _log_mixture(self._parts(scale, failures), self.min_flights, 0) - self.min_flights * math.log(
-                self.target
-            )
+            evidence = _log_mixture(
+                self._mixture_parts(scale, failures), self.min_flights, 0
+            ) - self.min_flights * math.log(self.target)
             min_failures, max_failures = (
                 (failures, max_failures) if evidence >= self._required_evidence else (min_failures, failures)
             )
         # Slightly less, to cover rounding.
-        return self._parts(scale, 0.999 * min_failures)
+        return self._mixture_parts(scale, 0.999 * min_failures)
 
     @staticmethod
-    def _parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
+    def _mixture_parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
         return (1.0 - _JEFFREYS_WEIGHT, scale, max(failures, 1e-9)), (_JEFFREYS_WEIGHT, 0.5, 0.5)
 
     def evidence(self, successes: int, failures: int, p: float) -> float:

@@ -70,7 +70,7 @@ def boundary_quantiles(
     >>> [round(one, 1) for one in boundary_quantiles(modes, np.zeros((1, 0)), 0.5, 20.0, (0.5,))]
     [10.0]
     """
-    speeds = [_boundaries(fit.modes, draws, failing_fraction, max_speed) for fit in fits]
+    speeds = [_boundary_speeds(fit.modes, draws, failing_fraction, max_speed) for fit in fits]
     weights = np.concatenate(
         [np.full(fit_speeds.size, fit.weight / fit_speeds.size) for fit, fit_speeds in zip(fits, speeds, strict=True)]
     )
@@ -83,7 +83,7 @@ def boundary_quantiles(
     ]
 
 
-def _boundaries(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> Floats:
+def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> Floats:
     """Return the boundary (n,) of each sample, m/s."""
     # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
@@ -401,7 +401,7 @@ class _ExpectedPosterior:
     def expected_gains(self, terms: Floats) -> Floats:
         """Return the expected reduction (n,) of the boundary's variance by each flight (n, 2 + d), m2/s2."""
         expected_gains: Floats = np.zeros(len(terms))
-        for k, information in enumerate(self._informations(terms)):
+        for k, information in enumerate(self._mode_information(terms)):
             projected, slope = terms @ self._covariances[k], self._fit.slopes[k]
             expected_gains += (
                 (projected @ slope) ** 2 * information / (1.0 + information * (projected * terms).sum(axis=1))
@@ -410,13 +410,13 @@ class _ExpectedPosterior:
 
     def include_flight(self, row: Floats) -> None:
         """Include a flight (2 + d,) as flown, with unknown outcome."""
-        for k, information in enumerate(self._informations(row[None])):
+        for k, information in enumerate(self._mode_information(row[None])):
             projected = self._covariances[k] @ row
             self._covariances[k] = self._covariances[k] - information * np.outer(projected, projected) / (
                 1.0 + information * (row @ projected)
             )
 
-    def _informations(self, terms: Floats) -> Iterator[Floats]:
+    def _mode_information(self, terms: Floats) -> Iterator[Floats]:
         """Yield the information (n,) on each mode: a flight is informative unless it fails in an earlier mode."""
         reach_probability: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
