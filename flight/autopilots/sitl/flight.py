@@ -207,9 +207,7 @@ class SitlFlight(ProgramFlight):
         self._binary, self._ground_phases, gear = binary, setup.ground_phases, None
         if self._ground_phases:
             gear = default_gear(self._ground_phases)
-            self._from_ground = setup.autopilot.from_ground(
-                self._ground_phases, aircraft, contacts_of(aircraft, gear)
-            )
+            self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts_of(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
         self._rail = self._trim_on_rail(setup)
