@@ -207,7 +207,9 @@ class MissionParts(NamedTuple):
     has_return_path: True if the mission marks a return path (DO_RETURN_PATH_START).
     takes_off, lands: True if the take-off or the landing is flown from or to the ground.
     loiters_to_land: True if the last item before a landing is a loiter.
+    has_fence: True if the mission carries a fence.
     enables_fence: True if the mission switches the fence on (DO_FENCE_ENABLE).
+    throttled_airspeeds: airspeeds that the mission commands together with a throttle, m/s.
     moves_payload: True if the mission commands a gripper, a winch or a gimbal, after which PX4 may wait.
     wind: highest mean wind speed on the route, m/s.
     """
@@ -217,7 +219,9 @@ class MissionParts(NamedTuple):
     takes_off: bool = False
     lands: bool = False
     loiters_to_land: bool = False
+    has_fence: bool = False
     enables_fence: bool = False
+    throttled_airspeeds: tuple[float, ...] = ()
     moves_payload: bool = False
     wind: float = 0.0
 

@@ -20,7 +20,8 @@ MAX_BYTES = 4 * 2**20
 # Maximum length of a parameter name (MAVLink, PARAM_VALUE): no autopilot has a longer one.
 LONGEST_NAME = 16
 # Pattern of a name: longer names occur in files that were edited by hand, and ground stations skip them.
-_NAME_PATTERN = re.compile(r"[A-Z][A-Z0-9_]{0,63}")
+# One name of ArduPlane 4.7 has small letters.
+_NAME_PATTERN = re.compile(r"[A-Z][A-Z0-9_]{0,63}|FOLLP_LkAHD")
 _NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # Number of columns in QGroundControl's format: vehicle, component, name, value, type.
 _QGC_COLUMN_COUNT = 5

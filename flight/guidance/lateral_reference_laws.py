@@ -32,10 +32,13 @@ WAYPOINT = record_dtype(
     ("loiters_to_altitude", np.bool_),  # True if the loiter climbs or descends to an altitude
     ("exits_on_course", np.bool_),  # True if the item states an exit on the course to the next waypoint
     ("exits_on_tangent", np.bool_),  # True if the line to the next waypoint starts on the circle, not at its center
+    "exit_bearing",  # rad, 0 < it <= 2 pi, to which ArduPlane exits a loiter; 0 for the bearing to the next waypoint
     ("is_rtl", np.bool_),  # True if the leg to it is an RTL; radius, center and up are then those of the RTL loiter
     ("stop", np.int64),  # its stop of the route: a jump back leads to another stop of the same item
     ("is_gate", np.bool_),  # True for a CONDITION_GATE, which is no target
     ("is_mission_end", np.bool_),  # True if the mission ends there without a landing or an RTL
+    ("precedes_landing", np.bool_),  # True if the next item that is flown to is a landing
+    ("ignores_altitude", np.bool_),  # True if PX4 accepts it at any altitude, as a waypoint of a mission's landing
     ("without_crosstrack", np.bool_),  # True if the leg to it starts at the aircraft and follows no line
     "slope_base",  # m, see `flight.mission.return_path.ReturnCircle`
     ("follows_terrain", np.bool_),  # True if the leg to it follows the ground

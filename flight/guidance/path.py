@@ -8,6 +8,7 @@ waypoint, whose corner stays sharp, like the corner of a U-turn.
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
-from flight.mission.items import Command, Mission, MissionItem
+from flight.mission.items import LANDINGS, PLACES, TAKEOFFS, Command, Mission, MissionItem
 from flight.mission.itinerary import loiter_of, pass_by_distance
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.arrays import Floats
@@ -465,6 +466,8 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     last_before_return = route.return_from if route.return_to is not None else route.straight_to - 1
     if last_before_return >= 0:
         waypoints["turn"][last_before_return] = _turn_before_return(route, last_before_return, items)
+        _set_exit_bearing(waypoints, last_before_return, items)
+    _set_landing(waypoints, mission)
     return waypoints
 
 
@@ -477,8 +480,36 @@ def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem])
     item = items.get(int(route.items[index]))
     if index == 0 or item is None or not item.has_position:
         return 0.5 * math.pi
-    north = -item.lat_deg / math.cos(math.radians(0.5 * item.lat_deg))
-    return float(abs(wrap(math.atan2(-item.lon_deg, north) - float(leg_courses(route.waypoints)[index - 1]))))
+    return float(abs(wrap(_bearing_to_origin(item) - float(leg_courses(route.waypoints)[index - 1]))))
+
+
+def _bearing_to_origin(item: MissionItem) -> float:
+    """Return the bearing from an item to 0 N, 0 E, rad (`Location::get_bearing_to`)."""
+    return math.atan2(-item.lon_deg, -item.lat_deg / math.cos(math.radians(0.5 * item.lat_deg)))
+
+
+def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionItem]) -> None:
+    """Set the bearing to which ArduPlane exits a loiter before an RTL, whose item has no position: that of 0 N, 0 E.
+
+    last: index of the last waypoint before the RTL.
+    """
+    item = items.get(int(waypoints["item"][last]))
+    if item is not None and item.has_position and loiter_of(item) is not None:
+        bearing = _bearing_to_origin(item) % (2.0 * math.pi)
+        waypoints["exit_bearing"][waypoints["stop"] == waypoints["stop"][last]] = bearing or 2.0 * math.pi
+
+
+def _set_landing(waypoints: Records, mission: Mission | None) -> None:
+    """Mark the waypoint before a landing, and those of a mission's landing (`MissionBase::isLanding` of PX4)."""
+    if mission is None:
+        return
+    flown = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
+    last_items = [item.seq for item, next_item in pairwise(flown) if next_item.command in LANDINGS]
+    waypoints["precedes_landing"] = np.isin(waypoints["item"], last_items)
+    first_seq = next((item.seq for item in mission.items if item.command == Command.DO_LAND_START), math.inf)
+    landing_items = [item for item in flown if item.seq > first_seq][1:]
+    plain_items = [item.seq for item in landing_items if item.command == Command.NAV_WAYPOINT]
+    waypoints["ignores_altitude"] = np.isin(waypoints["item"], plain_items)
 
 
 def _set_circles(corners: Records, route: Route) -> None:

@@ -36,6 +36,12 @@ from world.errors import MissionError
 MAX_STOPS = 10_000
 # Maximum number of items passed while a mission is unrolled.
 _MAX_STEPS = 200_000
+# Number of jumps that ArduPlane counts (`AP_MISSION_MAX_NUM_DO_JUMP_COMMANDS`).
+_MAX_COUNTED_JUMPS = 100
+# The same number on a board with little memory.
+_MAX_COUNTED_JUMPS_SMALL_BOARD = 15
+# Number of jumps in a row at which PX4 finds no item (`MAX_JUMP_ITERATION`).
+_MAX_JUMPS_IN_A_ROW = 10
 
 # Simulated duration of a loiter without end, s; the mission ends there.
 UNLIMITED = 60.0
@@ -247,6 +253,16 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     if steps.endless >= 0:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
+    jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
+    if len(jumps) > _MAX_COUNTED_JUMPS:
+        text = f"flown, where ArduPlane passes over jumps beyond the first {_MAX_COUNTED_JUMPS} that it meets"
+        builder.add_open_item(f"DO_JUMP: {text}", jumps[_MAX_COUNTED_JUMPS], px4=False)
+    elif len(jumps) > _MAX_COUNTED_JUMPS_SMALL_BOARD:
+        board_text = f"a board with little memory passes over jumps beyond {_MAX_COUNTED_JUMPS_SMALL_BOARD}"
+        builder.notes.arduplane.add(f"{len(jumps)} jumps: {board_text}")
+    if steps.long_jump_chain >= 0:
+        text = f"DO_JUMP: flown, where PX4 ends the mission at {_MAX_JUMPS_IN_A_ROW} jumps in a row"
+        builder.add_open_item(text, steps.long_jump_chain, arduplane=False)
     for gate in builder.gates:
         builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)
     for item in mission.items:
@@ -294,6 +310,7 @@ class _Steps:
     passes_exhausted_jump: True if a jump is passed again after its last repeat.
     reached: numbers of the items reached, including jumps.
     endless: seq of the jump without end at which the iteration ended, -1 for none; such a jump is taken once.
+    long_jump_chain: seq of the jump at which PX4 finds no next item, -1 for none.
     """
 
     def __init__(self, mission: Mission, resets_jump_counters: bool) -> None:
@@ -308,7 +325,7 @@ class _Steps:
                 self.tags.setdefault(int(item.params[0]), k)
         self.jump_counts: dict[int, int] = {}
         self.reached: set[int] = set()
-        self.endless, self._step_count = -1, 0
+        self.endless, self.long_jump_chain, self._step_count = -1, -1, 0
 
     def __iter__(self) -> Iterator[_Step]:
         """Iterate over the navigation items, counting jumps."""
@@ -343,7 +360,7 @@ class _Steps:
 
     def _next_item(self, index: int, *, counting: bool) -> int | None:
         """Return the index of the next item, following jumps, or None at the end (`get_next_cmd`)."""
-        first_jump = -1
+        first_jump, chain_length = -1, 0
         while index < len(self.items):
             item = self.items[index]
             if counting:
@@ -351,6 +368,9 @@ class _Steps:
             if item.command not in JUMPS:
                 return index
             target, repeats = self._jump_target(item), int(item.params[1])
+            chain_length += 1
+            if counting and chain_length == _MAX_JUMPS_IN_A_ROW and self.long_jump_chain < 0:
+                self.long_jump_chain = item.seq
             if not counting and index == first_jump:
                 return None
             first_jump = index if first_jump < 0 else first_jump

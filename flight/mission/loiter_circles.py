@@ -71,7 +71,7 @@ class LoiterRules:
     altitude_tolerance: altitude tolerance, m.
     ends_in_circle: True if the autopilot loiters without end about a mission's last waypoint.
     unflown_note: note on parts of loiters that are not simulated; "" for none.
-    rtl_exit_note: note on the exit from a loiter before an RTL, if that is not simulated.
+    rtl_exit_note: note on the exit from a loiter before an RTL, if the route has another exit.
 
     >>> LoiterRules().radius, LoiterRules().steers_to_center
     (0.0, False)

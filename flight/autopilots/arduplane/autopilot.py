@@ -516,7 +516,8 @@ _RETURN_PATH = (
 
 # `Plane::verify_loiter_heading` lines up with the place of the next item; an RTL item has no place, which is 0 N 0 E.
 _BEFORE_RETURN = (
-    "ArduPlane leaves its circle on the heading to 0° N 0° E, and returns from there: flown on the heading to home"
+    "ArduPlane leaves its circle on the heading to 0° N 0° E, and returns from there: so it is flown, but the route is"
+    " judged on the heading to home"
 )
 
 # ArduPlane treats a radius up to this as no radius, m.

@@ -30,6 +30,7 @@ from flight.autopilots.arduplane.law import (
     initialise_memory,
     update_terrain_lookahead,
 )
+from flight.autopilots.arduplane.navigator import keep_turn_side
 from flight.autopilots.arduplane.parameters import ARDUPILOT_PARAMETERS
 from flight.autopilots.arduplane.tecs import (
     airspeed_target,
@@ -310,7 +311,8 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
         memory.altitude_demand_in, memory.altitude_demand_limited = estimated.up, estimated.up
         memory.altitude_demand, memory.climb_rate_demand = estimated.up, 0.0
         memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
-        _set_take_off_parameters(estimated, arduplane.parameters, stage_parameters, ground)
+        roll_error = abs(memory.roll_demand - state.roll)
+        _set_take_off_parameters(estimated, arduplane.parameters, stage_parameters, ground, roll_error)
         target_airspeed = min(
             stage_parameters.airspeed_max, max(stage_parameters.airspeed_min, waypoints[ground.leg].airspeed)
         )
@@ -355,14 +357,20 @@ def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record,
 
 
 @inner
-def _set_take_off_parameters(estimated: Record, parameters: Record, stage_parameters: Record, ground: Record) -> None:
+def _set_take_off_parameters(
+    estimated: Record, parameters: Record, stage_parameters: Record, ground: Record, roll_error: float
+) -> None:
     """Set the parameters of the take-off: fixed pitch, speed by pitch, and a bank limit that grows with height.
 
     Follows `Plane::takeoff_calc_pitch` and `Plane::takeoff_calc_roll`.
+
+    roll_error: demanded roll minus roll, rad, positive; it reduces the pitch.
     """
     stage_parameters.tecs_speed_weight = 2.0
     stage_parameters.tecs_pitch_min = 0.0
     stage_parameters.pitch_limit_min = ground.takeoff_pitch * _leveling_fraction(estimated, parameters, ground)
+    if parameters.stall_prevention > 0.0:
+        stage_parameters.pitch_limit_min *= math.cos(min(0.5 * math.pi, roll_error)) ** 2
     # The minimum pitch is also the maximum: no observed take-off had more, because TECS's integrators stay wound up.
     stage_parameters.pitch_limit_max = stage_parameters.pitch_limit_min
     level_height, height = parameters.takeoff_level_height, estimated.up - ground.launch_up
@@ -500,6 +508,7 @@ def _follow_line_to_point(
     )
     if not math.isnan(aim):
         angle += aim + memory.cross_track_integrator
+    angle = keep_turn_side(estimated, angle, ground.east, ground.north, memory)
     memory.lateral_acceleration = l1_acceleration(angle, ground_speed, l1_distance, parameters.navl1_damping)
     return line_length - along, along / line_length, abs(angle), abs(cross_track)
 

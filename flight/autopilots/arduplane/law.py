@@ -54,6 +54,7 @@ ARDUPILOT_MEMORY = record_dtype(
     ("leg_after_loiter", np.int64),  # leg that followed the last loiter, 0 if none
     ("is_in_rtl", np.bool_),  # True during an RTL; from_east, from_north and from_up are then where the RTL began
     ("rtl_climb_complete", np.bool_),  # True once the climb that precedes the turn to home is done (`rtl.done_climb`)
+    "l1_angle",  # rad, last angle of L1 to its aim, positive if the aircraft must turn left (`-_last_Nu`)
     "lateral_acceleration",  # m/s^2 to the right, the last demand (`_latAccDem`)
     "roll_demand",  # rad (`nav_roll_cd`)
     # Altitude: `Plane::target_altitude` and `AP_TECS::_update_height_demand`.

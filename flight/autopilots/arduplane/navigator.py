@@ -7,9 +7,9 @@ the parameters of ArduPlane's documentation (ardupilot.org, Plane, "Navigation T
 Loiters follow ArduPlane's `Plane::update_loiter`, `verify_loiter_*` and `ModeLoiter::isHeadingLinedUp`.  The aircraft
 follows the line to the center of the loiter until it is within three radii, then steers to the center until the loiter
 demands the sharper turn, and then flies around.  Turns, time and altitude are measured from there on.  Once they are
-done, it keeps loitering until it heads for what follows, within ten degrees plus ten for each lap of waiting.  The
-next leg's line begins in the loiter's center, or at the aircraft if the item says so.  The radius grows with altitude
-as the square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).
+done, it keeps loitering until the circle at its place leads to what follows, within ten degrees plus ten for each lap
+of waiting.  The next leg's line begins in the loiter's center, or at the aircraft if the item says so.  The radius
+grows with altitude as the square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).
 """
 
 import math
@@ -35,8 +35,12 @@ _EXIT_HEADING_TOLERANCE_RAD = math.radians(10.0)
 _EXIT_HEADING_GROWTH_RAD = math.radians(10.0)
 # Altitude tolerance for leaving the RTL loiter to join the landing sequence, m.
 LANDING_JOIN_ALTITUDE_TOLERANCE_M = 10.0
-# A place closer to the center than this, in radii, cannot be headed for from the loiter: no heading is awaited.
-_MIN_EXIT_DISTANCE_RATIO = 1.05
+# L1 keeps the side of a turn while its angle exceeds this, rad ...
+_INDECISION_ANGLE_RAD = 0.9 * math.pi
+# ... and the target is further from the course than this, rad.
+_TARGET_BEHIND_ANGLE_RAD = math.radians(120.0)
+# Items closer than this have the same position, which ArduPlane stores in 1e-7 degrees, m.
+_SAME_PLACE_M = 0.01
 
 
 @compiled
@@ -154,7 +158,28 @@ def _follow_line(
     memory.cross_track_integrator = l1_integrate(aim, memory.cross_track_integrator, parameters.navl1_xtrack_i, dt)
     if not math.isnan(aim):
         angle += aim + memory.cross_track_integrator
+    angle = keep_turn_side(estimated, angle, end_e, end_n, memory)
     memory.lateral_acceleration = l1_acceleration(angle, ground_speed, l1_distance, parameters.navl1_damping)
+
+
+@inner
+def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
+    """Return L1's angle (rad) to its aim, or the last angle if a turn by almost 180 degrees changed its side.
+
+    Follows `AP_L1_Control::_prevent_indecision`, with the course in place of the heading.
+
+    target_e, target_n: position that the aircraft flies to, m.
+    """
+    course = math.atan2(estimated.velocity_east, estimated.velocity_north)
+    bearing = math.atan2(target_e - estimated.east, target_n - estimated.north)
+    if (
+        min(abs(angle), abs(memory.l1_angle)) > _INDECISION_ANGLE_RAD
+        and abs(wrap(bearing - course)) > _TARGET_BEHIND_ANGLE_RAD
+        and angle * memory.l1_angle < 0.0
+    ):
+        angle = memory.l1_angle
+    memory.l1_angle = angle
+    return angle
 
 
 @inner
@@ -324,20 +349,32 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
 def _is_heading_lined_up(
     estimated: Record, next_waypoint: Record, loiter: Record, radius: float, memory: Record
 ) -> bool:
-    """Return True if the course points to the waypoint after a loiter, within the tolerance.
+    """Return True if the tangent of a loiter's circle at the aircraft leads to the next waypoint, within the tolerance.
 
-    Also True if that waypoint lies inside the loiter's circle (radius, m): the course can then never point to it.
-    Follows `ModeLoiter::isHeadingLinedUp`.
+    To a waypoint inside the circle no tangent leads: the aircraft then leaves on a tangent next to it.  Follows
+    `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft from its center.
+
+    radius: of the circle, m.
     """
     next_e, next_n = (
         (next_waypoint.centre_east, next_waypoint.centre_north)
         if next_waypoint.is_rtl
         else target_position(next_waypoint)
     )
-    if math.hypot(next_e - loiter.centre_east, next_n - loiter.centre_north) < _MIN_EXIT_DISTANCE_RATIO * radius:
+    side = math.copysign(1.0, loiter.loiter_radius)
+    place_angle = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
+    offset_e, offset_n = next_e - loiter.centre_east, next_n - loiter.centre_north
+    distance = math.hypot(offset_e, offset_n)
+    if loiter.exit_bearing > 0.0:
+        exit_course = loiter.exit_bearing
+    elif radius <= 0.0 or distance < _SAME_PLACE_M:
         return True
-    bearing = math.atan2(next_e - estimated.east, next_n - estimated.north)
-    heading_error = abs(wrap(bearing - math.atan2(estimated.velocity_east, estimated.velocity_north)))
+    elif distance >= radius:
+        exit_course = math.atan2(offset_e - radius * math.sin(place_angle), offset_n - radius * math.cos(place_angle))
+    else:
+        segment_angle = 2.0 * math.asin((radius - distance) / (2.0 * radius))
+        exit_course = math.atan2(offset_e, offset_n) + side * (0.5 * math.pi - segment_angle)
+    heading_error = abs(wrap(exit_course - place_angle - side * 0.5 * math.pi))
     return heading_error <= _EXIT_HEADING_TOLERANCE_RAD + _EXIT_HEADING_GROWTH_RAD * math.floor(
         abs(memory.exit_wait_angle) / (2.0 * math.pi)
     )
@@ -416,7 +453,8 @@ def _loiter_acceleration(
     distance = max(0.1, math.hypot(offset_e, offset_n))
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     capture_angle = wrap(course - math.atan2(-offset_e, -offset_n))
-    capture_acceleration = l1_acceleration(capture_angle, ground_speed, l1_distance, parameters.navl1_damping)
+    turn_angle = keep_turn_side(estimated, capture_angle, loiter.centre_east, loiter.centre_north, memory)
+    capture_acceleration = l1_acceleration(turn_angle, ground_speed, l1_distance, parameters.navl1_damping)
     # Speeds over the ground: outwards, and around the circle in its direction.
     outward_velocity = -ground_speed * math.cos(capture_angle)
     tangential_velocity = -direction * ground_speed * math.sin(capture_angle)

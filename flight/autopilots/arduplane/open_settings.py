@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from enum import StrEnum
 from typing import NamedTuple
 
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, accepts_speed
 from flight.autopilots.autopilot import MissionParts
 
 
@@ -87,6 +87,8 @@ _CONTINUE_AFTER_LANDING = 0b100
 _MOTOR_OFF_THROTTLE = 0.01
 # RTL_AUTOLAND of a return along the mission's return path.
 _BY_RETURN_PATH = 4.0
+# Height from which a take-off banks freely, as a ratio to TKOFF_LVL_ALT.
+_FREE_BANK_HEIGHT_RATIO = 3.0
 
 
 def describe_open_settings(parameters: ArduPilotParameters, mission: MissionParts, *, by_program: bool) -> list[str]:
@@ -134,6 +136,21 @@ def _describe_others(
         yield f"MIS_OPTIONS {values['MIS_OPTIONS']:g} continues the mission after its landing, which is not flown"
     if by_program:
         return
+    for airspeed in mission.throttled_airspeeds:
+        if not accepts_speed(airspeed, parameters):
+            # `Plane::do_change_speed` falls through to the throttle.
+            range_text = f"AIRSPEED_MIN {values['AIRSPEED_MIN']:g} to AIRSPEED_MAX {values['AIRSPEED_MAX']:g}"
+            yield (
+                f"DO_CHANGE_SPEED to {airspeed:g} m/s with a throttle sets TRIM_THROTTLE outside {range_text},"
+                " which is not flown"
+            )
+    free_bank_height = _FREE_BANK_HEIGHT_RATIO * parameters.takeoff_level_height
+    if mission.takes_off and values["TKOFF_ALT"] < free_bank_height:
+        # `Plane::takeoff_calc_roll`.
+        yield (
+            f"TKOFF_ALT {values['TKOFF_ALT']:g} frees the bank of the take-off below {free_bank_height:g} m,"
+            " which is not flown"
+        )
     if parameters.throttle_cruise <= _MOTOR_OFF_THROTTLE:
         yield f"TRIM_THROTTLE {values['TRIM_THROTTLE']:g} stops the motor, which is not flown"
     reverse = _REVERSE_IN_FLIGHT | _REVERSE_IN_RETURN * mission.returns | _REVERSE_IN_LANDING * mission.lands

@@ -171,6 +171,7 @@ _WHEN_STATED = {
     **dict.fromkeys(("RNGFND_LANDING", "TECS_LAND_PDAMP"), 0.0),
     "ICE_IDLE_RPM": -1.0,
     "TKOFF_ACCEL_CNT": 1.0,
+    "TKOFF_ALT": 50.0,
     "USE_REV_THRUST": 2.0,
     # mAh; read for the battery failsafe alone.
     "BATT_CAPACITY": 3300.0,

@@ -344,8 +344,9 @@ def _update_throttle(
     ste_rate_demand: m^2/s^3.
     ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
     """
+    # No thrust is reversed (`Plane::apply_throttle_limits`).
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
-    ste_rate_per_throttle = (ste_rate_max - ste_rate_min) / (throttle_max - parameters.throttle_min)
+    ste_rate_per_throttle = (ste_rate_max - ste_rate_min) / (throttle_max - throttle_min)
     memory.ste_rate_error += (ste_rate_demand - ste_rate - memory.ste_rate_error) * dt / (dt + _STE_RATE_LAG_S)
     tilt = math.sin(state.roll) * math.cos(state.pitch)
     roll_compensation = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
@@ -357,7 +358,7 @@ def _update_throttle(
         integrator_limit, max(-integrator_limit, throttle_max - throttle + _THROTTLE_OVERSHOOT_FRACTION)
     )
     integrator_min = min(
-        integrator_limit, max(-integrator_limit, parameters.throttle_min - throttle - _THROTTLE_OVERSHOOT_FRACTION)
+        integrator_limit, max(-integrator_limit, throttle_min - throttle - _THROTTLE_OVERSHOOT_FRACTION)
     )
     memory.ste_integrator += throttle_per_ste * parameters.tecs_integral * ste_error * dt
     memory.ste_integrator = min(integrator_max, max(integrator_min, memory.ste_integrator))
@@ -368,7 +369,7 @@ def _update_throttle(
     throttle += memory.ste_integrator
     memory.throttle_demand = min(throttle_max, max(throttle_min, throttle))
     memory.is_throttle_saturated = throttle >= throttle_max - _SATURATION_BAND_FRACTION
-    memory.saturation = 1 if memory.is_throttle_saturated else (-1 if throttle <= parameters.throttle_min else 0)
+    memory.saturation = 1 if memory.is_throttle_saturated else (-1 if throttle <= throttle_min else 0)
 
 
 @inner

@@ -11,6 +11,7 @@ from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import (
     Autopilot,
+    BatteryFailsafe,
     Loop,
     MissionChecks,
     MissionParts,
@@ -61,6 +62,9 @@ _NEUTRAL = {
     "FW_T_F_ALT_ERR": _NeutralRange(-math.inf, 0.0),
     # Descents that a distance sensor ends (`updateAltToAvoidTerrainCollisionAndRepublishTriplet`).
     "NAV_MIN_GND_DIST": _NeutralRange(-math.inf, 0.0, by_program=False),
+    # Slower changes of pitch than simulated (`FixedwingAttitudeControl`).
+    "FW_P_RMAX_POS": _NeutralRange(60.0, math.inf),
+    "FW_P_RMAX_NEG": _NeutralRange(60.0, math.inf),
 }
 # Part of an RTL that is not flown, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
@@ -74,8 +78,16 @@ _RTL_TYPES_NOT_FLOWN = {
 
 # Values of RTL_TYPE for an RTL along the mission.
 _ALONG_THE_MISSION = (2.0, 4.0)
-# COM_WIND_MAX_ACT that only warns.
+# COM_WIND_MAX_ACT and GF_ACTION that only warn.
 _WARN_OF_WIND = 1.0
+_WARN_OF_FENCE = 1.0
+# COM_LOW_BAT_ACT that leave a mission at BAT_CRIT_THR: to return, to land, to return and then land.
+_LEAVE_AT_CRITICAL_CHARGE = (1.0, 2.0, 3.0)
+# COM_FLTT_LOW_ACT that returns, and its default by release.
+_RETURN_IN_TIME = 3.0
+_RETURN_IN_TIME_DEFAULT = {"1.16": 3.0, "1.17": 0.0}
+# CBRK_FLIGHTTERM that disables the termination of a flight.
+_NO_TERMINATION = 121212.0
 
 # Fields of `flight.autopilots.px4.law.PX4_MEMORY` that belong to the current leg or mission, not to the aircraft.
 _LEG_FIELDS = (
@@ -200,6 +212,7 @@ class Px4(Autopilot):
             if not neutral.lowest <= parameters[name] <= neutral.highest
             and not (self.is_program and neutral.by_program)
         ]
+        ending_texts += self._describe_endings(mission)
         return [*ending_texts, *changing_texts, *([] if self.is_program else self._describe_mission_settings(mission))]
 
     def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:
@@ -209,6 +222,9 @@ class Px4(Autopilot):
             yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not flown"
         if mission.moves_payload and parameters["MIS_COMMAND_TOUT"] > 0.0:
             yield f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} waits for the payload, which is not flown"
+        if parameters["FW_T_THR_LOW_HGT"] >= 0.0 and parameters["FW_LND_THRTC_SC"] != 1.0:
+            scale_text = f"FW_LND_THRTC_SC {parameters['FW_LND_THRTC_SC']:g}"
+            yield f"{scale_text} below FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m is not flown"
         if mission.loiters_to_land and parameters["FW_LND_EARLYCFG"] != 0.0:
             yield "FW_LND_EARLYCFG 1 changes the loiter before the landing and is not flown"
         if not mission.returns:
@@ -220,6 +236,37 @@ class Px4(Autopilot):
             yield f"{end_text} ends the return, which is flown to RTL_RETURN_ALT {parameters['RTL_RETURN_ALT']:g}"
         if parameters["RTL_LAND_DELAY"] >= 0.0:
             yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not flown"
+
+    def _describe_endings(self, mission: MissionParts) -> Iterator[str]:
+        """Describe settings with which PX4 may leave a mission in flight."""
+        parameters = self.parameters
+        if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
+            yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not flown"
+        time_action = _RETURN_IN_TIME_DEFAULT[self.parameters.version]
+        time_action = parameters.by_origin("file").get("COM_FLTT_LOW_ACT", time_action)
+        if time_action == _RETURN_IN_TIME and parameters["BAT1_CAPACITY"] > 0.0:
+            yield "COM_FLTT_LOW_ACT 3 returns when the battery lasts only for the return, which is not flown"
+        if parameters["CBRK_FLIGHTTERM"] != _NO_TERMINATION:
+            limits = {"FD_FAIL_R": "FW_R_LIM", "FD_FAIL_P": "FW_P_LIM_MAX"}
+            for name, limit in limits.items():
+                if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6):
+                    yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not flown"
+
+    @property
+    def battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
+        """Failsafe from COM_LOW_BAT_ACT and BAT_CRIT_THR, which PX4's own program does not get.
+
+        >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
+        >>> Px4(made).battery_failsafes
+        (BatteryFailsafe(parameter='BAT_CRIT_THR', threshold=0.1, used_charge=4500.0),)
+        """
+        parameters = self.parameters
+        if parameters["COM_LOW_BAT_ACT"] not in _LEAVE_AT_CRITICAL_CHARGE:
+            return ()
+        # Without a capacity the charge is estimated from the voltage.
+        capacity = parameters["BAT1_CAPACITY"] if parameters["BAT1_CAPACITY"] > 0.0 else math.nan
+        threshold = parameters["BAT_CRIT_THR"]
+        return (BatteryFailsafe("BAT_CRIT_THR", threshold, (1.0 - threshold) * capacity),)
 
     @property
     def reads_acceptance(self) -> bool:
@@ -271,7 +318,7 @@ class Px4(Autopilot):
             includes_home=return_type in (0, 3),
             holds_height=True,
             rally_height=parameters["RTL_RETURN_ALT"],
-            may_use_landing=return_type == 1,
+            may_use_landing=return_type in (1, 3),
             deviation_note=_RTL_TYPES_NOT_FLOWN.get(return_type, ""),
         )
 

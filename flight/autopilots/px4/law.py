@@ -8,7 +8,6 @@ import math
 
 import numpy as np
 
-from aircraft.envelope import GRAVITY
 from flight.autopilots.px4.lateral import roll_setpoint
 from flight.autopilots.px4.navigator import find_target, is_last_target, navigate
 from flight.autopilots.px4.parameters import PX4_PARAMETERS
@@ -60,7 +59,7 @@ PX4_MEMORY = record_dtype(
     "tas_rate",  # m/s^2 (`TECSAirspeedFilter`)
     "tas_setpoint",  # m/s, after the rate limit (`Setpoint::tas_setpoint`)
     "ste_rate",  # m^2/s^3, filtered (`_ste_rate_estimate_filter`)
-    "pitch_integrator",  # m^2/s^3, integrator of the SEB rate error (`_pitch_integ_state`)
+    "pitch_integrator",  # rad, integrator of the SEB rate error (`_pitch_integ_state`)
     "throttle_integrator",  # 0..1, integrator of the STE rate error (`_throttle_integ_state`)
     "pitch_setpoint",  # rad above the trim pitch (`_pitch_setpoint`)
     "throttle_setpoint",  # 0..1 (`_throttle_setpoint`)
@@ -242,7 +241,7 @@ def _initialise_memory(
     memory.tas_setpoint = state.airspeed
     # Start with the trim of level flight here, as if the aircraft had been flying.
     memory.pitch_setpoint = state.alpha - parameters.pitch_trim
-    memory.pitch_integrator = memory.pitch_setpoint * state.airspeed * GRAVITY
+    memory.pitch_integrator = memory.pitch_setpoint
     memory.throttle_setpoint = guidance.trim_throttle
     throttle_trim = min(parameters.throttle_max, max(parameters.throttle_min, parameters.throttle_trim * eas_to_tas))
     memory.throttle_integrator = guidance.trim_throttle - throttle_trim

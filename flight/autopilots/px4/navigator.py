@@ -45,6 +45,19 @@ def acceptance_radius_at(ground_speed: float, parameters: Record) -> float:
 
 
 @inner
+def _altitude_acceptance_radius(target: Record, parameters: Record) -> float:
+    """Return the altitude tolerance within which a waypoint or a loiter is accepted, m.
+
+    Follows `Navigator::get_altitude_acceptance_radius`: any altitude in a mission's landing (`setActiveMissionItems`),
+    NAV_FW_ALTL_RAD before a landing, or NAV_FW_ALT_RAD.
+    """
+    if target.ignores_altitude:
+        return math.inf
+    radius: float = parameters.altitude_acceptance_radius
+    return parameters.landing_altitude_acceptance_radius if target.precedes_landing else radius
+
+
+@inner
 def is_past_waypoint(estimated: Record, target: Record, memory: Record) -> bool:
     """Return True if the aircraft is past the vertical plane across the leg at its end.
 
@@ -130,7 +143,9 @@ def _navigate_waypoint(
     turn_distance, loiter_radius = switch_distance(ground_speed, parameters), parameters.loiter_radius
     distance = math.hypot(target.east - estimated.east, target.north - estimated.north)
     memory.min_distance_to_end = min(memory.min_distance_to_end, distance)
-    is_off_altitude = abs(estimated.up - target.up) > parameters.altitude_acceptance_radius
+    altitude_error = abs(estimated.up - target.up)
+    is_off_altitude = altitude_error > parameters.altitude_acceptance_radius and not target.ignores_altitude
+    is_accepted_altitude = altitude_error <= _altitude_acceptance_radius(target, parameters)
     # A circle continues once begun, even if the aircraft is far outside it.
     memory.is_loitering = memory.mission_finished or (
         is_off_altitude and (memory.is_loitering or distance < turn_distance)
@@ -154,7 +169,7 @@ def _navigate_waypoint(
     )
     memory.time_since_reached = (
         memory.time_since_reached + dt
-        if memory.time_since_reached > 0.0 or (is_reached and not is_off_altitude)
+        if memory.time_since_reached > 0.0 or (is_reached and is_accepted_altitude)
         else 0.0
     )
     if memory.time_since_reached <= SWITCH_DELAY:
@@ -198,14 +213,13 @@ def _navigate_loiter(
         memory,
     )
     is_on_rim = distance <= abs(loiter.loiter_radius) + acceptance_radius_at(ground_speed, parameters)
+    altitude_radius = _altitude_acceptance_radius(loiter, parameters)
     if loiter.loiters_to_altitude and not memory.rim_reached:
         memory.altitude_setpoint = memory.leg_start_altitude
-        memory.rim_reached = (
-            is_on_rim and abs(estimated.up - memory.leg_start_altitude) <= parameters.altitude_acceptance_radius
-        )
+        memory.rim_reached = is_on_rim and abs(estimated.up - memory.leg_start_altitude) <= altitude_radius
         return
     memory.altitude_setpoint = loiter.up
-    is_at_altitude = abs(estimated.up - loiter.up) <= parameters.altitude_acceptance_radius
+    is_at_altitude = abs(estimated.up - loiter.up) <= altitude_radius
     memory.time_since_reached = (
         memory.time_since_reached + dt if memory.time_since_reached > 0.0 or (is_on_rim and is_at_altitude) else 0.0
     )
@@ -299,22 +313,18 @@ def _navigate_rtl(
     distance = math.hypot(rtl.centre_east - estimated.east, rtl.centre_north - estimated.north)
     memory.is_loitering = memory.is_loitering or distance < abs(rtl.loiter_radius) + switch_distance(speed, parameters)
     memory.altitude_setpoint = rtl.up if memory.is_loitering else return_altitude
-    if memory.is_loitering:
-        follow_loiter(
-            estimated,
-            rtl.centre_east,
-            rtl.centre_north,
-            rtl.loiter_radius,
-            wind_east,
-            wind_north,
-            target_airspeed,
-            parameters,
-            memory,
-        )
-    else:
-        follow_leg(
-            estimated, rtl.centre_east, rtl.centre_north, wind_east, wind_north, target_airspeed, parameters, memory
-        )
+    # The way is a loiter, too, which from afar leads straight to its center.
+    follow_loiter(
+        estimated,
+        rtl.centre_east,
+        rtl.centre_north,
+        rtl.loiter_radius,
+        wind_east,
+        wind_north,
+        target_airspeed,
+        parameters,
+        memory,
+    )
 
 
 @inner

@@ -151,9 +151,21 @@ FROM_ARDUPILOT = {
 # Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
+    "BAT_CRIT_THR": 0.07,
+    "BAT1_CAPACITY": -1.0,
+    "CBRK_FLIGHTTERM": 121212.0,
+    "COM_FLTT_LOW_ACT": 0.0,
+    "COM_LOW_BAT_ACT": 0.0,
     "COM_WIND_MAX": -1.0,
     "COM_WIND_MAX_ACT": 0.0,
+    "FD_FAIL_P": 60.0,
+    "FD_FAIL_R": 60.0,
     "FW_LND_EARLYCFG": 0.0,
+    "FW_LND_THRTC_SC": 1.0,
+    "FW_P_RMAX_NEG": 60.0,
+    "FW_P_RMAX_POS": 60.0,
+    "FW_T_THR_LOW_HGT": -1.0,
+    "GF_PREDICT": 0.0,
     "MIS_COMMAND_TOUT": 0.0,
     "NAV_MIN_GND_DIST": -1.0,
 }

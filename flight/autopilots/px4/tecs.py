@@ -66,7 +66,8 @@ def update_tecs(
     """Update the throttle and pitch setpoints of ``memory`` for its altitude setpoint and an airspeed.
 
     Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
-    `_calcAirspeedControlOutput`.
+    `_calcAirspeedControlOutput`.  Rates of kinetic energy are demanded by the airspeed setpoint
+    (`_calcSpecificEnergyRates`).
 
     state: a record of `flight.dynamics.state.STATE`.  estimated: a record of
     `flight.guidance.navigation_error.MOTION`.
@@ -75,12 +76,10 @@ def update_tecs(
     update_altitude_reference(parameters, memory, dt)
     update_airspeed_filter(state.airspeed, parameters, memory, dt)
     tas = memory.tas
-    # In a bank the minimum airspeed grows as the root of the load factor.
-    min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
-    limited_tas_setpoint = min(parameters.airspeed_max, max(min_airspeed, airspeed_setpoint)) * eas_to_tas
-    step = _AIRSPEED_SLEW_MPS2 * dt
-    memory.tas_setpoint = min(memory.tas_setpoint + step, max(memory.tas_setpoint - step, limited_tas_setpoint))
-    ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * parameters.min_sink_rate
+    _adapt_airspeed_setpoint(airspeed_setpoint, parameters, memory, eas_to_tas, dt)
+    # In thin air the aircraft sinks faster at idle (`PerformanceModel::getMinimumSinkRate`).
+    min_sink_rate = parameters.min_sink_rate * eas_to_tas
+    ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
     altitude_rate_setpoint = (memory.altitude_reference - estimated.up) / parameters.altitude_time_constant
     altitude_rate_setpoint += parameters.altitude_rate_feedforward * memory.altitude_rate_reference
     altitude_rate_setpoint = min(parameters.max_climb_rate, max(-parameters.max_sink_rate, altitude_rate_setpoint))
@@ -90,18 +89,35 @@ def update_tecs(
         tas_rate_per_ste_rate * ste_rate_max, max(tas_rate_per_ste_rate * ste_rate_min, tas_rate_setpoint)
     )
     underspeed_ratio = detect_underspeed(tas / eas_to_tas, parameters)
-    _calc_pitch_control(estimated, parameters, memory, altitude_rate_setpoint, tas_rate_setpoint, underspeed_ratio, dt)
+    ske_rate_setpoint = memory.tas_setpoint * tas_rate_setpoint
+    _calc_pitch_control(estimated, parameters, memory, altitude_rate_setpoint, ske_rate_setpoint, underspeed_ratio, dt)
     _calc_throttle_control(
         state,
         estimated,
         parameters,
         memory,
         altitude_rate_setpoint,
-        tas_rate_setpoint,
+        ske_rate_setpoint,
         underspeed_ratio,
+        min_sink_rate,
         eas_to_tas,
         dt,
     )
+
+
+@inner
+def _adapt_airspeed_setpoint(
+    airspeed_setpoint: float, parameters: Record, memory: Record, eas_to_tas: float, dt: float
+) -> None:
+    """Move the airspeed setpoint towards an equivalent airspeed, m/s, at a limited rate; limits apply at once.
+
+    Follows `adapt_airspeed_setpoint`.  In a bank the minimum airspeed grows as the root of the load factor.
+    """
+    min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
+    tas_min, tas_max = min_airspeed * eas_to_tas, parameters.airspeed_max * eas_to_tas
+    step = _AIRSPEED_SLEW_MPS2 * eas_to_tas * dt
+    tas_setpoint = min(memory.tas_setpoint + step, max(memory.tas_setpoint - step, airspeed_setpoint * eas_to_tas))
+    memory.tas_setpoint = min(tas_max, max(tas_min, tas_setpoint))
 
 
 @inner
@@ -122,20 +138,19 @@ def _calc_pitch_control(
     parameters: Record,
     memory: Record,
     altitude_rate_setpoint: float,
-    tas_rate_setpoint: float,
+    ske_rate_setpoint: float,
     underspeed_ratio: float,
     dt: float,
 ) -> None:
-    """Set the pitch setpoint from the SEB rate of an altitude rate (m/s) and an acceleration (m/s^2).
+    """Set the pitch setpoint from the SEB rate of an altitude rate (m/s) and an SKE rate (m^2/s^3).
 
     Follows `TECSControl::_updateSpeedAltitudeWeights`, `_calcPitchControlSebRate`, `_calcPitchControlUpdate` and
     `_calcPitchControlOutput`.
     """
     tas = memory.tas
     speed_weight = parameters.pitch_speed_weight * (1.0 - underspeed_ratio) + 2.0 * underspeed_ratio
-    # Clip both weights at 1: a weight above 1 then lowers the other instead of raising the loop gain.
-    ske_weighting, spe_weighting = min(1.0, max(0.0, speed_weight)), min(1.0, max(0.0, 2.0 - speed_weight))
-    seb_rate_setpoint = GRAVITY * altitude_rate_setpoint * spe_weighting - tas * tas_rate_setpoint * ske_weighting
+    ske_weighting, spe_weighting = speed_weight, 2.0 - speed_weight
+    seb_rate_setpoint = GRAVITY * altitude_rate_setpoint * spe_weighting - ske_rate_setpoint * ske_weighting
     seb_rate_error = seb_rate_setpoint - (
         GRAVITY * estimated.velocity_up * spe_weighting - tas * memory.tas_rate * ske_weighting
     )
@@ -144,16 +159,16 @@ def _calc_pitch_control(
         parameters.pitch_limit_max - parameters.pitch_trim,
         parameters.pitch_limit_min - parameters.pitch_trim,
     )
-    increment = seb_rate_error * parameters.integrator_gain_pitch * dt
+    increment = seb_rate_error * parameters.integrator_gain_pitch / seb_rate_per_pitch * dt
+    # With the setpoint at a limit the integrator may only move away from the limit.
+    if memory.pitch_setpoint >= pitch_max:
+        increment = min(0.0, increment)
+    elif memory.pitch_setpoint <= pitch_min:
+        increment = max(0.0, increment)
+    memory.pitch_integrator += increment
     pitch = (
-        seb_rate_error * parameters.pitch_damping_gain
-        + parameters.seb_rate_feedforward * seb_rate_setpoint
-        + memory.pitch_integrator
-    ) / seb_rate_per_pitch
-    # In saturation the integrator may only move away from the limit.
-    if not ((pitch >= pitch_max and increment > 0.0) or (pitch <= pitch_min and increment < 0.0)):
-        memory.pitch_integrator += increment
-        pitch += increment / seb_rate_per_pitch
+        seb_rate_error * parameters.pitch_damping_gain + parameters.seb_rate_feedforward * seb_rate_setpoint
+    ) / seb_rate_per_pitch + memory.pitch_integrator
     pitch = min(pitch_max, max(pitch_min, pitch))
     max_step = parameters.vertical_acceleration_limit / tas * dt
     memory.pitch_setpoint = min(memory.pitch_setpoint + max_step, max(memory.pitch_setpoint - max_step, pitch))
@@ -166,20 +181,23 @@ def _calc_throttle_control(
     parameters: Record,
     memory: Record,
     altitude_rate_setpoint: float,
-    tas_rate_setpoint: float,
+    ske_rate_setpoint: float,
     underspeed_ratio: float,
+    min_sink_rate: float,
     eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Set the throttle setpoint from the STE rate of an altitude rate (m/s) and an acceleration (m/s^2).
+    """Set the throttle setpoint from the STE rate of an altitude rate (m/s) and an SKE rate (m^2/s^3).
 
     Follows `TECSControl::_calcThrottleControlSteRate`, `_calcThrottleControlUpdate` and `_calcThrottleControlOutput`.
+
+    min_sink_rate: at idle throttle, m/s.
     """
-    ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * parameters.min_sink_rate
+    ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
     load_factor_correction = parameters.load_factor_correction * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)
     ste_rate_setpoint = min(
         ste_rate_max,
-        max(ste_rate_min, GRAVITY * altitude_rate_setpoint + memory.tas * tas_rate_setpoint + load_factor_correction),
+        max(ste_rate_min, GRAVITY * altitude_rate_setpoint + ske_rate_setpoint + load_factor_correction),
     )
     ste_rate = GRAVITY * estimated.velocity_up + memory.tas * memory.tas_rate
     memory.ste_rate += (ste_rate - memory.ste_rate) * dt / (dt + parameters.ste_rate_time_constant)
@@ -190,12 +208,14 @@ def _calc_throttle_control(
         throttle = throttle_trim + ste_rate_setpoint * (parameters.throttle_max - throttle_trim) / ste_rate_max
     else:
         throttle = throttle_trim + ste_rate_setpoint * (throttle_trim - parameters.throttle_min) / -ste_rate_min
+    increment = ste_rate_error * parameters.integrator_gain_throttle / ste_rate_span * (1.0 - underspeed_ratio) * dt
+    # With the setpoint at a limit the integrator may only move away from the limit.
+    if memory.throttle_setpoint >= parameters.throttle_max:
+        increment = min(0.0, increment)
+    if memory.throttle_setpoint <= parameters.throttle_min:
+        increment = max(0.0, increment)
+    memory.throttle_integrator += increment
     throttle += ste_rate_error * parameters.throttle_damping_gain / ste_rate_span + memory.throttle_integrator
-    increment = ste_rate_error * parameters.integrator_gain_throttle / ste_rate_span * dt
-    is_at_max, is_at_min = throttle >= parameters.throttle_max, throttle <= parameters.throttle_min
-    if not ((is_at_max and increment > 0.0) or (is_at_min and increment < 0.0)):
-        memory.throttle_integrator += increment
-        throttle += increment
     throttle += underspeed_ratio * (parameters.throttle_max - throttle)
     throttle = min(parameters.throttle_max, max(parameters.throttle_min, throttle))
     if parameters.throttle_slew_rate > 0.0:

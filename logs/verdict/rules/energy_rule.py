@@ -121,7 +121,7 @@ def _battery_failsafe_messages(requirements: RouteRequirements, energy_used: flo
                     f" {energy_used / volts * _MAH_PER_AH:.0f} mAh"
                 )
             )
-    clause = f"; whether the voltage falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
+    clause = f"; whether the battery falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
     return messages, clause if unjudged else ""
 
 

@@ -213,7 +213,13 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         takes_off=procedures.take_off is not None,
         lands=procedures.approach is not None,
         loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
+        has_fence=bool(setup.mission.fences),
         enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
+        throttled_airspeeds=tuple(
+            item.params[1]
+            for item in items
+            if item.command == C.DO_CHANGE_SPEED and item.params[0] == 0.0 and min(item.params[1:3]) > 0.0
+        ),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
         wind=setup.scenario.wind.strongest(setup.route.waypoints[:, 2]),
     )

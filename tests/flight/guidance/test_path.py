@@ -9,6 +9,9 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.autopilot import Autopilot
 from flight.guidance.path import (
     NODE,
     PIECE,
@@ -19,9 +22,11 @@ from flight.guidance.path import (
     mean_curvature,
     profile,
     project,
+    waypoint_records,
 )
-from flight.mission.route import Route
+from flight.mission.route import Route, RouteRules, make_route
 from flight.simulation.setup import FlightSetup
+from tests.mission_lines import ORIGIN, mission, wp
 from tests.sampled_paths import sample_path
 from tests.setups import MakeSetup
 from tests.soak import scaled
@@ -31,6 +36,7 @@ from world.kernels import Record, field_names
 
 # All fields of a piece but where its leg changes, which may be nowhere.
 FINITE = set(field_names(PIECE)) - {"leg_change"}
+USUAL_ARDUPLANE = ArduPlane(ArduPilotParameters.defaults())
 RADIUS = 25.0**2 / (9.80665 * math.tan(math.radians(30.0)))
 
 
@@ -46,6 +52,40 @@ def test_a_first_leg_without_length_has_no_slope(make_setup: MakeSetup) -> None:
     assert path.length == pytest.approx(2000.0, abs=150.0)
     assert path.nodes["slope"][0] == pytest.approx(20.0 / 1000.0, rel=0.2)
     assert np.isfinite(path.nodes["height"]).all()
+
+
+def _records(*lines: str, autopilot: Autopilot = USUAL_ARDUPLANE) -> Records:
+    """The waypoint records of a mission, as an autopilot flies it."""
+    made = mission(*lines)
+    rules = RouteRules(autopilot.return_rules, autopilot.loiter_rules)
+    return waypoint_records(make_route(made, ORIGIN, None, 25.0, False, rules=rules), made)
+
+
+def _items_with(records: Records, name: str) -> set[int]:
+    return set(records["item"][records[name] != 0].tolist())
+
+
+def test_only_a_loiter_before_a_return_has_an_exit_bearing_that_of_0_north_0_east() -> None:
+    """From 36.5° N 84.2° W that is atan2(84.2, -36.5 / cos 18.25°) = 114.5° (`Location::get_bearing_to`)."""
+    loiters = wp(0, 2000, command=18, p="1 0 150 0"), wp(0, 4000)
+    last = wp(3000, 4000, command=18, p="1 0 150 0")
+    records = _records(wp(0, 0), *loiters, last, "2 20 0 0 0 0 0 0 0")
+    assert _items_with(records, "exit_bearing") == {4}
+    assert np.degrees(np.unique(records["exit_bearing"][records["item"] == 4])) == pytest.approx([114.5], abs=0.1)
+    assert _items_with(_records(wp(0, 0), *loiters), "exit_bearing") == set()
+
+
+def test_the_waypoints_of_a_missions_landing_are_marked() -> None:
+    """`MissionBase::isLanding`: those after the first place behind DO_LAND_START; and the last before the landing."""
+    land, start = wp(4000, 0, 0, command=21), "2 189 0 0 0 0 0 0 0"
+    records = _records(wp(0, 0), start, wp(1000, 0), wp(2000, 0), wp(3000, 0), land)
+    assert (_items_with(records, "ignores_altitude"), _items_with(records, "precedes_landing")) == ({4, 5}, {5})
+    records = _records(wp(0, 0), wp(1000, 0), wp(2000, 0), land)
+    assert (_items_with(records, "ignores_altitude"), _items_with(records, "precedes_landing")) == (set(), {3})
+    loiter = wp(2000, 0, command=31, p="0 150 0 0")
+    records = _records(wp(0, 0), start, wp(1000, 0), loiter, land)
+    assert (_items_with(records, "ignores_altitude"), _items_with(records, "precedes_landing")) == (set(), {4})
+    assert _items_with(_records(wp(0, 0), wp(1000, 0)), "precedes_landing") == set()
 
 
 def _end(piece: Record) -> tuple[Floats, float]:

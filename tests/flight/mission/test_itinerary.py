@@ -149,6 +149,24 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     assert nested.items.tolist() == [1, 2, 3, 2, 3, 1, 2, 3]
 
 
+@pytest.mark.parametrize(("count", "opens", "notes"), [(15, False, False), (16, False, True), (101, True, False)])
+def test_arduplane_counts_a_hundred_jumps_and_fifteen_on_a_small_board(count: int, opens: bool, notes: bool) -> None:
+    """`AP_Mission::get_jump_times_run`: the other jumps count as used up."""
+    jumps = [line for k in range(count) for line in (wp(0, 100 * k + 900), f"2 177 {2 * k + 2} 1 0 0 0 0 0")]
+    made = make_itinerary(mission(wp(0, 0), *jumps))
+    assert [(one.item, "beyond the first 100" in one.text) for one in made.open_items] == [(203, True)] * opens
+    assert any("a board with little memory" in note for note in made.notes) == notes
+    assert made.px4_open_items == ()
+
+
+@pytest.mark.parametrize(("count", "opens"), [(9, False), (10, True)])
+def test_px4_ends_a_mission_at_ten_jumps_in_a_row(count: int, opens: bool) -> None:
+    """`MissionBase::getNonJumpItem` reads ten items at most (`MAX_JUMP_ITERATION`)."""
+    made = make_itinerary(mission(wp(0, 0), wp(0, 900), *["2 177 2 0 0 0 0 0 0"] * count, wp(0, 1800)))
+    assert [one.item for one in made.px4_open_items] == [count + 2] * opens
+    assert made.open_items == ()
+
+
 @settings(max_examples=60, deadline=None)
 @given(st.integers(2, 6), st.integers(0, 30))
 def test_a_jump_flies_its_body_once_more_each_time(corners: int, repeats: int) -> None:

@@ -15,9 +15,12 @@ from flight.autopilots.arduplane.ground_law import (
     GROUND_STATE,
     ON_GLIDE,
     _begin_first_leg,
+    _demand_glide,
     _demand_heading,
     _is_leveled,
     _limit_rotation_pitch,
+    _set_landing_parameters,
+    _set_take_off_parameters,
     _tick_landing,
     _update_stage,
 )
@@ -229,6 +232,48 @@ def test_the_flare_begins_with_the_flown_sink_rate_and_in_47_with_the_demanded_o
     assert (ground.stage, ground.entry_sink, ground.entry_height) == (FLARING, entry_sink, 2.0)
 
 
+@pytest.mark.parametrize("field", [0.0, -60.0, 400.0])
+def test_the_flares_demand_fades_from_the_glides_to_the_flown_height_on_any_field(field: float) -> None:
+    """`AP_TECS::_update_height_demand` since 4.6.3: both heights count from one datum, wherever the field lies.
+
+    The flare begins at 3 m, 1 m over the glide's demand, with 2 m/s of sink; 1 s later, at 2 m, half of it is done down
+    to TECS_FLARE_HGT of 1 m.  The sink of ten updates of 0.1 s is taken off both heights.
+    """
+    ground, own, settings = record(GROUND_STATE, up=field, stage=APPROACHING), memory(), parameters()
+    own.altitude_demand = field + 2.0
+    _update_stage(flying(up=field + 3.0, climb=-2.0), settings, ground, own, (30.0, 0.95, 0.0, 0.0))
+    assert ground.stage == FLARING
+    adjusted, ideal = field + 2.0, field + 3.0
+    for update in range(1, 11):
+        height = 3.0 - 0.1 * update
+        _demand_glide(flying(up=field + height), settings, ground, own, 30.0 - 2.5 * update)
+        fraction = (3.0 - height) / (3.0 - 1.0)
+        sink = 2.0 * (1.0 - fraction) + 0.25 * fraction
+        adjusted, ideal = adjusted - 0.1 * sink, ideal - 0.1 * sink
+    assert fraction == pytest.approx(0.5)
+    assert own.climb_rate_demand == pytest.approx(-sink)
+    assert own.altitude_demand == pytest.approx(0.5 * (adjusted + ideal))
+
+
+@pytest.mark.parametrize(
+    ("version", "stall", "stage", "least"),
+    [
+        ("4.7", 14.0, FLARING, 14.0),
+        ("4.7", 14.0, APPROACHING, 18.0),
+        ("4.7", 0.0, FLARING, 18.0),
+        ("4.6", 14.0, FLARING, 18.0),
+    ],
+)
+def test_in_the_flare_of_47_the_least_airspeed_is_that_of_the_stall(
+    version: ArduPlaneVersion, stall: float, stage: int, least: float
+) -> None:
+    """`AP_TECS::_update_speed`: AIRSPEED_STALL on the final part of a landing."""
+    settings, stage_parameters = parameters(version, AIRSPEED_MIN=18.0, AIRSPEED_STALL=stall), parameters()
+    ground = record(GROUND_STATE, stage=stage, entry_height=3.0)
+    _set_landing_parameters(flying(up=2.0), settings, stage_parameters, ground, 0.9)
+    assert stage_parameters.airspeed_min == least
+
+
 @pytest.mark.parametrize("version", ["4.6", "4.7"])
 def test_each_release_flares_by_its_own_sink_rate(version: ArduPlaneVersion) -> None:
     setup = circuit(None, STRIP)
@@ -301,6 +346,20 @@ def test_a_rotation_raises_the_pitch_with_the_ground_speed(fastest: float, groun
     own.pitch_demand = math.radians(12.0)
     _limit_rotation_pitch(estimated, settings, ground, own)
     assert ground.rotation_complete == (degrees == 12.0)
+
+
+@pytest.mark.parametrize(
+    ("error", "prevents", "degrees"), [(0.0, 1.0, 12.0), (45.0, 1.0, 6.0), (120.0, 1.0, 0.0), (45.0, 0.0, 12.0)]
+)
+def test_a_take_off_pitches_less_while_its_bank_is_not_as_demanded(
+    error: float, prevents: float, degrees: float
+) -> None:
+    """`Plane::takeoff_calc_pitch`: by the square of the cosine of the roll's error, with STALL_PREVENTION."""
+    ground = record(GROUND_STATE, takeoff_pitch=math.radians(12.0), takeoff_end_altitude=600.0)
+    settings, stage = parameters(STALL_PREVENTION=prevents), parameters()
+    _set_take_off_parameters(flying(), settings, stage, ground, math.radians(error))
+    assert math.degrees(stage.pitch_limit_min) == pytest.approx(degrees, abs=1e-9)
+    assert stage.pitch_limit_max == stage.pitch_limit_min
 
 
 @pytest.mark.parametrize(("seconds", "is_over"), [(1.9, False), (2.1, True)])

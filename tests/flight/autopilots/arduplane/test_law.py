@@ -402,6 +402,21 @@ def test_at_full_throttle_the_highest_airspeed_falls_to_the_cruise_airspeed() ->
     assert own.tas_max_drop == pytest.approx(10.0 - 0.5 * 5.0 * GRAVITY / 25.0 * DT, rel=1e-2)
 
 
+def test_without_reverse_thrust_a_negative_throttle_counts_as_none() -> None:
+    """`Plane::apply_throttle_limits` gives TECS a minimum of 0: the gain is that of a range from 0 to THR_MAX."""
+    found = []
+    for least in (0.0, -100.0):
+        own = steady(altitude_demand=498.0)
+        weighed(own, reading(), flying(), THR_MIN=least)
+        found.append((own.last_throttle_demand, own.ste_integrator, own.throttle_demand, own.saturation))
+    assert found[0] == found[1]
+    # 2 m high at idle: no thrust is left to take away.
+    own = steady(altitude_demand=400.0)
+    for _ in range(30):
+        weighed(own, reading(), flying(), THR_MIN=-100.0)
+    assert (own.throttle_demand, own.saturation) == (0.0, -1)
+
+
 def test_a_descent_at_full_throttle_gives_up_the_airspeed() -> None:
     """`AP_TECS::_detect_bad_descent`: an STE error above 200 m^2/s^2, sinking, at 90 % of the throttle or more."""
     made = parameters(AIRSPEED_CRUISE=25.0, AIRSPEED_MAX=40.0)

@@ -143,7 +143,9 @@ def test_after_a_loiter_the_slope_begins_at_its_top() -> None:
     ):
         way[name][:2], way[name][2] = loiter, ahead
     way["is_rtl"][2], way["stop"] = True, (1, 1, 2)
-    here = flying(0.0, 1.0, course=math.atan2(EAST, NORTH))
+    course = math.atan2(EAST - 120.0, NORTH)
+    east, north = 120.0 - 120.0 * math.cos(course), 120.0 * math.sin(course)
+    here = flying(east, north, course=course)
     own = navigated(memory(loiter_started=True, loiter_complete=True), here, way)
     assert own.leg == 1
     assert asked(own, here, way) > 499.0

@@ -6,7 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.navigator import is_past_finish_line, navigate_legs, turn_distance
+from flight.autopilots.arduplane.navigator import (
+    _is_heading_lined_up,
+    is_past_finish_line,
+    keep_turn_side,
+    navigate_legs,
+    turn_distance,
+)
 from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, waypoints
 
 RIGHT_ANGLE = math.pi / 2
@@ -216,22 +222,94 @@ def test_a_loiter_to_a_height_is_left_at_it_or_where_that_stays_out_of_reach(up:
     assert left == pytest.approx(360.0 * circles + 82.3, abs=1.0)
 
 
-def test_who_waits_for_the_course_is_content_with_ten_degrees_more_each_circle() -> None:
-    """After 1 s of its loiter (7 degrees) it waits, with a course that is always so far off: a circle, or two."""
-    for degrees, circles in ((9.0, 0), (11.0, 1), (19.0, 1), (21.0, 2), (-21.0, 2)):
-        way = circle_route(loiter_turns=0.0, loiter_time=1.0)
-        left = go_around(way, 300.0, off=math.radians(degrees))[1]
-        assert left == pytest.approx(360.0 * circles + math.degrees(25.0 / 200.0), abs=2.0)
+def is_lined_up(
+    place: float, target: tuple[float, float], *, side: float = 1.0, laps: int = 0, away: float = 200.0, to: float = 0.0
+) -> bool:
+    """Return the answer on a circle of 200 m about the origin, at a bearing (degrees) and distance from its center.
+
+    to: exit bearing, rad.
+    """
+    way = circle_route(loiter_radius=side * 200.0, exit_bearing=to)
+    way["east"][2], way["north"][2] = target
+    angle = math.radians(place)
+    # The course does not count: it is always 100 degrees off.
+    here = flying(away * math.sin(angle), away * math.cos(angle), 0.0, angle + 100.0)
+    own = memory(exit_wait_angle=2.0 * math.pi * laps)
+    return bool(_is_heading_lined_up(here, way[2], way[1], 200.0, own))
 
 
-def test_no_course_is_asked_for_to_a_place_within_the_circle() -> None:
-    """Within 1.05 radii of the middle: there the course from the circle is off by up to 90 degrees on all of it."""
-    for north, waits in ((209.0, False), (211.0, True)):
-        way = circle_route(loiter_turns=0.0, loiter_time=1.0)
-        way["north"][2] = north
-        left = go_around(way, 300.0)[1]
-        assert left is not None
-        assert (left > 20.0) == waits
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("away", [150.0, 200.0, 300.0])
+def test_a_loiter_is_left_where_its_tangent_leads_to_what_follows(side: float, away: float) -> None:
+    """`ModeLoiter::isHeadingLinedUp` since 4.6.0: within 10 degrees, 10 more for each circle, wherever it is off it."""
+    # 2 km north: from the circle's point at a bearing the target is seen at a bearing, and the tangent leads at 90
+    # degrees to the first.  Where both agree, the point is at acos(200 / 2000) from the target.
+    tangent_place = -side * math.degrees(math.acos(200.0 / 2000.0))
+    for degrees, laps, expected in (
+        (0.0, 0, True),
+        (8.0, 0, True),
+        (12.0, 0, False),
+        (-12.0, 0, False),
+        (12.0, 1, True),
+        (-22.0, 1, False),
+        (-22.0, 2, True),
+    ):
+        place = math.radians(tangent_place + degrees)
+        seen = math.atan2(-200.0 * math.sin(place), 2000.0 - 200.0 * math.cos(place))
+        error = math.degrees(abs((seen - place - side * RIGHT_ANGLE + math.pi) % (2.0 * math.pi) - math.pi))
+        assert (error <= 10.0 + 10.0 * laps) == expected, "the arithmetic of the case"
+        assert is_lined_up(math.degrees(place), (0.0, 2000.0), side=side, laps=laps, away=away) == expected
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize(("north", "segment"), [(200.0, 0.0), (100.0, 28.955), (0.1, 59.97)])
+def test_for_a_target_within_the_circle_it_leaves_at_the_tangent_next_to_it(
+    side: float, north: float, segment: float
+) -> None:
+    """`ModeLoiter::isHeadingLinedUp`: ahead of the target by twice asin((r - d) / 2 r), at most 60 degrees."""
+    for off, expected in ((0.0, True), (9.0, True), (-9.0, True), (11.0, False), (-11.0, False)):
+        assert is_lined_up(-side * segment + off, (0.0, north - 1e-6), side=side) == expected
+    # An item at the same place, as after a jump back, has no bearing.
+    for place in (0.0, 120.0, 240.0):
+        assert is_lined_up(place, (0.0, 1e-9), side=side)
+
+
+def test_before_a_return_a_loiter_is_left_towards_0_north_0_east() -> None:
+    """The return's item has no position (`Plane::verify_loiter_heading`): its bearing counts, wherever home is."""
+    for place, expected in ((90.0, True), (99.0, True), (101.0, False), (-90.0, False)):
+        assert is_lined_up(place, (0.0, 1000.0), to=math.pi) == expected
+
+
+@pytest.mark.parametrize(
+    ("last", "angle", "target_north", "kept"),
+    [
+        (170.0, -175.0, -1000.0, 170.0),  # straight behind, and the side would change
+        (170.0, 175.0, -1000.0, 175.0),
+        (160.0, -175.0, -1000.0, -175.0),  # 162 degrees: only while both are beyond
+        (170.0, -160.0, -1000.0, -160.0),
+        (170.0, -175.0, 1000.0, -175.0),  # the target is not behind
+        (0.0, -175.0, -1000.0, -175.0),
+    ],
+)
+def test_a_turn_by_almost_180_degrees_keeps_its_side(
+    last: float, angle: float, target_north: float, kept: float
+) -> None:
+    """`AP_L1_Control::_prevent_indecision`."""
+    own = memory(l1_angle=math.radians(last))
+    for _ in range(2):
+        found = keep_turn_side(flying(), math.radians(angle), 0.0, target_north, own)
+        assert math.degrees(found) == pytest.approx(kept)
+        assert math.degrees(own.l1_angle) == pytest.approx(kept)
+
+
+def test_a_return_straight_behind_turns_to_the_side_that_it_has_begun_to() -> None:
+    """A roll that lags may carry the course across 180 degrees: the demanded side remains."""
+    way = waypoints((0, 0, 500), (0, 1000, 500), (0, -5000, 500))
+    way["is_rtl"][1:], way["loiter_radius"][1:], way["centre_north"][1:] = True, 60.0, -5000.0
+    own = memory()
+    for course in (-0.05, 0.05):
+        navigate_legs(flying(0.0, 1000.0, course=course), way, parameters(), own, 1.0, 0.1)
+        assert own.lateral_acceleration < 0.0
 
 
 def test_the_next_legs_line_begins_where_the_loiter_is_left_if_its_item_asks_for_that() -> None:

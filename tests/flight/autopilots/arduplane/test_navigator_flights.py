@@ -124,7 +124,8 @@ def test_circles_that_harm_nothing_are_flyable(flight: str) -> None:
     ],
 )
 def test_without_end_the_items_radius_is_flown_and_for_a_time_never(command: int, params: str, radius: float) -> None:
-    onward = () if command == 17 else (wp(-3000, 1000),)
+    # It comes from the south and goes around to the right: to the east it leaves after half of a circle.
+    onward = () if command == 17 else (wp(3000, 2000),)
     read = mission(wp(0, 0, 0.0), wp(0, 1500, 0.0, command=command, p=params), *onward)
     setup = setup_by_law(read)
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).with_parameters(WP_LOITER_RAD=250.0)

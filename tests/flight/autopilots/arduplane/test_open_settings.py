@@ -21,6 +21,7 @@ ICE_IDLE_PCT 0
 ICE_IDLE_RPM -1
 TKOFF_OPTIONS 0
 TKOFF_ACCEL_CNT 1
+TKOFF_ALT 50
 TKOFF_TDRAG_ELEV 0
 TKOFF_FLAP_PCNT 0
 TKOFF_THR_IDLE 0
@@ -120,6 +121,10 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
         ("THR_MIN -100\nUSE_REV_THRUST 64", IN_THE_AIR, ""),
         ("THR_MIN -100\nUSE_REV_THRUST 64", IN_THE_AIR._replace(returns=True), "THR_MIN -100 and USE_REV_THRUST 64"),
         ("USE_REV_THRUST 1", EVERYTHING, ""),
+        # A take-off banks freely from three times TKOFF_LVL_ALT, 30 m, or from TKOFF_ALT.
+        ("TKOFF_ALT 29", FROM_GROUND, "TKOFF_ALT 29 frees the bank of the take-off below 30 m"),
+        ("TKOFF_ALT 30", FROM_GROUND, ""),
+        ("TKOFF_ALT 29", IN_THE_AIR, ""),
     ],
 )
 def test_settings_that_depend_on_others(text: str, mission: MissionParts, expected: str) -> None:

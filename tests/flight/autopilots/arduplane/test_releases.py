@@ -177,3 +177,69 @@ def test_a_file_of_47_that_46_flies_states_the_older_name(tmp_path: Path) -> Non
     assert notes[1:] == (f"{file}: ALT_SLOPE_MIN is named GLIDE_SLOPE_MIN in ArduPlane 4.6",)
     # A name of the release that flies needs no note.
     assert choose_release("4.7", str(file)).notes == ()
+
+
+def names_by_release() -> dict[str, frozenset[str]]:
+    """The names of ArduPlane's parameter references, by release."""
+    names: dict[str, set[str]] = {release: set() for release in ("4.4", "4.5", "4.6", "4.7")}
+    releases: list[str] = []
+    for line in Path(__file__).with_name("parameter_names.txt").read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            releases = line.strip("[]").split()
+        elif not line.startswith("#"):
+            for release in releases:
+                names[release].update(line.split())
+    return {release: frozenset(found) for release, found in names.items()}
+
+
+LISTED = names_by_release()
+# Parameters that a release removed, or replaced by one of another meaning (ARMING_CHECK by ARMING_SKIPCHK).
+REMOVED = {
+    "4.5": {"GPS_BLEND_TC", "RELAY_DEFAULT"}
+    | {f"CAN_D{number}_{name}" for number in "123" for name in ("KDE_NPOLE", "TST_ID", "TST_LPR8")},
+    "4.6": {"GPS_MIN_DGPS"},
+    "4.7": {"ARMING_CHECK", "ARM_C_RTL_ALT", "EK3_MAX_FLOW", "FLOW_HGT_OVR", "FS_SHORT_TIMEOUT", "PLND_ORIENT"}
+    | {f"CAM_RC_{name}" for name in ("BTN_DELAY", "BT_DELAY", "CONTROL", "FEATURES", "MDE_DELAY", "TYPE")}
+    | {f"VIEP_{name}" for name in ("CAM_SWHIGH", "CAM_SWLOW", "CAM_SWMID", "DEBUG", "ZOOM_MAX", "ZOOM_SPEED")}
+    | {"SYSID_ENFORCE"},
+}
+
+
+@pytest.mark.parametrize(("before", "release"), [("4.4", "4.5"), ("4.5", "4.6"), ("4.6", "4.7")])
+def test_every_name_that_a_release_gave_up_is_renamed_or_removed(before: str, release: str) -> None:
+    """The references of 4.4 and 4.5 list the GPS names of both 4.5 and 4.6."""
+    given_up = LISTED[before] - LISTED[release]
+    assert given_up - set(RENAMED[release]) == REMOVED[release]
+    assert set(RENAMED[release].values()) <= LISTED[release]
+    if release != "4.6":
+        assert set(RENAMED[release]) <= given_up
+
+
+@pytest.mark.parametrize(("release", "version"), [("4.5", "4.6"), ("4.6", "4.6"), ("4.7", "4.7")])
+def test_every_parameter_of_a_release_is_read_or_said_not_to_be_used(
+    release: str, version: ArduPlaneVersion, tmp_path: Path
+) -> None:
+    """A file with all of the list: each name is read under its present name, or is among those that are not used."""
+    # Of a parameter that the references list under two names, a file has one.
+    names = {
+        name for name in LISTED[release] if name_in_release(name, "4.7") in (name, *(set(RENAMED["4.7"].values())))
+    }
+    assert len(names) > 4000
+    defaults = {name: definition.default / factor for name, (definition, factor) in TABLE.by_any_name.items()}
+    text = "".join(f"{name} {defaults.get(name, 1.0):.10g}\n" for name in sorted(names))
+    file = tmp_path / "all.param"
+    file.write_text(text, encoding="utf-8")
+    made = ArduPilotParameters.load(load_aircraft("aerosonde"), file, version)
+    read, unused = set(made.by_origin("file")), set(made.unused)
+    assert not read & unused
+    present = {name: TABLE.by_any_name[name][0].name for name in names if name in TABLE.by_any_name}
+    assert read == set(present.values()) - ({"CLIMB_SLOPE_HGT"} if version == "4.6" else set())
+    assert unused == names - {name for name, known in present.items() if known in read}
+    # The renamed ones are said in one line.
+    renamed = {name for name in names if name_in_release(name, version) != name}
+    notes = " ".join(choose_release(version, str(file)).notes)
+    for name in renamed & TABLE.by_any_name.keys():
+        assert f"{name} is named {name_in_release(name, version)}" in notes
+    left = len(renamed - TABLE.by_any_name.keys())
+    assert ("not used:" in notes) == (left > 0)
+    assert (f"+{left - 1} more renamed" in notes) == (left > 1)

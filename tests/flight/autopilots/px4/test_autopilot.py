@@ -99,6 +99,47 @@ def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
     assert sorted(left) == sorted(values | others)
 
 
+@pytest.mark.parametrize(
+    ("values", "has_fence", "opens"),
+    [
+        ({"GF_PREDICT": 1.0}, True, True),
+        ({"GF_PREDICT": 1.0}, False, False),
+        ({"GF_PREDICT": 1.0, "GF_ACTION": 1.0}, True, False),  # a warning
+        ({}, True, False),
+    ],
+)
+def test_a_predicted_breach_of_the_missions_fence_leaves_the_verdict_open(
+    values: dict[str, float], has_fence: bool, opens: bool
+) -> None:
+    """`Navigator::geofence_breach_check` up to 1.17."""
+    made = Px4(Px4Parameters.defaults().changed(**values))
+    assert [text.split()[0] for text in made.settings_not_flown(MissionParts(has_fence=has_fence))] == [
+        "GF_PREDICT"
+    ] * opens
+
+
+@pytest.mark.parametrize(
+    ("values", "used"),
+    [
+        ({}, None),
+        ({"COM_LOW_BAT_ACT": 2.0, "BAT1_CAPACITY": 4000.0, "BAT_CRIT_THR": 0.25}, 3000.0),
+        ({"COM_LOW_BAT_ACT": 3.0}, float("nan")),  # by the voltage
+        ({"COM_LOW_BAT_ACT": 0.0, "BAT1_CAPACITY": 4000.0}, None),
+    ],
+)
+def test_a_critical_charge_leaves_the_mission_by_com_low_bat_act(values: dict[str, float], used: float | None) -> None:
+    """`Failsafe::fromBatteryWarningActParam`: 2 lands and 3 returns at BAT_CRIT_THR."""
+    found = Px4(Px4Parameters.defaults().changed(**values)).battery_failsafes
+    assert [one.used_charge for one in found] == pytest.approx([] if used is None else [used], nan_ok=True)
+
+
+def test_a_return_of_type_3_may_be_to_the_missions_landing() -> None:
+    """`RTL::findRtlDestination` counts it for types 1 and 3."""
+    for kind, may in ((0, False), (1, True), (3, True), (5, False)):
+        made = Px4(Px4Parameters.defaults().changed(RTL_TYPE=float(kind)))
+        assert made.return_rules.may_use_landing == may
+
+
 def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     # 100 m down in 1,000 m: 40 s at 25 m/s, in which 2 m/s take it 80 m; within 10 m it has arrived.
     setup = make_setup([[0, 0, 600.0], [0, 1000, 500.0]])

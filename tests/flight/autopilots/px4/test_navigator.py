@@ -256,3 +256,47 @@ def test_a_return_climbs_with_the_radius_of_loiters(loiters: float, returns: flo
     # Around the place where it began, to the right: on the circle's east it flies south, with V^2 / r to the west.
     navigate(flying(loiters, 0.0, 500.0, course=math.pi), route, 0.0, 0.0, 25.0, made, own, DT)
     assert own.lateral_acceleration == pytest.approx(25.0**2 / loiters, rel=1e-6)
+
+
+def test_a_return_is_flown_straight_to_its_target_from_wherever_its_climb_ends() -> None:
+    """`RtlDirect::set_rtl_item` flies a loiter from the start: there is no line to come back to."""
+    route = waypoints((0.0, 0.0, 500.0), (0.0, 5000.0, 500.0), is_rtl=True, loiter_radius=80.0, centre_north=5000.0)
+    own, made = memory(), parameters()
+    navigate(flying(0.0, 0.0, 600.0), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert own.rtl_climb_complete
+    # 300 m beside the line from where it began.
+    course = math.atan2(-300.0, 4000.0)
+    navigate(flying(300.0, 1000.0, 600.0, course=course), route, 0.0, 0.0, 25.0, made, own, DT)
+    assert own.lateral_acceleration == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("up", "fields", "leg", "loiters"),
+    [
+        (505.1, {}, 1, False),
+        # NAV_FW_ALTL_RAD, 5 m, before a landing; a circle is still begun at NAV_FW_ALT_RAD, 10 m, only.
+        (505.1, {"precedes_landing": True}, 0, False),
+        (504.9, {"precedes_landing": True}, 1, False),
+        (510.1, {"precedes_landing": True}, 0, True),
+        # A waypoint of a mission's landing is accepted at any height, and never circled.
+        (560.0, {"ignores_altitude": True}, 1, False),
+        (560.0, {"ignores_altitude": True, "precedes_landing": True}, 1, False),
+    ],
+)
+def test_before_a_landing_a_waypoint_is_accepted_at_other_heights(
+    up: float, fields: dict[str, bool], leg: int, loiters: bool
+) -> None:
+    """`Navigator::get_altitude_acceptance_radius`, `Mission::setActiveMissionItems`, `handle_setpoint_type`."""
+    own, route = memory(), waypoints(*LEGS, **fields)
+    for _ in range(round(SWITCH_DELAY / DT) + 2):
+        navigate(flying(0.0, 991.0, up), route, 0.0, 0.0, 25.0, parameters("1.17"), own, DT)
+        if own.leg:
+            break
+    assert (own.leg, bool(own.is_loitering)) == (leg, loiters)
+
+
+@pytest.mark.parametrize(("up", "leg"), [(605.1, 0), (604.9, 2)])
+def test_a_loiter_before_a_landing_is_left_within_the_tighter_height(up: float, leg: int) -> None:
+    own, route = memory(rim_reached=True), to_a_loiter(loiters_to_altitude=True, loiter_time=0.0, precedes_landing=True)
+    fly_on(flying(0.0, 891.0, up), route, own, 1.0)
+    assert own.leg == leg

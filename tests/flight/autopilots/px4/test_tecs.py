@@ -85,17 +85,25 @@ def test_no_climb_beyond_the_limits_is_asked_for(off: float, rate: float) -> Non
     assert own.pitch_setpoint == pytest.approx(rate / 25.0, rel=1e-3)
 
 
-@pytest.mark.parametrize(("demand", "throttle"), [(60.0, 0.8), (10.0, 0.3)])
+@pytest.mark.parametrize(
+    ("demand", "throttle"), [(60.0, 0.6 + 0.4 * 0.5 * 31.0 / 25.0), (10.0, 0.6 - 0.6 * 0.5 * 18.0 / 25.0)]
+)
 def test_a_change_of_speed_takes_half_of_the_energy_there_is(demand: float, throttle: float) -> None:
-    # Half way from trim, 0.6, to full throttle and to idle, whatever FW_T_CLMB_MAX and FW_T_SINK_MIN are.
+    """`_calcSpecificEnergyRates`: the demanded speed, 31 or 18 m/s, times half of the energy rates over 25 m/s.
+
+    It is a share of the way from trim, 0.6, to full throttle or to idle, whatever the energy rates are.
+    """
     own = memory(tas_setpoint=demand)
     demanded(own, FW_T_THR_DAMPING=0.0, FW_T_THR_INTEG=0.0, FW_THR_MIN=0.0, FW_THR_MAX=1.0)
     assert own.throttle_setpoint == pytest.approx(throttle)
 
 
-@pytest.mark.parametrize(("weight", "of_height", "of_speed"), [(0.0, 1.0, 0.0), (1.0, 1.0, 1.0), (2.0, 0.0, 1.0)])
-def test_neither_height_nor_speed_weighs_more_than_one(weight: float, of_height: float, of_speed: float) -> None:
-    # 5 m low: 1 m/s is asked for; 1.25 m/s fast: 0.25 m/s^2 less.  Their angles: g x 1 and 25 x 0.25 by 25 g.
+@pytest.mark.parametrize(("weight", "of_height", "of_speed"), [(0.0, 2.0, 0.0), (1.0, 1.0, 1.0), (2.0, 0.0, 2.0)])
+def test_the_weights_of_height_and_speed_are_two_together(weight: float, of_height: float, of_speed: float) -> None:
+    """`_updateSpeedAltitudeWeights` of 1.16 and later.
+
+    5 m low: 1 m/s is asked for; 1.25 m/s fast: 0.25 m/s^2 less.  Their angles: g x 1 and 23.75 x 0.25 by 25 g.
+    """
     own = memory(altitude_reference=505.0, altitude_setpoint=505.0, tas_setpoint=23.75)
     for _ in range(40):
         update_tecs(
@@ -114,7 +122,7 @@ def test_neither_height_nor_speed_weighs_more_than_one(weight: float, of_height:
             1.0,
             DT,
         )
-    assert own.pitch_setpoint == pytest.approx((of_height * G * 1.0 + of_speed * 25.0 * 0.25) / (25.0 * G), rel=1e-3)
+    assert own.pitch_setpoint == pytest.approx((of_height * G * 1.0 + of_speed * 23.75 * 0.25) / (25.0 * G), rel=1e-3)
 
 
 def test_the_throttles_rate_is_a_share_of_its_range() -> None:
@@ -166,13 +174,15 @@ def test_thin_air_takes_more_throttle_and_a_bank_more_energy() -> None:
 
 def test_a_speed_is_taken_up_by_one_metre_a_second_squared_within_its_limits() -> None:
     own = memory()
-    for _ in range(40):
-        demanded(own, FW_AIRSPD_MAX=24.5)
+    demanded(own, FW_AIRSPD_MAX=24.5)
     assert own.tas_setpoint == pytest.approx(24.5)
+    # A minimum that a bank raises, and the maximum, apply at once (`adapt_airspeed_setpoint`).
     own = memory(roll_setpoint=math.radians(60.0))
-    for _ in range(80):
-        demanded(own, FW_AIRSPD_MIN=20.0)
+    demanded(own, FW_AIRSPD_MIN=20.0)
     assert own.tas_setpoint == pytest.approx(20.0 * math.sqrt(2.0))
+    own = memory(tas_setpoint=40.0)
+    demanded(own)
+    assert own.tas_setpoint == pytest.approx(31.0)
     own = memory(tas_setpoint=20.0)
     for _ in range(20):
         demanded(own)
@@ -184,3 +194,37 @@ def test_speed_comes_first_below_the_least(speed: float, expected: float) -> Non
     # 18 m/s less 15 % of 25 m/s, and as much less again.
     made = parameters(FW_AIRSPD_MIN=18.0, FW_AIRSPD_TRIM=25.0, FW_AIRSPD_MAX=31.0)
     assert detect_underspeed(speed, made) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("eas_to_tas", "throttle"), [(1.0, 0.6 * (1.0 - 1.0 / 2.0)), (1.1, 0.66 * (1.0 - 1.0 / 2.2))])
+def test_in_thin_air_the_least_sink_is_faster(eas_to_tas: float, throttle: float) -> None:
+    """`getMinimumSinkRate`: FW_T_SINK_MIN, 2 m/s, by the root of the density; 1 m/s of sink is a share of it."""
+    own = memory(altitude_reference=495.0, altitude_setpoint=495.0, ste_rate=-G)
+    made = parameters(FW_AIRSPD_MIN=18.0, FW_AIRSPD_TRIM=25.0, FW_AIRSPD_MAX=31.0, FW_THR_MIN=0.0)
+    update_tecs(state(), flying(climb=-1.0), made, own, 25.0 / eas_to_tas, eas_to_tas, DT)
+    assert own.throttle_setpoint == pytest.approx(throttle, abs=1e-3)
+
+
+@pytest.mark.parametrize(("speed", "share"), [(18.0, 1.0), (12.375, 0.5), (10.5, 0.0)])
+def test_the_throttles_integrator_pauses_below_the_least_speed(speed: float, share: float) -> None:
+    """`_calcThrottleControlUpdate`: 1 less the underspeed ratio; 0.02 of the missing energy rate over (5 + 2) g."""
+    own = memory(tas=speed, tas_setpoint=speed, altitude_reference=502.5, altitude_setpoint=502.5)
+    demanded(own, speed=speed, FW_T_TAS_TC=1e9)
+    missing = 0.5 * G
+    assert own.throttle_integrator == pytest.approx(share * 0.02 * missing / (7.0 * G) * DT, rel=1e-3, abs=1e-12)
+
+
+def test_the_pitchs_integrator_is_an_angle_at_any_speed() -> None:
+    """`_calcPitchControlOutput` adds it to the angle: it does not grow where the aircraft is slower."""
+    for speed in (20.0, 25.0, 30.0):
+        own = memory(tas=speed, tas_setpoint=speed, pitch_integrator=0.04, pitch_setpoint=0.04)
+        update_tecs(
+            state(airspeed=speed),
+            flying(),
+            parameters(FW_AIRSPD_MIN=18.0, FW_AIRSPD_TRIM=25.0, FW_AIRSPD_MAX=31.0),
+            own,
+            speed,
+            1.0,
+            DT,
+        )
+        assert own.pitch_setpoint == pytest.approx(0.04, abs=1e-9)

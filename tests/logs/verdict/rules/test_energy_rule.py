@@ -72,7 +72,7 @@ def test_a_voltage_at_which_arduplane_leaves_the_mission_is_said_not_to_be_judge
     law = ArduPlane(ArduPilotParameters.of_text("BATT_LOW_VOLT 21\nBATT_FS_LOW_ACT 2\n", "mine.param"))
     item = of(judge_geometry(replace(real_setup(), autopilot=law)), "energy")
     assert item.ok
-    assert "whether the voltage falls below BATT_LOW_VOLT 21, which leaves the mission, is not judged" in item.reason
+    assert "whether the battery falls below BATT_LOW_VOLT 21, which leaves the mission, is not judged" in item.reason
 
 
 def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:

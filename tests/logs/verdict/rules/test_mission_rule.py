@@ -394,6 +394,22 @@ def test_settings_leave_the_verdict_open_where_an_item_makes_them_matter(lines: 
         ({"COM_WIND_MAX": 5.0, "COM_WIND_MAX_ACT": 2.0}, ("COM_WIND_MAX 5",)),
         ({"COM_WIND_MAX": 5.0, "COM_WIND_MAX_ACT": 1.0}, ()),
         ({"COM_WIND_MAX": 7.0, "COM_WIND_MAX_ACT": 2.0}, ()),
+        # A slower pitch than the simulated 60 degrees per second; a faster one is not reached.
+        ({"FW_P_RMAX_POS": 45.0, "FW_P_RMAX_NEG": 59.0}, ("FW_P_RMAX_POS 45", "FW_P_RMAX_NEG 59")),
+        ({"FW_P_RMAX_POS": 120.0, "FW_P_RMAX_NEG": 60.0}, ()),
+        # `checkLowHeightConditions`: both are needed.
+        ({"FW_T_THR_LOW_HGT": 30.0, "FW_LND_THRTC_SC": 0.5}, ("FW_LND_THRTC_SC 0.5",)),
+        ({"FW_T_THR_LOW_HGT": 30.0}, ()),
+        ({"FW_LND_THRTC_SC": 0.5}, ()),
+        # CBRK_FLIGHTTERM 121212, the default, terminates no flight; FW_R_LIM is 50, FW_P_LIM_MAX 30 degrees.
+        ({"FD_FAIL_R": 45.0}, ()),
+        ({"FD_FAIL_R": 45.0, "CBRK_FLIGHTTERM": 0.0}, ("FD_FAIL_R 45",)),
+        ({"FD_FAIL_P": 30.0, "CBRK_FLIGHTTERM": 0.0}, ("FD_FAIL_P 30",)),
+        ({"FD_FAIL_R": 51.0, "FD_FAIL_P": 0.0, "CBRK_FLIGHTTERM": 0.0}, ()),
+        # 1.17 returns at a low remaining time only where that is stated, and knows it only with a capacity.
+        ({"BAT1_CAPACITY": 5000.0}, ()),
+        ({"BAT1_CAPACITY": 5000.0, "COM_FLTT_LOW_ACT": 3.0}, ("COM_FLTT_LOW_ACT 3",)),
+        ({"COM_FLTT_LOW_ACT": 3.0}, ()),
         # These matter in a return, and with a payload.
         ({"RTL_DESCEND_ALT": 50.0, "RTL_LAND_DELAY": 0.0, "RTL_TYPE": 2.0, "MIS_COMMAND_TOUT": 5.0}, ()),
         # 1.17 has no such parameter.
@@ -447,3 +463,27 @@ def test_settings_of_px4_leave_the_verdict_open_where_an_item_makes_them_matter(
 
 def test_px4_1_16_may_keep_no_minimum_ground_speed() -> None:
     assert unflown_by_px4({"NPFG_EN_MIN_GSP": 0.0}, *RETURN[:2], version="1.16") == ["NPFG_EN_MIN_GSP 0"]
+
+
+@pytest.mark.parametrize(("values", "said"), [({}, ["COM_FLTT_LOW_ACT 3"]), ({"COM_FLTT_LOW_ACT": 1.0}, [])])
+def test_px4_1_16_returns_at_a_low_remaining_time_by_default(values: dict[str, float], said: list[str]) -> None:
+    """COM_FLTT_LOW_ACT is 3 by default in 1.16 and 0 in 1.17."""
+    assert unflown_by_px4({"BAT1_CAPACITY": 5000.0} | values, *RETURN[:2], version="1.16") == said
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("0 50 60", "DO_CHANGE_SPEED to 50 m/s with a throttle sets TRIM_THROTTLE"),
+        ("0 5 60", "DO_CHANGE_SPEED to 5 m/s with a throttle sets TRIM_THROTTLE"),
+        ("0 15 60", ""),  # within AIRSPEED_MIN 9 to AIRSPEED_MAX 22: the airspeed, and no throttle
+        ("0 50 -1", ""),
+        ("1 50 60", ""),  # a minimum ground speed, and no throttle
+    ],
+)
+def test_a_throttle_with_an_airspeed_beyond_the_limits_leaves_the_verdict_open(change: str, said: str) -> None:
+    """`Plane::do_change_speed` of 4.6.3: the case of an airspeed that is not accepted falls through to the throttle."""
+    lines = (wp(0, 0), wp(0, 900), f"2 178 {change} 0 0 0 0", wp(0, 1800))
+    law = ArduPlane(ArduPilotParameters.defaults())
+    left = [item for item in mission_findings(replace(setup_of(*lines), autopilot=law)) if item.check == "not flown"]
+    assert [item.reason.startswith(said) for item in left] == [True] * bool(said)
