@@ -304,7 +304,7 @@ def make_own_folder(
     1124.9
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    files = _renamed_files(source, target.name, model or {})
+    files = _files_under_new_name(source, target.name, model or {})
     write_own_folder(target, files)
     return tuple(sorted(files))
 
@@ -343,8 +343,11 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     return target
 
 
-def _renamed_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the files of the new folder by path: the files of aircraft and model, renamed to the new name."""
+def _files_under_new_name(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the content of the new folder's files by path: those of the aircraft and of its model, under the new name.
+
+    model: files of the flight model by path; empty if the new aircraft keeps using the shipped model.
+    """
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]
     files = {}
@@ -355,8 +358,8 @@ def _renamed_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> d
         new_path = path if path.stem != source.name else path.with_name(f"{name}{path.suffix}")
         files[str(new_path)] = file.read_bytes()
     metadata = files[f"{name}.toml"].decode("utf-8").replace(f"{source.name}.xml", f"{name}.xml")
-    shipped = f"{source.model.shipped}.xml"
-    files |= {f"{name}.xml" if file == shipped else file: data for file, data in model.items()}
-    entry = "" if model else rf'\g<1>"{source.model.shipped}"\n'
-    files[f"{name}.toml"] = _SHIPPED_ENTRY.sub(entry, metadata).encode()
+    shipped_model_file = f"{source.model.shipped}.xml"
+    files |= {f"{name}.xml" if file == shipped_model_file else file: data for file, data in model.items()}
+    shipped_model_entry = "" if model else rf'\g<1>"{source.model.shipped}"\n'
+    files[f"{name}.toml"] = _SHIPPED_ENTRY.sub(shipped_model_entry, metadata).encode()
     return files

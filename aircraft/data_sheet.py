@@ -489,10 +489,10 @@ def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
     """Return a function for the drag, N, of level flight at an airspeed, m/s."""
 
     def drag(airspeed: float) -> float:
-        area_pressure = 0.5 * SHEET_DENSITY * airspeed**2 * sheet.area
+        area_times_pressure = 0.5 * SHEET_DENSITY * airspeed**2 * sheet.area
         # The drag depends only on the angle of attack, as in the model; the elevator's lift is neglected.
-        lift = _weight(sheet) / area_pressure
-        return area_pressure * (aero.drag_min + aero.drag_lift * lift**2)
+        lift_coefficient = _weight(sheet) / area_times_pressure
+        return area_times_pressure * (aero.drag_min + aero.drag_lift * lift_coefficient**2)
 
     return drag
 

@@ -109,8 +109,8 @@ def _check_layout(file: Path, source: Any) -> None:
         raise TerrainError.at(file, "bands", source.count, allowed, shown=f"{source.count} of kind {number_kind!r}")
     block_pixels = math.prod(source.block_shapes[0])
     if block_pixels > MAX_BLOCK_PIXELS:
-        allowed = f"at most {MAX_BLOCK_PIXELS:,} are; tile the file"
-        raise TerrainError.at(file, "pixels of a block, read whole", block_pixels, allowed, shown=f"{block_pixels:,}")
+        allowed = f"at most {MAX_BLOCK_PIXELS:,} are read at once; save the file with tiles"
+        raise TerrainError.at(file, "pixels of a block", block_pixels, allowed, shown=f"{block_pixels:,}")
     require_min_pixels(file, (source.height, source.width))
 
 

@@ -111,12 +111,12 @@ def _count_empty(heights: Heights) -> int:
 
 
 def _write_geotiff(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
-    """Write a GeoTIFF atomically.  grid: affine coefficients from columns and rows to the reference system."""
+    """Write a GeoTIFF atomically.  grid: affine coefficients that convert columns and rows to coordinates."""
     if heights.size > MAX_PIXELS:
-        allowed = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
-        raise TerrainError(f"{out}: {allowed}", file=out, value=heights.size, allowed=allowed)
+        message = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
+        raise TerrainError(f"{out}: {message}", file=out, value=heights.size, allowed=message)
     if _count_empty(heights) == heights.size:
-        raise TerrainError(f"{out}: no data in the area: the tiles have none there", file=out)
+        raise TerrainError(f"{out}: the tiles have no data in the area", file=out)
     filled_heights = np.where(is_ground(heights), heights, np.float32(_NODATA))
     write_whole(out, geotiff_bytes(filled_heights, tuple(grid), crs, _NODATA))
 

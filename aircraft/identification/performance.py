@@ -118,7 +118,7 @@ def _elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
-    """Return the path angle (m,), rad, at a throttle."""
+    """Return the flight path angle of each set of values, rad (m,), at a given throttle (m,)."""
     thrust, _ = _thrust(base, values, airspeed, throttle, density)
     angle = np.zeros(len(values))
     for _ in range(12):

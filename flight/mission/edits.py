@@ -126,7 +126,9 @@ def insert_waypoint(
     """
     previous_item = movable_item(mission, previous_index)
     if len(mission.items) >= MAX_EDITED:
-        raise MissionError(f"{mission.source}: {MAX_EDITED} items: no more can be edited here", file=mission.source)
+        raise MissionError(
+            f"{mission.source}: already has {MAX_EDITED} items, the most that can be edited here", file=mission.source
+        )
     radius = previous_item.params[1] if previous_item.command == Command.NAV_WAYPOINT else 0.0
     index = insertion_index(mission, previous_index)
     waypoint = MissionItem(

@@ -112,15 +112,15 @@ def open_log(path: Path) -> "RawLog":
 
 
 def log_format(path: Path, head: bytes) -> LogFormat:
-    """Return the format of a file, by its first bytes and its suffix, or by only its suffix.
+    """Return the format that fits a file's first bytes and suffix, else its first bytes only, else its suffix only.
 
-    Raises LogError if neither is known, and for a dataflash log as text.
+    Raises LogError if neither is known, and for a dataflash log that was converted to text.
 
     >>> log_format(Path("flight.igc"), b"<gpx>").name, log_format(Path("a.BIN"), bytes(9)).name
     ('.gpx', 'ArduPilot .BIN')
     """
     if re.search(_AS_TEXT, head, re.IGNORECASE):
-        raise LogError(f"{path}: a dataflash log as text; planfly reads the .BIN from which it was made", file=path)
+        raise LogError(f"{path}: a dataflash log converted to text; open the .BIN from which it was made", file=path)
     by_content = [log_type for log_type in FORMATS if re.search(log_type.content, head, re.DOTALL | re.IGNORECASE)]
     by_suffix = [log_type for log_type in FORMATS if _suffix(path) in log_type.suffixes]
     if not by_content and not by_suffix:

@@ -227,9 +227,9 @@ FIGURES = (
         "Return to launch, or engine failure",
         _returns_view("return-heights"),
         alternative=_fixed_caption(
-            "Over time: the flight's height coloured by the outcome of a return, the lowest "
-            "height from which a return is safe, and the height that a glide without the engine "
-            "has left over."
+            "Over time: the flight's altitude coloured by the outcome of a return, the lowest "
+            "altitude from which a return is safe, and the altitude to spare of a glide without "
+            "the engine."
         ),
         caption=_fixed_caption(
             "Lowest safe height: the lowest height from which a return is safe. Where a return "

@@ -56,7 +56,7 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | N
 
 def _glide_text(glide: Glide, drawn_returns: DrawnReturns) -> str:
     altitude_left = drawn_returns.glides.altitude_left(glide)
-    left_text = f", {altitude_left:.0f} m left over" if altitude_left >= 0.0 else ""
+    left_text = f", {altitude_left:.0f} m of altitude to spare" if altitude_left >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
 
 

@@ -164,7 +164,7 @@ def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tu
 
 
 def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track | None) -> Chart | None:
-    """Chart flown altitudes by outcome of a return, minimum safe altitudes, and margins of glides, over time.
+    """Chart over time the flown altitude by the outcome of a return, the lowest safe altitude, and glide margins.
 
     Return None if no returns were judged.
     """
@@ -177,7 +177,7 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
     min_altitude, max_altitude = float(np.nanmin(altitudes)), float(np.nanmax(altitudes))
     margin = 0.06 * max(max_altitude - min_altitude, _MIN_SPAN)
     span = (min_altitude - margin, max_altitude + margin)
-    name = f"lowest height for a safe return (no line: none up to {safe_altitudes.search_range:.0f} m more)"
+    name = f"lowest altitude for a safe return (no line: not safe even {safe_altitudes.search_range:.0f} m higher)"
     layers = [
         *ground_bands(scenario, PathPlane(time, positions, ground, *span)),
         *path_layers(
@@ -188,7 +188,7 @@ def return_heights_chart(setup: FlightSetup, drawn_returns: DrawnReturns, track:
         ),
         Layer("line", name, "limit", safe_altitudes.time, safe_altitudes.altitude),
     ]
-    panels = [Panel("height", "m AMSL", tuple(layers), span=span)]
+    panels = [Panel("altitude", "m AMSL", tuple(layers), span=span)]
     if drawn_returns.glides.each:
         panels.append(_glide_margin_panel(drawn_returns.glides))
     return Chart(
@@ -224,10 +224,10 @@ def _glide_margin_panel(glides: Glides) -> Panel:
         column = np.array(values)
         return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
 
-    layers = [line("left over for home", "left-home", [glide.altitudes_left[0] for glide in glides.each])]
+    layers = [line("to spare for home", "left-home", [glide.altitudes_left[0] for glide in glides.each])]
     if len(glides.sites) > 1:
         best_site_margins = [max(glide.altitudes_left[1:]) for glide in glides.each]
-        layers.append(line("left over for a rally point or landing place", "left-site", best_site_margins))
-    layers.append(line("left over for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each]))
-    limits = (("nothing left over", 0.0),)
-    return Panel("height left over without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)
+        layers.append(line("to spare for a rally point or landing place", "left-site", best_site_margins))
+    layers.append(line("to spare for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each]))
+    limits = (("nothing to spare", 0.0),)
+    return Panel("altitude to spare without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)

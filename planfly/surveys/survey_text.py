@@ -97,7 +97,10 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
         max(measure.lost_at_start for measure in usable_lines),
         max(measure.length for measure in usable_lines),
     )
-    text = f"lines can be used from at most {latest_start:.0f} m behind their start; the longest has {max_length:.0f} m"
+    text = (
+        f"every usable line can be used from {latest_start:.0f} m after its start, or earlier;"
+        f" the longest line is {max_length:.0f} m long"
+    )
     return (
         f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} have no usable part"
         if len(usable_lines) < len(lines)

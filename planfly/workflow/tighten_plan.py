@@ -85,7 +85,7 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
     if not changes:
         # These limits are tightened only if the flight followed slopes and turns.  A flight that cannot follow its plan
         # is also too low or too close, which is not a separate cause.
-        changes = _raise_clearance(spec, scenario, failed_findings) + _enlarge_missiles(spec, failed_findings)
+        changes = _raise_clearance(spec, scenario, failed_findings) + _enlarge_missile_spheres(spec, failed_findings)
         changes += _lower_max_height(spec, scenario, failed_findings) + _widen_zone_margin(
             spec, scenario, failed_findings
         )
@@ -183,13 +183,14 @@ def _widen_zone_margin(spec: Spec, scenario: Scenario, failed_findings: list[Fin
     return [Tightening("zone_margin_m", current, tightened)]
 
 
-def _enlarge_missiles(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
+def _enlarge_missile_spheres(spec: Spec, failed_findings: list[Finding]) -> list[Tightening]:
     changes = []
     for finding in failed_findings:
         if finding.planned:
-            # The plan itself enters the sphere, because the planner found no path outside.  It would find none outside
-            # a larger sphere either.
+            # The plan itself enters the sphere, because the planner found no path outside it.  It would find none
+            # outside a larger sphere either.
             continue
+        # The nearest distance is negative inside the sphere.
         depth = next((-fact.value for fact in finding.facts if fact.what == "nearest"), None)
         if depth is None:
             continue

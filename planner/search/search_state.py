@@ -409,12 +409,15 @@ class Search:
         return result
 
     def best_path(self) -> tuple[Floats, Certificate]:
-        """Return the shorter of the archive's certified path and the shortened path, and its certificate."""
-        best = self.best_certified()
+        """Return the archive's best path or, if it is shorter or the only one that meets the goal, the shortened path.
+
+        The path (w, 3) is returned with its certificate.
+        """
+        path, certificate = self.best_certified()
         if self.shortest is None or (
-            self.meets_goal(best[1]) and path_length(best[0]) <= path_length(self.shortest[0])
+            self.meets_goal(certificate) and path_length(path) <= path_length(self.shortest[0])
         ):
-            return best
+            return path, certificate
         return self.shortest
 
     def _certify_vector(self, vector: Floats, path: Floats) -> Certificate:

@@ -130,7 +130,7 @@ def parse_span(text: str) -> tuple[datetime, datetime]:
     start_time = _parse_part(start_text) if separator else parse_time(start_text)
     end_time = _parse_part(end_text) if separator else start_time + DEFAULT_SPAN
     if not start_time <= end_time <= start_time + LONGEST_SPAN:
-        raise ValueError(f"allowed an end from the start on, at most {LONGEST_SPAN.days} days later")
+        raise ValueError(f"the end must not be before the start, nor more than {LONGEST_SPAN.days} days after it")
     return start_time, end_time
 
 

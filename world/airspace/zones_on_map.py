@@ -69,7 +69,7 @@ def add_corners(count: int, shape: Polygon | Cylinder) -> int:
     """
     count += 0 if isinstance(shape, Cylinder) else sum(map(len, shape.rings))
     if count > MAX_MAP_CORNERS:
-        raise ValueError(f"too many corners on the map: at most {MAX_MAP_CORNERS:,} are allowed in all zones")
+        raise ValueError(f"too many corners on the map: all zones together may have at most {MAX_MAP_CORNERS:,}")
     return count
 
 

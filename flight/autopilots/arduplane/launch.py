@@ -74,17 +74,14 @@ def takeoff_slew(parameters: ArduPilotParameters) -> float:
     return parameters.takeoff_slew or parameters.throttle_slew or math.inf
 
 
-def run_up(start_time: float, parameters: ArduPilotParameters) -> float:
-    """Return the time on the ground until full throttle, s; 0 if the motor starts in the launch or later.
+def run_up_time(start_time: float, parameters: ArduPilotParameters) -> float:
+    """Return the time on the ground until full throttle, s; 0 if the motor starts during the launch or after it.
 
-    start_time: result of `motor_start`, s.
+    start_time: result of `motor_start`, s; -inf if the motor starts on the ground before the launch.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> round(run_up(-math.inf, ArduPilotParameters.defaults()), 2), run_up(-0.4, ArduPilotParameters.defaults())
+    >>> parameters = ArduPilotParameters.defaults()
+    >>> round(run_up_time(-math.inf, parameters), 2), run_up_time(-0.4, parameters)
     (1.2, 0.0)
     """
-    return (
-        parameters.takeoff_delay + 1.0 / takeoff_slew(parameters)
-        if math.isinf(start_time) and start_time < 0.0
-        else 0.0
-    )
+    return parameters.takeoff_delay + 1.0 / takeoff_slew(parameters) if start_time == -math.inf else 0.0

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane, ArduPlaneFromGround
-from flight.autopilots.arduplane.launch import run_up
+from flight.autopilots.arduplane.launch import run_up_time
 from flight.autopilots.arduplane.releases import simulated_release
 from flight.autopilots.arduplane_sitl.ground_tick import program_ground_tick
 from flight.autopilots.arduplane_sitl.physics import JsonLockstep, PhysicsPort
@@ -95,8 +95,8 @@ class AutopilotFlight(SitlFlight):
         law = None if take_off is None else self._from_ground
         if take_off is None or take_off.launch.method == "runway" or not isinstance(law, ArduPlaneFromGround):
             return
-        run_up_time = run_up(law.motor_start, law.parameters)
-        deadline = self._lockstep.time + (run_up_time + _SPOOL_TIME_S if run_up_time else 0.0)
+        run_up_s = run_up_time(law.motor_start, law.parameters)
+        deadline = self._lockstep.time + (run_up_s + _SPOOL_TIME_S if run_up_s else 0.0)
         while self._lockstep.time < deadline:
             yield
 

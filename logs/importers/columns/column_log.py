@@ -243,7 +243,7 @@ class ColumnLog:
     def _times(self, name: str) -> Floats:
         """Return the times of a clock on the main clock."""
         self._check_overlap(name)
-        return self._own_times(name) + self._shift(name)
+        return self._own_times(name) + self._clock_shift(name)
 
     def _check_overlap(self, name: str) -> None:
         """Raise LogError for a clock without any time in common with the main clock, if nothing aligns it."""
@@ -258,24 +258,27 @@ class ColumnLog:
         time = self._clock(name).time
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
-    def _shift(self, name: str) -> float:
+    def _clock_shift(self, name: str) -> float:
+        """Return the shift that best aligns a clock's column with its partner, s; 0 if no alignment is asked for."""
         align = self.table.clocks[name].align
         if align is None:
             return 0.0
         if name not in self._shifts:
             clock, field = self._clock(name), f"clocks.{name}.align"
-            own = _numbers(
+            values = _numbers(
                 self._column(clock, align.column, f"{field}.column", name), self._place(clock.data, align.column)
             )
             partner = self._partner(align.partner, field)
-            known = np.isfinite(own)
-            time = self._own_times(name)[known]
-            found = find_clock_shift(time, own[known], *partner, align.within_s)
-            if found.correlation < _MIN_CORRELATION:
-                message = f"{align.column} and {align.partner} correlate by {found.correlation:.2f} at most"
-                allowed = f"expected {_MIN_CORRELATION:g} at a shift within {align.within_s:g} s"
-                raise LogError(f"{self.table_path}: {field}: {message}; {allowed}", file=self.table_path, field=field)
-            self._shifts[name] = found.shift
+            is_known = np.isfinite(values)
+            time = self._own_times(name)[is_known]
+            best = find_clock_shift(time, values[is_known], *partner, align.within_s)
+            if best.correlation < _MIN_CORRELATION:
+                message = f"{align.column} and {align.partner} have a correlation of at most {best.correlation:.2f}"
+                requirement = f"expected {_MIN_CORRELATION:g} at a shift within {align.within_s:g} s"
+                raise LogError(
+                    f"{self.table_path}: {field}: {message}; {requirement}", file=self.table_path, field=field
+                )
+            self._shifts[name] = best.shift
         return self._shifts[name]
 
     def _partner(self, name: str, field: str) -> tuple[Floats, Floats]:

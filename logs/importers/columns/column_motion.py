@@ -148,7 +148,7 @@ def read_air(log: ColumnLog) -> AirData:
         ratio = Samples(pressure.time, np.sqrt(_SEA_LEVEL_DENSITY / density)[:, np.newaxis])
     airspeed = true = _group(log, "airspeed")
     if len(airspeed.time):
-        factor = _ratio_at(ratio, _group(log, "altitude"), airspeed.time)[:, np.newaxis]
+        factor = _airspeed_ratio_at(ratio, _group(log, "altitude"), airspeed.time)[:, np.newaxis]
         if log.frame("airspeed") == "true":
             airspeed = Samples(airspeed.time, airspeed.values / factor)
         else:
@@ -169,8 +169,8 @@ def _logged_wind(log: ColumnLog) -> Samples:
     return NONE
 
 
-def _ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
-    """Return the ratio of true to indicated airspeed at some times, from the standard atmosphere if it is not given."""
+def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
+    """Return the ratio of true to indicated airspeed at the given times, by default of the standard atmosphere."""
     if len(ratio.time):
         return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
     amsl = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))

@@ -120,22 +120,22 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
-    """Return the maximum horizontal distance of any point from its nearest leg, m, and that point's row.
+    """Return the maximum horizontal distance of any point from its nearest leg, m, and the row of that point.
 
-    points: (n, 3).  legs: (k + 1, 3), the ends of k legs in a row.
+    points: (n, 3).  legs: (k + 1, 3), the ends of k consecutive legs.
 
     >>> legs = np.array([[0.0, 0.0, 0.0], [0.0, 100.0, 0.0], [100.0, 100.0, 0.0]])
     >>> farthest_from_legs(np.array([[5.0, 50.0, 0.0], [30.0, 60.0, 0.0], [50.0, 93.0, 0.0]]), legs)
     (30.0, 1)
     """
-    nearest_square = np.full(len(points), math.inf)
+    min_squared_distances = np.full(len(points), math.inf)
     for start, end in zip(legs[:-1, :2], legs[1:, :2], strict=True):
         leg_vector, offsets = end - start, points[:, :2] - start
         fractions = np.clip(offsets @ leg_vector / max(float(leg_vector @ leg_vector), 1e-12), 0.0, 1.0)
         leg_offsets = offsets - fractions[:, None] * leg_vector
-        nearest_square = np.minimum(nearest_square, (leg_offsets * leg_offsets).sum(axis=1))
-    row = int(np.argmax(nearest_square))
-    return math.sqrt(float(nearest_square[row])), row
+        min_squared_distances = np.minimum(min_squared_distances, (leg_offsets * leg_offsets).sum(axis=1))
+    row = int(np.argmax(min_squared_distances))
+    return math.sqrt(float(min_squared_distances[row])), row
 
 
 # ----------------------------------------------------------------------

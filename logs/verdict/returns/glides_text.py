@@ -73,7 +73,7 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe a time range: what is in reach, the altitude left over, and ArduPlane's own return."""
+    """Describe a time range: what is in reach, the altitude to spare, and ArduPlane's own return."""
     time_text = (
         f"{glide_range.first:.0f} s"
         if glide_range.count == 1
@@ -88,11 +88,11 @@ def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
     time_text = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"
     match glide.reach:
         case "home" | "site":
-            return f"{site_text(glides.sites[glide_range.site])}, {altitude_left:.0f} m left over{time_text}"
+            return f"{site_text(glides.sites[glide_range.site])}, {altitude_left:.0f} m of altitude to spare{time_text}"
         case "flat":
             east, north, up = glide.flat_position
             position_text = f"such as at {east:.0f} m east, {north:.0f} m north, {up:.0f} m AMSL"
-            return f"only flat ground, {position_text}, {altitude_left:.0f} m left over{time_text}"
+            return f"only flat ground, {position_text}, {altitude_left:.0f} m of altitude to spare{time_text}"
         case "nothing":
             shortfall_text = (
                 "no glide path exists" if math.isinf(altitude_left) else f"{-altitude_left:.0f} m are missing at most"

@@ -113,7 +113,7 @@ class GlideRange:
     """Time range with the same destination in reach and the same outcome of ArduPlane's return.
 
     first, last: s.  count: number of glides.  site: index of the site in `Glides.sites` with most altitude left, or -1.
-    lowest_glide: the glide with the least altitude left over at its best destination.
+    lowest_glide: the glide with the least altitude to spare at its best destination.
     """
 
     first: float

@@ -49,7 +49,7 @@ _SEGMENT_NAMES: dict[Kind, str] = {
 _ACTION_TEXTS = {
     "return": "returns",
     "land": "lands by its landing sequence",
-    "autoland": "lands in mode AUTOLAND, otherwise returns",
+    "autoland": "lands in mode AUTOLAND if it can, and otherwise returns",
     "on": "continues its mission",
     "circle": "circles where it is",
     "glide": "glides straight ahead without its motor, which is not a return",

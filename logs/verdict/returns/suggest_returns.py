@@ -157,9 +157,12 @@ class _ReturnTrial:
         self._order = list(range(len(starts)))[::-1]
 
     def passes(self, world: ReturnWorld, criterion: Criterion) -> bool:
-        """Return True if every return meets the requirements."""
-        for position, k in enumerate(self._order):
-            index = np.array([k])
+        """Return True if every return meets the criterion.
+
+        A start that fails is moved to the front, so that the next trial fails early.
+        """
+        for position, start in enumerate(self._order):
+            index = np.array([start])
             if not _rtls_meet_criterion(world, self._starts.subset(index), self._limits.subset(index), criterion)[0]:
                 self._order.insert(0, self._order.pop(position))
                 return False

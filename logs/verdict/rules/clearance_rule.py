@@ -109,7 +109,8 @@ def _home_above_ground_findings(
     )
     brief = f"the mission's home is {height:.0f} m above the ground there"
     explanation = (
-        f": an autopilot that is armed on that ground flies lower by as much, down to {min_height:.0f} m above ground"
+        f": if it is armed on that ground, the whole flight is lower by that height, and at its lowest"
+        f" {min_height:.0f} m above ground"
     )
     fault = message(brief, explanation)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
@@ -272,7 +273,7 @@ def _flown_clearance(
         terrain = requirements.setup.scenario.terrain
         reason += _terrain_error_text(min_clearance, limit, None if terrain is None else terrain.vertical_error)
     if is_planned_short:
-        reason += f"; the planned path descends to {planned_height:.1f} m"
+        reason += f"; the planned path descends to {planned_height:.1f} m above ground"
     return make_finding(
         "clearance",
         requirements.leg(leg),

@@ -293,7 +293,7 @@ def _unheld_corners_message(circle: LoiterCircle, failed_corners: list[Finding])
     """State the number of corners not held, and the worst one."""
     worst_corner = min(failed_corners, key=badness)
     corner_count = len({finding.place for finding in failed_corners})
-    count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held, as "
+    count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held; the worst is "
     return Message(
         f"{count_text}{place_text(worst_corner.place)}: {worst_corner.reason}",
         f"{count_text}{_corner_text(worst_corner.place)}",

@@ -160,8 +160,8 @@ def _planned_finding(requirements: RouteRequirements, survey: Survey, line: Phot
     # The turns may use the leads before and after the line.
     lead_in = float(requirements.runs[line.begins : line.first].sum())
     lead_out = float(requirements.runs[line.last : line.ends].sum())
-    cut_in = _clip_length(float(requirements.length_after[line.begins]) - lead_in, length)
-    cut_out = _clip_length(_turn_lead(requirements, line) - lead_out, length)
+    cut_in = _clip_to_length(float(requirements.length_after[line.begins]) - lead_in, length)
+    cut_out = _clip_to_length(_turn_lead(requirements, line) - lead_out, length)
     straight_fraction = max(0.0, length - cut_in - cut_out) / length
     ok = straight_fraction >= PHOTO_COVERAGE_FRACTION
     name = _line_text(requirements, survey, line, number)
@@ -187,7 +187,8 @@ def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
     return mission_radius or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
 
 
-def _clip_length(distance: float, length: float) -> float:
+def _clip_to_length(distance: float, length: float) -> float:
+    """Return a distance limited to 0 ... length; return the length for a distance that is not finite."""
     return min(max(distance, 0.0), length) if math.isfinite(distance) else length
 
 

@@ -117,7 +117,9 @@ def _no_entry_finding(
     navigation_error: navigation error, m.
     """
     reason = (
-        f"no missile sphere of {threat_count} threats is entered" if threat_count else "the scenario has no threats"
+        f"none of the missile spheres of {threat_count} threats is entered"
+        if threat_count
+        else "the scenario has no threats"
     )
     facts = []
     if math.isfinite(nearest_distance):

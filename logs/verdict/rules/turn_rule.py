@@ -254,9 +254,9 @@ def _tight_turn_faults(requirements: RouteRequirements, i: int, measure: TurnMea
     radius = measure.min_distance / min_distance * min_radius
     return [
         message(
-            f"flown with a radius of {radius:.0f} m, {measure.min_distance:.1f} m from its waypoint",
-            f"; at {math.degrees(requirements.limits.max_bank):.0f}° bank in this wind it is {min_radius:.0f} m, and"
-            f" {min_distance:.1f} m from it",
+            f"flown with a radius of {radius:.0f} m, passing its waypoint at {measure.min_distance:.1f} m",
+            f"; with {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind the radius is"
+            f" {min_radius:.0f} m, and the waypoint is passed at {min_distance:.1f} m",
         )
     ]
 

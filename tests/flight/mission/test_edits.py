@@ -99,5 +99,5 @@ def test_the_last_leg_needs_no_speed_after_it() -> None:
 
 def test_a_mission_has_its_most_items() -> None:
     full = mission(*(item(k) for k in range(1, edits.MAX_EDITED + 1)))
-    with pytest.raises(MissionError, match="no more can be edited"):
+    with pytest.raises(MissionError, match="the most that can be edited"):
         edits.insert_waypoint(full, 0, 46.0, 8.0)

@@ -114,7 +114,7 @@ def test_heights_and_what_is_left_over_stand_at_their_times(shown: tuple[FlightS
     lefts = [one.altitudes_left[0] if math.isfinite(one.altitudes_left[0]) else math.nan for one in drawn.glides.each]
     assert home.y == pytest.approx(lefts, nan_ok=True)
     assert flat.x.tolist() == [one.time for one in drawn.glides.each]
-    assert left.limits == (("nothing left over", 0.0),)
+    assert left.limits == (("nothing to spare", 0.0),)
     assert not by_role(left.layers, "left-site")
 
 

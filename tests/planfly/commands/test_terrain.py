@@ -327,7 +327,7 @@ def test_an_area_without_data_is_refused_and_a_gap_is_told(here: Path, capsys: p
         file.write(heights, 1)
     argv = ["terrain", "--margin", "0", "--source", "half.tif"]
     assert main([*argv, "--box", "46.2,8.7,46.3,8.8"]) == 2
-    assert "dem.tif: no data in the area" in capsys.readouterr().err
+    assert "dem.tif: the tiles have no data in the area" in capsys.readouterr().err
     assert not (here / "dem.tif").exists()
     assert main([*argv, "--box", "46.2,8.4,46.3,8.6"]) == 0
     assert " pixels have no data" in capsys.readouterr().err

@@ -143,7 +143,9 @@ def test_a_second_file_is_aligned_by_signals_that_move_together(tmp_path: Path) 
 def test_clocks_that_do_not_correlate_are_refused(tmp_path: Path) -> None:
     noise = np.random.default_rng(3).normal(size=400)
     message = said(write_motor(tmp_path, shift=0.0, servo=noise))
-    assert re.search(r"clocks.motor.align: servo and throttle correlate by 0.\d\d at most; expected 0.6", message)
+    assert re.search(
+        r"clocks.motor.align: servo and throttle have a correlation of at most 0.\d\d; expected 0.6", message
+    )
 
 
 def test_a_clock_is_not_aligned_with_its_own_quantity(tmp_path: Path) -> None:

@@ -150,7 +150,7 @@ def test_corners_that_were_not_held_are_counted_and_the_worst_is_named() -> None
     (one,) = merge_loiter_findings(requirements, aligned, at)
     count = circle.last - circle.first + 1
     assert one.ok is False
-    assert one.reason.startswith(f"2 of {count} corners not held, as waypoint 1 (item 2): turn -3.0")
+    assert one.reason.startswith(f"2 of {count} corners not held; the worst is waypoint 1 (item 2): turn -3.0")
     # Of the route alone the first is told.
     (planned,) = merge_loiter_findings(requirements, None, at)
     assert planned.reason.startswith(f"waypoint {circle.first} (item 2): turn -1.0")
