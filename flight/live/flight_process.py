@@ -1,6 +1,6 @@
 """Run the flight of the live vehicle in its own process, because JSBSim holds the interpreter's lock.
 
-Requests arrive over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends
+Requests arrive over a pipe and events go back: a state snapshot as packed bytes, everything else pickled. Both ends
 belong to planfly; nothing from a station is ever unpickled.
 
 | request | meaning |

@@ -1,7 +1,7 @@
 """Serve the vehicle's stations on one UDP socket.
 
 A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or, on this machine, any message addressed
-to the vehicle, from an address that is allowed, and signed if a key is set.  The table of stations is bounded; a silent
+to the vehicle, from an address that is allowed, and signed if a key is set. The table of stations is bounded; a silent
 station is removed from it.
 """
 
@@ -141,7 +141,7 @@ _MAX_KEY_BYTES = 1024
 def read_key(path: Path) -> bytes:
     """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
 
-    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way.  Raises FlightError if the file
+    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way. Raises FlightError if the file
     cannot be read, if another user could read it, or if it holds fewer than 8 or more than 1024 bytes.
 
     >>> import tempfile
@@ -206,7 +206,7 @@ class Signing:
     def find_refusal(self, frame: MavlinkFrame, wall: float) -> RefusalReason | None:
         """Return the reason to distrust a frame, or None if the frame is signed with the key and newer than its stream.
 
-        A stream is a system, its component and its link id.  A frame with a bad signature changes nothing.
+        A stream is a system, its component and its link id. A frame with a bad signature changes nothing.
 
         wall: time since 1970, s.
         """
@@ -337,7 +337,7 @@ def check_access(access: Access) -> None:
     """Raise FlightError if access to the vehicle from other machines is not protected.
 
     Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and an address to send to needs
-    a key or must be on that list.  The error names the argument to give.
+    a key or must be on that list. The error names the argument to give.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))

@@ -1,7 +1,7 @@
 """Implement the vehicle's side of the MAVLink mission protocol, as a state machine without socket and clock.
 
 A mission, a fence and rally points are each accepted whole or not at all: an upload is collected next to the current
-list and replaces it only when its last item has arrived and every item is valid.  One station uploads at a time;
+list and replaces it only when its last item has arrived and every item is valid. One station uploads at a time;
 another is denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)  pymavlink has
 the messages and a station's lists (`mavwp`), but not the vehicle's side.
 """
@@ -95,8 +95,8 @@ def from_message(message: Any, source: str) -> MissionItem:
 
     source: name of the sender in messages.
 
-    INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude are rounded to the
-    nearest 1e-7 degrees.  Raises MissionError with one line that names item, field, value, and allowed values.
+    INT32_MAX in an integer x or y is NaN (MAVLink's "unset"). A float's latitude and longitude are rounded to the
+    nearest 1e-7 degrees. Raises MissionError with one line that names item, field, value, and allowed values.
     """
     command, frame = int(message.command), int(message.frame)
     has_coordinates = is_located(command, frame)
@@ -331,7 +331,7 @@ class MissionServer:
     changed: lists that an upload replaced since the caller last cleared this set.
     locked: reason why the mission must not change now, or "".
     go_to: function that flies to an item's position and altitude, and loiters there; latitude and longitude are NaN
-        for the aircraft's position.  It returns the reason for a refusal, or "".
+        for the aircraft's position. It returns the reason for a refusal, or "".
     """
 
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))

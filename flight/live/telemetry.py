@@ -183,7 +183,7 @@ class StatusText(NamedTuple):
 def status_texts(text: str, severity: int, number: int) -> list[Any]:
     """Return the STATUSTEXT messages of a text, in pieces of 50 bytes that stations join again.
 
-    number: 1..65535, new for each text.  Ground stations show ASCII: any other character becomes "?", a degree sign
+    number: 1..65535, new for each text. Ground stations show ASCII: any other character becomes "?", a degree sign
     " deg", and bytes beyond 400 are omitted.
 
     >>> [message.text for message in status_texts("climb of 9° at leg 3", 4, 1)]

@@ -86,7 +86,7 @@ def timestamp(time_ns: int) -> Timestamp:
 def body_rotation(attitude: ArrayLike) -> Floats:
     """Return the quaternion (..., 4) x, y, z, w of the rotation from forward-left-up to east-north-up.
 
-    attitude: (..., 3) roll, pitch, yaw in rad, yaw clockwise from north.  After the change of axes from north-east-down
+    attitude: (..., 3) roll, pitch, yaw in rad, yaw clockwise from north. After the change of axes from north-east-down
     the angles are roll, -pitch and pi/2 - yaw about forward, left and up.
     """
     roll, pitch, yaw = np.moveaxis(np.asarray(attitude, dtype=np.float64), -1, 0)

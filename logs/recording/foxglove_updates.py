@@ -312,7 +312,7 @@ _FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)]
 def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
     """Encode position and attitude of the aircraft: a FrameTransform for each of n rows.
 
-    position, attitude: (n, 3).  Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and
+    position, attitude: (n, 3). Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and
     halves their size in the log; the state message is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):

@@ -1,8 +1,8 @@
 """Write an MCAP container front to back, from prepared chunks.
 
 The `Writer` of mcap takes one message at a time, at 5 us each, two to three times the time of this writer; its `Chunk`
-and `ChunkIndex` copy their fields through a record builder for as long as the compression takes.  Here the records of a
-chunk and the index of its messages are passed as bytes.  Records that are written once use the classes of mcap.  Every
+and `ChunkIndex` copy their fields through a record builder for as long as the compression takes. Here the records of a
+chunk and the index of its messages are passed as bytes. Records that are written once use the classes of mcap. Every
 CRC of the format is written.
 """
 
@@ -235,7 +235,7 @@ class ContainerWriter:
         )
 
     def flush(self) -> None:
-        """Pass the written bytes to the operating system.  Raises OSError."""
+        """Pass the written bytes to the operating system. Raises OSError."""
         try:
             self._file.flush()
         except OSError as error:
@@ -415,7 +415,7 @@ def _merge_by_time(
 ) -> tuple[Entries, Ints]:
     """Merge rows and other messages by time; return all messages (n,) and the first of each chunk.
 
-    At equal times a row comes last.  The array of first messages ends with n.
+    At equal times a row comes last. The array of first messages ends with n.
     """
     count = len(row_times) + len(other_messages)
     merged = np.empty(count, dtype=ENTRY)
@@ -512,7 +512,7 @@ def lay_out_chunks(
     """Order message records by time, and index them in chunks of at most one second and ``limit`` bytes.
 
     rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
-    front: bytes before the first message.  A message of more than ``limit`` bytes gets its own chunk.
+    front: bytes before the first message. A message of more than ``limit`` bytes gets its own chunk.
     """
     max_channel = max([row_channel, *(messages.channel for messages in other_messages)])
     blob = np.concatenate([np.zeros(0, np.uint8), *(messages.blob for messages in other_messages)])
@@ -549,7 +549,7 @@ def _message_entries(other_messages: list[MessageRecords]) -> Entries:
 def last_log_time(times: Floats, newest: int, epoch: int, max_time: float) -> int:
     """Return the log time (ns) of the last of ``times`` (s).
 
-    newest: log time before the first.  Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if
+    newest: log time before the first. Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if
     a time is not later than the time before it.
     """
     for k in range(len(times)):

@@ -76,7 +76,7 @@ class LogMessage:
 
 
 def log_messages(path: Path) -> Iterator[LogMessage]:
-    """Yield the messages of a log in the order of the file, up to its first damage.  Raises OSError.
+    """Yield the messages of a log in the order of the file, up to its first damage. Raises OSError.
 
     >>> import tempfile
     >>> from collections import Counter
@@ -221,7 +221,7 @@ class _MessageCollector:
         self._parser = state_class()
 
     def add(self, data: bytes) -> None:
-        """Add the records of one chunk.  Raises one of `PARSE_ERRORS` or DecodeError."""
+        """Add the records of one chunk. Raises one of `PARSE_ERRORS` or DecodeError."""
         self.chunks += 1
         position = 0
         while position < len(data):

@@ -103,7 +103,7 @@ class Recorder:
     """
 
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
-        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
+        """Open ``path`` for writing (replacing it) and write the setup. Raises OSError.
 
         every: record every n-th row, and the last row of the flight.  batch: number of whole seconds of flight written
         at once, each in its own chunks; a larger batch costs less time, but a killed process loses up to one batch.
@@ -153,7 +153,7 @@ class Recorder:
                 self._close_file()
 
     def write(self, block: Track) -> None:
-        """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
+        """Append rows. Raises ValueError unless their times increase, from 0 on, across all blocks."""
         self.write_rows(track_rows(block))
 
     def write_rows(self, rows: Rows) -> None:
@@ -191,13 +191,13 @@ class Recorder:
     def flush(self) -> None:
         """Pass all received rows to the operating system now.
 
-        In a live flight, a killed process then loses less than a second.  Chunks end at each flush, so the bytes of the
+        In a live flight, a killed process then loses less than a second. Chunks end at each flush, so the bytes of the
         file (not its rows) depend on the times of the calls.
         """
         self._write_pending(self._last_ns + 1)
 
     def event(self, time: float, text: str, level: str = "info") -> None:
-        """Record an event at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
+        """Record an event at ``time`` (s); level: debug, info, warning, error or fatal. Raises ValueError."""
         if level not in scene.LOG_LEVELS:
             raise ValueError(f"level {level!r}: expected {', '.join(scene.LOG_LEVELS)}")
         if not 0.0 <= time < LATEST:

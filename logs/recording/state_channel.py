@@ -1,7 +1,7 @@
 """The `/state` channel: rows of the track as protobuf messages, their schema, and their bytes as numpy arrays.
 
 Every field is a fixed32 or fixed64 and every field is written, zero or not, so that a message has one layout and n
-messages are one structured array.  Any protobuf parser reads them.  The schema is built here, so that no protoc is
+messages are one structured array. Any protobuf parser reads them. The schema is built here, so that no protoc is
 needed.
 """
 

@@ -75,7 +75,7 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """Return the setup without any variation.  Raises PlanflyError for a mission without a valid route."""
+        """Return the setup without any variation. Raises PlanflyError for a mission without a valid route."""
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
@@ -252,7 +252,7 @@ class VariedFlight:
 def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
     """Return the flight of a draw.
 
-    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`.  The autopilot does not know the
+    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`. The autopilot does not know the
     mass, drag, control power, drawn aircraft and start position.
 
     wind: mean wind that the draw varies; None for the wind of the scenario.

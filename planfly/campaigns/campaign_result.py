@@ -138,7 +138,7 @@ class CampaignResult:
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """Return the goal for keyword arguments.  Raises ArgumentError for numbers outside their ranges.
+    """Return the goal for keyword arguments. Raises ArgumentError for numbers outside their ranges.
 
     >>> make_goal(None, 0.99, None, None)
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)

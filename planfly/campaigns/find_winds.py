@@ -147,8 +147,8 @@ def find_winds(
 ) -> WindsFound:
     """Fly rounds of flights until each boundary is known accurately enough, or all flights are used.
 
-    Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so the result is
-    the same for any number of workers and interruptions.  Flights completed before an error or Ctrl-C stay in the
+    Flights in the table are not flown again. The winds of a round depend only on the earlier rounds, so the result is
+    the same for any number of workers and interruptions. Flights completed before an error or Ctrl-C stay in the
     table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
@@ -273,7 +273,7 @@ class _StoredFlights:
         self.flown = {number: flight for number, (_, flight) in stored_flights.items()}
 
     def missing(self, requests: list[RequestedFlight]) -> list[RequestedFlight]:
-        """Return the requests that are not in the table.  Raises StoreError if a number has another request there."""
+        """Return the requests that are not in the table. Raises StoreError if a number has another request there."""
         for request in requests:
             if self._requests.get(request.number, request) != request:
                 path = self._store.path

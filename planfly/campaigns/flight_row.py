@@ -104,7 +104,7 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
     """Return the distance right of and above each of s stops at closest approach, m, (s, 2); NaN if not reached.
 
     A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are omitted, because their
-    number differs between flights.  Right is relative to the mean of the incoming and outgoing courses.
+    number differs between flights. Right is relative to the mean of the incoming and outgoing courses.
     """
     points = route.waypoints
     crossings = np.full((len(points), 2), np.nan, dtype=np.float32)
@@ -188,7 +188,7 @@ _FAILED = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_findings)
 class FlightRow:
     """Row of a flight in the campaign's table; each field ``Annotated`` with a `Column` is a column.
 
-    The draw has one column for each dispersion.  The margins have two columns for each rule, and one for the closeness.
+    The draw has one column for each dispersion. The margins have two columns for each rule, and one for the closeness.
     The tables of `planfly.campaigns.tables` are derived from this class.
 
     ended: "completed", or the reason why the flight ended early.

@@ -89,7 +89,7 @@ def fly_campaign(
     """Fly the flights missing from the table until the goal has its number of flights or its answer.
 
     Flights are counted in the order of their indices, so that answer and table do not depend on the speed of the
-    workers; flights after the deciding flight are deleted.  Flights completed before an error or Ctrl-C stay in the
+    workers; flights after the deciding flight are deleted. Flights completed before an error or Ctrl-C stay in the
     table.
     """
     estimator = Estimator(goal)

@@ -142,7 +142,7 @@ class LocalPool:
             _end_workers(worker for worker, _ in flying.values())
 
     def _result_row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
-        """Return the row of a flight, or None if its process has died.  Raises the errors of `fly`."""
+        """Return the row of a flight, or None if its process has died. Raises the errors of `fly`."""
         try:
             row = future.result()
         except BrokenProcessPool:

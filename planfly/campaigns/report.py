@@ -118,7 +118,7 @@ def _render_page(template: str, **values: object) -> str:
 
 
 def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """Return the page of a go/no-go chart.  Changes the figure to the narrow layout."""
+    """Return the page of a go/no-go chart. Changes the figure to the narrow layout."""
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
     page = _render_page(
         "winds.html",
@@ -133,7 +133,7 @@ def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tupl
 
 
 def _draw_both_widths(figure: Figure, caption: str) -> Markup:
-    """Return a picture for a page in two widths, for desktops and phones.  Changes the figure to the narrow layout."""
+    """Return a picture for a page in two widths, for desktops and phones. Changes the figure to the narrow layout."""
     wide_svg = page_svg(figure, caption)
     narrow_svg = page_svg(narrow_figure(figure), f"{caption} (narrow)")
     return Markup(f'<div class="wide">{wide_svg}</div><div class="narrow">{narrow_svg}</div>')

@@ -1,7 +1,7 @@
 """Tables of flights: SQLite files that are written flight by flight, and read as rows or as columns.
 
-The table of a campaign has one row per flight, keyed by the index of its draw.  The table of a search for winds has one
-row per flight, in the order of requests.  One process at a time can lock a table; opening a table drops all rows with a
+The table of a campaign has one row per flight, keyed by the index of its draw. The table of a search for winds has one
+row per flight, in the order of requests. One process at a time can lock a table; opening a table drops all rows with a
 wrong checksum.
 """
 
@@ -115,7 +115,7 @@ class TableKind:
     """Kind of a table file.
 
     name: name of the schema.
-    columns: name and kind of each column of the table of flights; the first is the key, the number of the flight.  A
+    columns: name and kind of each column of the table of flights; the first is the key, the number of the flight. A
     checksum of all columns follows them.
     fixed: settings that must stay the same when the table is resumed.
     """
@@ -273,7 +273,7 @@ class LockedTable:
     def insert(self, values: Mapping[str, Any]) -> None:
         """Write a flight durably, one value per column.
 
-        Raises OSError for a full disk or a removed table; earlier flights stay in the file.  Raises StoreError for a
+        Raises OSError for a full disk or a removed table; earlier flights stay in the file. Raises StoreError for a
         number that the table already has.
         """
         self._check_not_removed()
@@ -396,7 +396,7 @@ class Store(LockedTable):
     """Table of a campaign, locked by one process at a time; the number of a flight is the index of its draw."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume.  Raises StoreError if it contains more flights than requested."""
+        """Create the table, or open it to resume. Raises StoreError if it contains more flights than requested."""
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
@@ -405,7 +405,7 @@ class Store(LockedTable):
             raise StoreError(f"{self.path}: {reason}", file=self.path)
 
     def add(self, row: FlightRow) -> None:
-        """Write a flight durably.  Raises OSError for a full disk; earlier flights stay in the file."""
+        """Write a flight durably. Raises OSError for a full disk; earlier flights stay in the file."""
         self.insert({"flight": row.draw.index, **row_values(replace(row, made_of=self.made_of))})
 
     def outcomes(self) -> dict[int, str]:
@@ -518,7 +518,7 @@ class WindsStore(LockedTable):
         super().__init__(path, WINDS_KIND, made_of, settings, resume=resume)
 
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
-        """Write a flight durably.  Raises OSError for a full disk; earlier flights stay in the file."""
+        """Write a flight durably. Raises OSError for a full disk; earlier flights stay in the file."""
         request_values = {
             "flight": request.number,
             "direction": request.direction,
@@ -569,8 +569,8 @@ _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": obje
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
     """Return the columns (n,) of a campaign's table, keyed by name, in the order of flights; without array columns.
 
-    Numbers are float64, NaN if missing, or int64.  Texts are Python strings, None if missing; equal strings share
-    memory.  The result takes about 60 MB for 100,000 flights.
+    Numbers are float64, NaN if missing, or int64. Texts are Python strings, None if missing; equal strings share
+    memory. The result takes about 60 MB for 100,000 flights.
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     names = tuple(name for name in CAMPAIGN_KIND.columns if name not in ARRAY_COLUMNS)
@@ -590,7 +590,7 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def count_flights(path: Path) -> int:
-    """Return the number of flights in a table of either kind.  Raises StoreError for other files and locked tables."""
+    """Return the number of flights in a table of either kind. Raises StoreError for other files and locked tables."""
     with _open_to_read(path) as connection:
         return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
 

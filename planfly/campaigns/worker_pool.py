@@ -67,7 +67,7 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
 
 
 def check_scheduler_address(address: str) -> str:
-    """Return a scheduler's address.  Raises SchedulerError for plain TCP beyond loopback; TLS is allowed for any host.
+    """Return a scheduler's address. Raises SchedulerError for plain TCP beyond loopback; TLS is allowed for any host.
 
     The reason is that the workers of a scheduler run any code sent to them.
 

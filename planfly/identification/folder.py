@@ -20,7 +20,7 @@ from flight.autopilots.arduplane.parameters import DEFINITIONS, ArduPilotParamet
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
-from flight.guidance.model_gains import gains_of_model, gains_text
+from flight.guidance.model_gains import gains_from_model, gains_text
 from flight.mission_files.wpl import waypoints_text
 from logs.importers.motion import MotionLog
 from planfly.identification.drive_check import DriveConflict, drive_conflict
@@ -149,7 +149,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
         files = {
             f"{name}.xml": xml,
             f"{name}.toml": toml.read_text(encoding="utf-8"),
-            "gains.toml": gains_text(gains_of_model(aircraft)),
+            "gains.toml": gains_text(gains_from_model(aircraft)),
         }
         if home is not None:
             mission = identification_mission(aircraft, envelope, *home)

@@ -115,7 +115,7 @@ _compiled_units: set[str] = set()
 def warm_up(*units: str) -> Iterator[None]:
     """Compile all kernels of units as soon as the code inside needs a kernel that is not cached.
 
-    units: units of `planfly.kernel_units` that the code will call, longest first.  They are compiled in two processes
+    units: units of `planfly.kernel_units` that the code will call, longest first. They are compiled in two processes
     before the code continues; if the cache cannot be written, each kernel is compiled when it is called.
     """
     has_reported = False

@@ -15,7 +15,7 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Collect garbage seldom, and limit linear algebra to one thread.  Call this before NumPy is imported.
+    """Collect garbage seldom, and limit linear algebra to one thread. Call this before NumPy is imported.
 
     Garbage collection during imports took a quarter of the start-up time, and spinning threads a tenth; no matrix in
     planfly is large enough for a second thread.
@@ -28,7 +28,7 @@ def prepare_process() -> None:
 def prepare_child() -> None:
     """Collect garbage seldom in a process that planfly started, such as the worker of a campaign.
 
-    Garbage collection in the processes of a short campaign took a sixth of its time.  If the address space is limited,
+    Garbage collection in the processes of a short campaign took a sixth of its time. If the address space is limited,
     import only modules that fit (`world.address_space`).
     """
     if _OWN_PROCESS_VARIABLE in os.environ:
@@ -65,9 +65,9 @@ def limit_of_address_space() -> int | None:
 def with_large_stack(function: Callable[[], _Given]) -> _Given:
     """Call a function with all frames in one large piece of memory, and return its result.
 
-    CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty.  Numba's recursion crosses
+    CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty. Numba's recursion crosses
     the boundary between two pieces so often that a sixth of its time was spent on memory pages that the operating
-    system reclaimed and provided again.  A frame with many values gets a piece of their size, and inner frames share
+    system reclaimed and provided again. A frame with many values gets a piece of their size, and inner frames share
     this piece.
 
     >>> with_large_stack(lambda: 7)

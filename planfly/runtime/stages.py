@@ -1,6 +1,6 @@
 """Report the progress of long work: the API reports stages, and its caller shows them.
 
-Without a receiver nothing is shown.  Only the compilation of kernels, up to a minute after an install, is then logged
+Without a receiver nothing is shown. Only the compilation of kernels, up to a minute after an install, is then logged
 as a warning of the logger ``planfly``, which Python writes to standard error unless logging is configured otherwise.
 """
 

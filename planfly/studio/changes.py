@@ -1,6 +1,6 @@
 """Compare a flight with the previous flight, even if items were inserted or deleted.
 
-An inserted or deleted item renumbers the later items.  Therefore equal items of both missions, and items between equal
+An inserted or deleted item renumbers the later items. Therefore equal items of both missions, and items between equal
 items, are matched first, and legs are identified by the items at their ends.
 """
 

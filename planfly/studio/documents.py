@@ -74,7 +74,7 @@ class Document:
 
 
 def open_document(target: str, options: MissionOptions) -> Document:
-    """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
+    """Open a scenario, a plan, a mission or a log, by name or path. Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
         return _scenario_document(load_scenario_with_options(target, options), options.get("seed"))
     path = Path(target)
@@ -213,7 +213,7 @@ class SavedFile:
 
 
 def save_document(document: Document, context: EditContext, judged: JudgedMission, kind: str) -> SavedFile:
-    """Return the edited mission as a file of one of `SAVED`.  Raises PlanflyError if the format cannot store it.
+    """Return the edited mission as a file of one of `SAVED`. Raises PlanflyError if the format cannot store it.
 
     An unchanged mission in its original format is saved as the original bytes.
     """
@@ -284,7 +284,7 @@ def _lost_parameters(context: EditContext) -> tuple[str, ...]:
 
 
 def _saved_parameters(name: str, context: EditContext) -> SavedFile:
-    """Return a file of the parameters set in the studio.  Raises PlanflyError if no parameter was set."""
+    """Return a file of the parameters set in the studio. Raises PlanflyError if no parameter was set."""
     if not context.parameters.values:
         raise PlanflyError("no parameter was set here: Settings sets them", field="form")
     return SavedFile(
@@ -362,7 +362,7 @@ def _scored_plan(context: EditContext, waypoints: Floats) -> Plan:
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
     """Return the edited plan with its unchanged departure and approach, or None if it has neither.
 
-    Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged.  Raises
+    Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged. Raises
     MissionError if these legs were changed.
     """
     opened_plan = context.opened_setup.plan

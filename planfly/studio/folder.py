@@ -44,7 +44,7 @@ def home_relative_text(path: Path) -> str:
 
 
 def find_file_in_folder(folder: Path | None, name: str) -> Path:
-    """Return a file by its path in the folder.  Raises MissionError for a file outside the folder or of another type.
+    """Return a file by its path in the folder. Raises MissionError for a file outside the folder or of another type.
 
     >>> find_file_in_folder(Path("/tmp"), "../etc/passwd")
     Traceback (most recent call last):

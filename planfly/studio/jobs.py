@@ -126,7 +126,7 @@ class Jobs:
         )
 
     def plan(self, message: messages.Plan, session: Session) -> None:
-        """Plan one or several paths.  Raises PlanflyError for items between which no path can be planned."""
+        """Plan one or several paths. Raises PlanflyError for items between which no path can be planned."""
         request = self._plan_request(message, session)
         self._uses_first_path = False
         self._send_work(LONG_WORKER, "plan", "planfly.studio.worker_tasks.plan", request, session.rev)

@@ -1,7 +1,7 @@
 """Run tasks in a worker process of the studio; a newer task cancels the task in progress.
 
-A task is a function and an argument that can be pickled.  It reports progress regularly, and is cancelled at a report.
-The process is spawned, never forked, because the server has threads.  A process that dies is started again.
+A task is a function and an argument that can be pickled. It reports progress regularly, and is cancelled at a report.
+The process is spawned, never forked, because the server has threads. A process that dies is started again.
 """
 
 import contextlib
@@ -63,7 +63,7 @@ class Cancelled(Exception):
 
 
 class WorkerProcess:
-    """Interface of the server to a worker process.  Its methods may be called from any thread, and never block.
+    """Interface of the server to a worker process. Its methods may be called from any thread, and never block.
 
     A thread sends the newest task, so that a process that does not read its pipe blocks no caller.
     """

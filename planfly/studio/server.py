@@ -1,6 +1,6 @@
 """Serve the studio, with pages on websockets, one session, a judging thread and two worker processes.
 
-Drags are judged one at a time, the newest first.  Edits are applied in order, and every page is sent the result.
+Drags are judged one at a time, the newest first. Edits are applied in order, and every page is sent the result.
 """
 
 import asyncio
@@ -274,7 +274,7 @@ class Server:
     # Messages of a page.
 
     async def _handle_message(self, page: Page, text: str) -> None:
-        """Handle a message.  Raises ValueError for a message that is not understood."""
+        """Handle a message. Raises ValueError for a message that is not understood."""
         try:
             message = read_message(text)
         except ValidationError as error:
@@ -424,7 +424,7 @@ class Server:
 
 
 async def _receive_text(socket: WebSocket) -> str:
-    """Return the next text message.  Raises ValueError for a binary message, and WebSocketDisconnect at the end."""
+    """Return the next text message. Raises ValueError for a binary message, and WebSocketDisconnect at the end."""
     received = await socket.receive()
     if received["type"] == "websocket.disconnect":
         raise WebSocketDisconnect(received.get("code", 1000))

@@ -1,6 +1,6 @@
 """Open, edit, judge, save and autosave the edited mission, which all pages share.
 
-The session does not know connections or processes, which belong to `planfly.studio.server`.  Each change increases the
+The session does not know connections or processes, which belong to `planfly.studio.server`. Each change increases the
 revision; an edit of an older revision is refused, so that no page edits a mission that it does not show.
 """
 
@@ -146,7 +146,7 @@ class Session:
     # Edits.
 
     def edit(self, message: Edit) -> None:
-        """Apply an edit.  Raises StaleEdit, or MissionError for an invalid mission; then nothing is changed."""
+        """Apply an edit. Raises StaleEdit, or MissionError for an invalid mission; then nothing is changed."""
         if message.rev != self.rev:
             raise StaleEdit
         mission, text = self._apply_edit(message)
@@ -190,7 +190,7 @@ class Session:
         return {"sheet": sheet_json(self.context, judged_mission)}
 
     def replace_plan(self, message: Choose) -> None:
-        """Replace the whole mission, or the items between two items, by a planned path.  Raises StaleEdit."""
+        """Replace the whole mission, or the items between two items, by a planned path. Raises StaleEdit."""
         if message.rev != self.rev:
             raise StaleEdit
         plans, item_range = self.plans
@@ -345,7 +345,7 @@ class Session:
         return mission
 
     def item_position(self, index: int) -> tuple[float, float, float]:
-        """Return east, north and altitude AMSL of an item, m.  Raises MissionError if the item has no position."""
+        """Return east, north and altitude AMSL of an item, m. Raises MissionError if the item has no position."""
         edits.movable_item(self.mission, index)
         east, north, altitude = self.context.item_positions(self.mission)[
             edits.movable_indices(self.mission).index(index)
@@ -356,7 +356,7 @@ class Session:
     # The world.
 
     def change_settings(self, settings: Settings) -> None:
-        """Change the settings of the flight.  Raises PlanflyError for a value that is not allowed in a scenario."""
+        """Change the settings of the flight. Raises PlanflyError for a value that is not allowed in a scenario."""
         scenario = apply_scenario_settings(self.context.scenario, settings)
         context = self.context.with_settings(
             scenario, apply_parameter_settings(self.context.parameters, scenario, settings)
@@ -400,14 +400,14 @@ class Session:
         }
 
     def save(self, form: str) -> SavedFile:
-        """Return the mission as a file.  Raises PlanflyError if the format cannot store it."""
+        """Return the mission as a file. Raises PlanflyError if the format cannot store it."""
         saved = save_document(self.document, self.context, self.judged, form)
         if form != "kml":
             self.saved_mission = self.mission
         return saved
 
     def save_over(self) -> SavedFile:
-        """Overwrite the file that the command named.  Raises PlanflyError if there is none."""
+        """Overwrite the file that the command named. Raises PlanflyError if there is none."""
         path = self.document.path
         if path is None or not self.document.kind:
             raise PlanflyError("no mission file was named: save it as a new one", field="over")
@@ -446,7 +446,7 @@ class Session:
     def restore(self, file: Path) -> bool:
         """Restore the autosave of this document, with its mission as an edit; return True if there was one.
 
-        An autosave of another document is ignored.  An autosave that cannot be read is added to `unreadable`, and is
+        An autosave of another document is ignored. An autosave that cannot be read is added to `unreadable`, and is
         neither restored nor overwritten.
         """
         previous_state = self.context, self.judged, self.plans
@@ -466,6 +466,6 @@ class Session:
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:
-    """Open a target of the command; also return True if an autosave was restored.  Raises PlanflyError."""
+    """Open a target of the command; also return True if an autosave was restored. Raises PlanflyError."""
     session = Session.from_document(open_document(target, options), options)
     return session, autosave_file is not None and session.restore(autosave_file)

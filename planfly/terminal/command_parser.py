@@ -177,7 +177,7 @@ class LineParser(CommandParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
-        """Parse the command line.  For bad usage, print one line with a suggestion and raise SystemExit."""
+        """Parse the command line. For bad usage, print one line with a suggestion and raise SystemExit."""
         arguments = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
         if arguments and not arguments[0].startswith("-") and arguments[0] not in self.commands:
             hint = did_you_mean(arguments[0], self.commands) or f"; there are {', '.join(self.commands)}"

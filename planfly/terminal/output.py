@@ -287,8 +287,8 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
     """Show the progress of a stage; the work reports the units done, the total and a remark.
 
     kind: see `planfly.runtime.stages.stage`.
-    The time left follows the remark, unless the remark states it.  At first, the duration of the previous stage of its
-    kind on this machine is shown, or "no estimate".  A total of 0 means that the total is unknown.
+    The time left follows the remark, unless the remark states it. At first, the duration of the previous stage of its
+    kind on this machine is shown, or "no estimate". A total of 0 means that the total is unknown.
     """
     time_left = _TimeLeft(kind or title)
     display = _Bar(title, time_left) if sys.stderr.isatty() else _Lines(title, time_left)

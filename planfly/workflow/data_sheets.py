@@ -43,7 +43,7 @@ from flight.autopilots.arduplane.parameters import DEFINITIONS
 from flight.autopilots.parameter_files import Entry, read_parameter_file
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Simulator, Trim, fastest, full_throttle, idle, linearise, slowest, straight
-from flight.guidance.model_gains import AMSL, gains_of_model, gains_text, idle_throttle
+from flight.guidance.model_gains import AMSL, gains_from_model, gains_text, idle_throttle
 from world.arrays import Floats
 from world.errors import FlightError
 from world.files import temporary_folder
@@ -428,7 +428,7 @@ def _make_files(
     return {
         f"{name}.xml": model,
         f"{name}.toml": metadata,
-        "gains.toml": gains_text(gains_of_model(aircraft, fdm)),
+        "gains.toml": gains_text(gains_from_model(aircraft, fdm)),
         "ardupilot.parm": arduplane_parameters(aircraft, performance, fdm, file_parameters),
         "ardupilot.toml": servo_text(aircraft, performance),
         "uncertainty.toml": uncertainty_text(uncertainty),

@@ -11,11 +11,11 @@ from aircraft.model_writer import model_xml
 from benchmarks.tuning.published_aircraft import PUBLISHED
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.dynamics.characteristics import modes_at
+from flight.dynamics.characteristics import level_flight_modes
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import fastest, linearise, slowest, straight
 from flight.guidance.gains import load_gains
-from flight.guidance.model_gains import gains_of_model
+from flight.guidance.model_gains import gains_from_model
 from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import setup_maker
 
@@ -26,7 +26,7 @@ NAMES = sorted(PUBLISHED)
 def test_files_are_made_of_the_numbers(name: str) -> None:
     aircraft = load_aircraft(name)
     assert aircraft.model_file.read_text(encoding="utf-8") == model_xml(name, PUBLISHED[name])
-    made, kept = gains_of_model(aircraft), load_gains(aircraft)
+    made, kept = gains_from_model(aircraft), load_gains(aircraft)
     for field in made.__dataclass_fields__:
         assert getattr(kept, field) == pytest.approx(getattr(made, field), rel=1e-3, abs=1e-9), field
 
@@ -41,7 +41,7 @@ def test_speeds_are_those_of_its_trims(name: str) -> None:
     assert slow.airspeed == pytest.approx(aircraft.stall_speed, abs=0.1)
     assert aircraft.airspeed_max < fast.airspeed
     assert aircraft.airspeed_min > 1.1 * aircraft.stall_speed
-    modes = {mode.name: mode for mode in modes_at(aircraft, aircraft.airspeed)}
+    modes = {mode.name: mode for mode in level_flight_modes(aircraft, aircraft.airspeed)}
     assert modes["short period"].damping > 0.3
     assert modes["Dutch roll"].damping > 0.1
 

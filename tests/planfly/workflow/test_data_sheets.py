@@ -12,7 +12,7 @@ from aircraft.data_sheet import DataSheet
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.dynamics.characteristics import modes_at
+from flight.dynamics.characteristics import level_flight_modes
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import fastest, full_throttle, slowest, straight
@@ -48,7 +48,7 @@ def test_the_model_does_what_the_sheet_says(foam: Aircraft) -> None:
 
 
 def test_it_is_stable(foam: Aircraft) -> None:
-    modes = {mode.name: mode for mode in modes_at(foam, 15.0)}
+    modes = {mode.name: mode for mode in level_flight_modes(foam, 15.0)}
     assert modes["short period"].damping > 0.3
     assert modes["Dutch roll"].damping > 0.05
 
