@@ -153,7 +153,9 @@ def translate(model: bytes) -> ModelProgram:
     sections = {section.tag: section for section in root}
     known_sections = {*_DATA_SECTIONS, "ground_reactions", "propulsion", *_SECTIONS}
     if len(sections) != len(root) or not sections.keys() <= known_sections:
-        raise UnsupportedModel(f"the section <{next((part.tag for part in root if part.tag not in known_sections), root[-1].tag)}>")
+        raise UnsupportedModel(
+            f"the section <{next((part.tag for part in root if part.tag not in known_sections), root[-1].tag)}>"
+        )
     if any("file" in element.attrib for element in root.iter()):
         raise UnsupportedModel("a file that the model includes")
     if len(sections.get("propulsion", ())):

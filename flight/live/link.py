@@ -426,7 +426,7 @@ class Link:
             except BlockingIOError:
                 break
             except OSError:
-                # A station's port is closed: its ICMP answer comes up here.
+                # A station's port is closed: its ICMP answer is reported here.
                 continue
             messages += self.decode_datagram(data, (str(source[0]), int(source[1])))
         return messages
@@ -489,8 +489,8 @@ class Link:
             f"{host} signs with timestamps more than a day ahead of this machine's clock: such frames are dropped"
         )
 
-    def take_notices(self) -> list[str]:
-        """Return the notices since the last call on senders without an answer."""
+    def pop_notices(self) -> list[str]:
+        """Return the notices since the last call on senders that get no answer."""
         notices, self._notices = self._notices, []
         return notices
 

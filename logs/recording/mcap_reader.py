@@ -27,13 +27,13 @@ from mcap.records import Attachment, Chunk, DataEnd, Footer
 
 # Magic at start and end of an MCAP file.
 MAGIC = b"\x89MCAP0\r\n"
-# Largest size of a record or an uncompressed chunk that is read, bytes.
+# Maximum size of a record or an uncompressed chunk that is read, bytes.
 RECORD_LIMIT = 64 * 2**20
-# Least size of the pieces in which records outside chunks are returned, bytes.
+# Minimum size of the pieces in which records outside chunks are returned, bytes.
 _PIECE_BYTES = 2**18
 # Records that are returned if they are outside chunks.
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-# Greatest ratio of the size of all chunks to the bytes read; valid logs stay under 20.
+# Maximum ratio of the size of all chunks to the bytes read; valid logs stay under 20.
 _MAX_GROWTH_RATIO = 256
 # Frame of a record: opcode and length.
 FRAME = struct.Struct("<BQ")

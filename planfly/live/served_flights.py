@@ -181,7 +181,7 @@ class ServedFlights:
             return None, MissionJudged(request.number, False, False, (text,))
         verdict = judge_geometry(setup)
         home = request.mission.home
-        start = SnapshotMaker(setup, flight.map).before_start(setup)
+        start = SnapshotMaker(setup, flight.map).start_snapshot(setup)
         if home is None:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
