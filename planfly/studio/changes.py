@@ -200,7 +200,7 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe the changes of the values of failures, then of the smallest margin of each rule."""
+    """Describe how the values of failures have changed, and then how the smallest margin of each rule has."""
     failures = [
         (rule, old_results[rule, key], result)
         for (rule, key), result in new_results.items()

@@ -151,20 +151,20 @@ class LineParser(CommandParser):
         """Start a section of the help under a title, for the commands added next."""
         self._section = title
 
-    def command(self, name: str, summary: str, *examples: str, extra: str = "", more: str = "") -> CommandParser:
+    def command(self, name: str, summary: str, *examples: str, extra: str = "", details: str = "") -> CommandParser:
         """Add the parser for a command, and return it.
 
         summary: one sentence on the command.
         examples: example command lines in its help.
         extra: the extra of planfly that the command needs, or "".
-        more: further sentences of its help.
+        details: further sentences of its help.
         """
         extra_note = f"  It requires the extra planfly[{extra}]." if extra else ""
         example_text = f"\n{' ' * len('example: ')}".join(examples)
         command_parser: CommandParser = self._parsers.add_parser(
             name,
             help=summary,
-            description=f"{summary[0].upper()}{summary[1:]}.{more}{extra_note}",
+            description=f"{summary[0].upper()}{summary[1:]}.{details}{extra_note}",
             epilog=f"example: {example_text}\n\n{EXIT_CODES}",
         )
         self.commands[name] = command_parser

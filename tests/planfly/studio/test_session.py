@@ -153,11 +153,11 @@ def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
     session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
-    session.save_over()
+    session.overwrite_file()
     assert parse_mission(file.read_text(encoding="utf-8"), "m").items == session.mission.items
     session.open(open_dropped("other.waypoints", file.read_bytes(), session.options))
     with pytest.raises(PlanflyError, match="no mission file was named"):
-        session.save_over()
+        session.overwrite_file()
 
 
 @pytest.mark.parametrize(
