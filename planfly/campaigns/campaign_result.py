@@ -83,7 +83,7 @@ class CampaignResult:
 
     @property
     def probability(self) -> float:
-        """Share of flyable flights."""
+        """Fraction of flyable flights."""
         return self.summary.estimate.tally.share
 
     @property
@@ -103,7 +103,7 @@ class CampaignResult:
 
     @property
     def by_rule(self) -> dict[str, int]:
-        """Number of flights that failed each rule, without rules that no flight failed."""
+        """Number of flights that failed each rule; rules that no flight failed are omitted."""
         return {failures.rule: failures.flights for failures in self.summary.by_rule}
 
     @property

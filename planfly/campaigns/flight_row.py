@@ -181,7 +181,7 @@ _REAL = Column("REAL NOT NULL")
 # Column of an array stored as bytes.
 _BLOB = Column("BLOB NOT NULL")
 # Column of the failed findings, as JSON.
-_FAILED = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_findings)
+_FAILED_FINDINGS = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_findings)
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,13 +201,13 @@ class FlightRow:
     flown.
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
-    narrow: marginal passes with their margins; the table of a campaign does not store them.
+    marginal_passes: marginal passes with their margins; the table of a campaign does not store them.
     """
 
     draw: Draw
     outcome: Annotated[Outcome, _TEXT]
     ended: Annotated[str, _TEXT]
-    failed: Annotated[tuple[tuple[str, Place], ...], _FAILED] = ()
+    failed: Annotated[tuple[tuple[str, Place], ...], _FAILED_FINDINGS] = ()
     margins: tuple[tuple[str, MinimumMargin], ...] = ()
     energy_left: Annotated[float | None, Column("REAL")] = None
     duration: Annotated[float, _REAL] = 0.0
@@ -216,7 +216,7 @@ class FlightRow:
     crossings: Annotated[bytes, Column("BLOB NOT NULL", entry=(2,))] = b""
     seconds: Annotated[float, Column("REAL NOT NULL", same=False)] = 0.0
     worker: Annotated[str, Column("TEXT NOT NULL", same=False)] = ""
-    narrow: tuple[MarginalPass, ...] = ()
+    marginal_passes: tuple[MarginalPass, ...] = ()
 
     @property
     def closeness(self) -> float:
@@ -266,7 +266,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         duration=float(track.time[-1]) if has_rows else 0.0,
         clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
         crossings=waypoint_crossings(route, track).tobytes() if has_rows else b"",
-        narrow=find_marginal_passes(flight.verdict.findings, varied_flight.setup.scenario, track),
+        marginal_passes=find_marginal_passes(flight.verdict.findings, varied_flight.setup.scenario, track),
         seconds=time.perf_counter() - start_time,
     )
 

@@ -153,7 +153,7 @@ class LockedTable:
             raise StoreError(f"{path}: no such campaign to resume", file=path)
         self._connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
         try:
-            with converted_errors(path):
+            with convert_errors(path):
                 self._prepare_file(settings)
             self._file = path.stat()
         except BaseException:
@@ -277,19 +277,19 @@ class LockedTable:
         number that the table already has.
         """
         self._check_not_removed()
-        with converted_errors(self.path):
+        with convert_errors(self.path):
             row = [stored_value(values[name], kind) for name, kind in self._kind.columns.items()]
             placeholders = ", ".join("?" * (len(row) + 1))
             self._connection.execute(f"INSERT INTO flights VALUES ({placeholders})", [*row, checksum(row)])
 
-    def delete_flights_from(self, flight: int) -> None:
-        """Delete all flights from a number on, because an earlier flight decided the campaign.
+    def delete_later_flights(self, first_number: int) -> None:
+        """Delete the flights with this number or a larger one, because an earlier flight decided the campaign.
 
         Raises OSError for a table that was removed.
         """
         self._check_not_removed()
-        with converted_errors(self.path):
-            self._connection.execute("DELETE FROM flights WHERE flight >= ?", (flight,))
+        with convert_errors(self.path):
+            self._connection.execute("DELETE FROM flights WHERE flight >= ?", (first_number,))
 
     def _check_not_removed(self) -> None:
         """Raise OSError if the file was deleted; on POSIX, writing to it would succeed, but the data would be lost."""
@@ -314,7 +314,7 @@ def read_stored_settings(path: Path) -> dict[str, Any]:
     """
     if not path.is_file():
         return {}
-    with converted_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
+    with convert_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
         settings = _read_settings(connection)
     if settings:
         _check_settings_intact(settings, path)
@@ -351,7 +351,7 @@ def check_not_locked(path: Path) -> None:
         connection.close()
 
 
-class converted_errors:
+class convert_errors:
     """Context that converts SQLite errors about a file: to OSError for a full disk, otherwise to StoreError."""
 
     def __init__(self, path: Path) -> None:
@@ -507,7 +507,7 @@ class FlownFlight:
 
     outcome: Outcome
     failed: tuple[tuple[str, Place], ...]
-    narrow: tuple[MarginalPass, ...] = ()
+    marginal_passes: tuple[MarginalPass, ...] = ()
 
 
 class WindsStore(LockedTable):
@@ -525,7 +525,7 @@ class WindsStore(LockedTable):
             "asked_speed": request.speed,
             "draw": request.draw,
             "narrow": json.dumps(
-                [{"rule": rule, "margin": margin, **asdict(place)} for rule, place, margin in row.narrow]
+                [{"rule": rule, "margin": margin, **asdict(place)} for rule, place, margin in row.marginal_passes]
             ),
         }
         self.insert({**request_values, **row_values(replace(row, made_of=self.made_of))})
@@ -538,9 +538,9 @@ class WindsStore(LockedTable):
         return {
             number: (
                 RequestedFlight(number, *request),
-                FlownFlight(outcome, parse_failed_findings(failed), parse_marginal_passes(narrow)),
+                FlownFlight(outcome, parse_failed_findings(failed_text), parse_marginal_passes(passes_text)),
             )
-            for number, *request, outcome, failed, narrow in rows
+            for number, *request, outcome, failed_text, passes_text in rows
         }
 
 
@@ -621,7 +621,7 @@ def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[i
 def _open_to_read(path: Path) -> Iterator[sqlite3.Connection]:
     # Nothing is written, but a writable connection removes its -wal and -shm files when it closes.
     with (
-        converted_errors(path),
+        convert_errors(path),
         closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True, timeout=1.0)) as connection,
     ):
         yield connection

@@ -101,7 +101,7 @@ def _is_loopback(host: str) -> bool:
 
 
 class FlightRate:
-    """Rate of flights since this object was made.  stored_count: number of flights in the table at the start."""
+    """Rate of flights since this object was created.  stored_count: number of flights in the table at the start."""
 
     def __init__(self, stored_count: int) -> None:
         self._stored_count = stored_count

@@ -60,23 +60,23 @@ def predict(args: argparse.Namespace) -> int:
     print("\n".join(result.lines))
     for file in result.files:
         print(f"predicted {file}")
-    write_json_if_requested(args, lambda: _answer(result))
+    write_json_if_requested(args, lambda: _json_answer(result))
     return FLYABLE
 
 
-def _answer(result: "Predicted") -> object:
+def _json_answer(result: "Predicted") -> object:
     from planfly.terminal.answers import PredictAnswer, PredictedQuantity
 
-    def known(value: float) -> float | None:
+    def none_if_nan(value: float) -> float | None:
         return None if math.isnan(value) else value
 
     quantities = [
         PredictedQuantity(
             name=band.name,
             unit=band.unit,
-            inside=known(band.inside),
-            half_width=known(band.half_width),
-            unchanged_half_width=known(band.unchanged),
+            inside=none_if_nan(band.inside),
+            half_width=none_if_nan(band.half_width),
+            unchanged_half_width=none_if_nan(band.unchanged),
         )
         for band in result.bands
     ]

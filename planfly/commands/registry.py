@@ -34,10 +34,10 @@ class Command(NamedTuple):
     module: str = ""
     function: str = ""
 
-    def load(self, ending: str = "") -> Any:
-        """Return the function of the command; with the ending "_options", the function that adds its parser."""
+    def load(self, suffix: str = "") -> Any:
+        """Return the function of the command; with the suffix "_options", the function that adds its parser."""
         module = import_module(f"planfly.commands.{self.module or self.name}")
-        return getattr(module, (self.function or self.name) + ending)
+        return getattr(module, (self.function or self.name) + suffix)
 
 
 # Section titles of the help.
