@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.state import STATE
-from flight.dynamics.trim import Trim, linearise, straight
+from flight.dynamics.trim import Trim, linearise, steady_flight
 from world.arrays import Floats
 
 # Altitude of all measurements, m AMSL.
@@ -99,7 +99,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
     fdm = Fdm(aircraft)
     rows = []
     for airspeed in np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, count):
-        trim = straight(fdm, float(airspeed), TRIM_AMSL)
+        trim = steady_flight(fdm, float(airspeed), TRIM_AMSL)
         if trim is None:
             continue
         fdm.balance(trim.vector())
@@ -123,7 +123,7 @@ def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_A
     spiral: 0.0917+0j
     """
     fdm = Fdm(aircraft)
-    trim = straight(fdm, airspeed, amsl)
+    trim = steady_flight(fdm, airspeed, amsl)
     return () if trim is None else name_modes(linearise(fdm, trim)[0], airspeed)
 
 
@@ -172,7 +172,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     elevator, aileron, rudder = (
         0.1 * max_deflection for max_deflection in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
-    level = straight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
+    level = steady_flight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
     longitudinal_quantities, lateral_quantities = (
         ("pitch", "alpha", "airspeed", "amsl"),

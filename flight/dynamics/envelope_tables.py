@@ -14,7 +14,14 @@ from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import POWERS, TABLES, Envelope
 from aircraft.uncertainty import read_uncertainty
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
-from flight.dynamics.trim import Trim, fastest, full_throttle, idle, slowest, straight
+from flight.dynamics.trim import (
+    Trim,
+    fastest_level_flight,
+    full_throttle_climb,
+    idle_descent,
+    slowest_level_flight,
+    steady_flight,
+)
 from world.arrays import Floats
 from world.files import write_whole
 
@@ -89,17 +96,17 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
         # From fast to slow, because the slowest airspeed may have no trim, and each trim starts from its neighbor.
         for airspeed_index in reversed(range(airspeeds.size)):
             airspeed = float(airspeeds[airspeed_index])
-            if trim := full_throttle(fdm, airspeed, amsl, last_climb):
+            if trim := full_throttle_climb(fdm, airspeed, amsl, last_climb):
                 last_climb, climb[airspeed_index, altitude_index] = trim, trim.climb
                 powers["power_full"][airspeed_index, altitude_index] = _power(fdm, trim)
-            if trim := idle(fdm, airspeed, amsl, last_descent):
+            if trim := idle_descent(fdm, airspeed, amsl, last_descent):
                 last_descent, descent[airspeed_index, altitude_index] = trim, -trim.climb
                 powers["power_idle"][airspeed_index, altitude_index] = _power(fdm, trim)
-            if trim := straight(fdm, airspeed, amsl, near=last_level):
+            if trim := steady_flight(fdm, airspeed, amsl, near=last_level):
                 last_level, powers["power_level"][airspeed_index, altitude_index] = trim, _power(fdm, trim)
-        if trim := fastest(fdm, amsl):
+        if trim := fastest_level_flight(fdm, amsl):
             max_level_speed[altitude_index] = trim.airspeed
-        if trim := slowest(fdm, amsl):
+        if trim := slowest_level_flight(fdm, amsl):
             min_level_speed[altitude_index] = trim.airspeed
     if np.isnan(min_level_speed).all():
         # The wing stalls before the elevator reaches its stop: the slowest trim of the grid is the slowest flight.

@@ -50,7 +50,7 @@ from flight.dynamics.jsbsim_properties import (
 )
 from flight.dynamics.model_check import check_model, jsbsim_reason, try_model
 from flight.dynamics.state import STATE
-from flight.dynamics.trim import Engine, Trim, air_velocity, body_axes, euler, first_guess, straight
+from flight.dynamics.trim import Engine, Trim, air_velocity, body_axes, euler, first_guess, steady_flight
 from world.arrays import Floats
 from world.errors import FlightError
 from world.files import temporary_folder
@@ -341,7 +341,7 @@ class Fdm:
         self._start_position = (lat_deg, lon_deg, terrain_amsl)
         self._wind = wind
         self._heading = math.atan2(velocity[1], velocity[0])
-        trim = straight(self, airspeed, amsl, climb)
+        trim = steady_flight(self, airspeed, amsl, climb)
         if trim is None:
             raise FlightError(
                 f"{self.aircraft.name} cannot hold steady flight at {airspeed:.1f} m/s,"

@@ -277,7 +277,7 @@ def from_vector(values: Floats, amsl: float) -> Trim:
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
 
 
-def straight(
+def steady_flight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
     """Return the steady flight at an airspeed (m/s), altitude (m) and climb angle (rad), or None.
@@ -287,37 +287,43 @@ def straight(
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.fdm import Fdm
     >>> model = Fdm(load_aircraft("aerosonde"))
-    >>> level = straight(model, 25.0, 500.0)
-    >>> 0.3 < level.throttle < 0.9, straight(model, 90.0, 500.0) is None
+    >>> level = steady_flight(model, 25.0, 500.0)
+    >>> 0.3 < level.throttle < 0.9, steady_flight(model, 90.0, 500.0) is None
     (True, True)
     """
     found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
     if found_trim is None and near is None:
         # With little excess power the search fails from a distant start, and succeeds from the climb at the same
         # airspeed.
-        steepest_climb = full_throttle(simulator, airspeed, amsl)
+        steepest_climb = full_throttle_climb(simulator, airspeed, amsl)
         if steepest_climb is not None and steepest_climb.climb >= climb:
             found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, steepest_climb)
     return found_trim
 
 
-def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+def full_throttle_climb(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
     """Return the steepest steady climb at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
 
 
-def idle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
     """Return the steepest steady descent, with closed throttle, at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
-def fastest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return level flight at full throttle, or None."""
+def fastest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Return level flight at full throttle, or None if there is no trim.
+
+    amsl: altitude, m.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, near)
 
 
-def slowest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return level flight with the elevator at its upper stop, or None."""
+def slowest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Return level flight with the elevator at its upper stop, or None if there is no trim.
+
+    amsl: altitude, m.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, near)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import Trim, linearise, straight
+from flight.dynamics.trim import Trim, linearise, steady_flight
 from flight.guidance.gains import Gains
 from world.arrays import Floats
 from world.errors import FlightError
@@ -97,7 +97,7 @@ def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, floa
 
 
 def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
-    level = straight(fdm, aircraft.airspeed, AMSL)
+    level = steady_flight(fdm, aircraft.airspeed, AMSL)
     if level is None:
         message = f"{aircraft.name} cannot hold level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
         raise FlightError(message, file=aircraft.model_file, field="airspeed", value=aircraft.airspeed)

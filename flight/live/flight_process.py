@@ -376,7 +376,7 @@ class _LoggedFlight:
                 time_origin += (due_ticks - max_due_ticks) * TICK / speed
                 due_ticks = max_due_ticks
             if due_ticks > 0:
-                rows, end_reason = self._flight.block(due_ticks)
+                rows, end_reason = self._flight.fly_block(due_ticks)
                 ticks += due_ticks
                 if len(rows):
                     self._unwritten_rows.append(rows)

@@ -78,7 +78,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
     data = data[:MAX_DATAGRAM_BYTES]
     offset = 0
     while offset < len(data) and len(frames) < MAX_FRAMES:
-        frame = _parse_frame_at(data, offset) if data[offset] in (MAGIC_V1, MAGIC_V2) else None
+        frame = _parse_frame(data, offset) if data[offset] in (MAGIC_V1, MAGIC_V2) else None
         if frame is None:
             offset += 1
         else:
@@ -87,7 +87,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
     return frames
 
 
-def _parse_frame_at(data: bytes, offset: int) -> MavlinkFrame | None:
+def _parse_frame(data: bytes, offset: int) -> MavlinkFrame | None:
     """Return the frame that starts at an offset, or None if no complete frame starts there."""
     is_v2 = data[offset] == MAGIC_V2
     header_size = 10 if is_v2 else 6

@@ -297,9 +297,9 @@ class Requests:
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self.arming.set_mode(_to_integer(message.param2))
         if number == mavlink.MAV_CMD_MISSION_START:
-            return self.arming.start()
+            return self.arming.start_mission()
         if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
-            return self.arming.pause(message.param1 == 1)
+            return self.arming.pause_or_continue(message.param1 == 1)
         if number in _MODE_COMMANDS:
             return self.arming.set_mode(_MODE_COMMANDS[number])
         if number == mavlink.MAV_CMD_DO_REPOSITION:

@@ -39,7 +39,7 @@ TIME_LIMIT_BASE_S = 60.0
 
 
 class Airborne(ABC):
-    """One flight in progress, advanced by `block`.
+    """One flight in progress, advanced by `fly_block`.
 
     dt: duration of a tick, s.
     setup: setup of the flight, with the program that flies once that is known.
@@ -74,7 +74,7 @@ class Airborne(ABC):
         self._steps = setup.fdm_hz // setup.guidance_hz
         self.dt = self._steps / setup.fdm_hz
         self._gains = gains
-        self._lay_out(setup, aircraft, local_map or LocalMap.around(setup))
+        self._prepare_route(setup, aircraft, local_map or LocalMap.around(setup))
         self._new_fdm = partial(
             Fdm,
             aircraft,
@@ -85,8 +85,8 @@ class Airborne(ABC):
         )
         self.fdm = self._new_fdm()
 
-    def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
-        """Create the workspace for a route, and set the time limit of the flight."""
+    def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
+        """Create the workspace for a route, and set the flight's time limit."""
         self.setup, self.map = setup, local_map
         # An autopilot with its own turns does not follow the arcs after fly-over waypoints.
         follows_arcs = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
@@ -171,7 +171,7 @@ class Airborne(ABC):
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         return trimmed
 
-    def block(self, count: int) -> tuple[Rows, str]:
+    def fly_block(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks, and return their rows and the reason for the flight's end, "" if it continues."""
         row_blocks: list[Rows] = []
         end_reason = ""
@@ -182,7 +182,7 @@ class Airborne(ABC):
         return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
 
     def _fill_workspace(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `block`."""
+        """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `fly_block`."""
         workspace = self._workspace
         workspace.turbulence[:count] = self._random.standard_normal((count, 3))
         if self._navigation_random is not None:

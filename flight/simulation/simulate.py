@@ -14,7 +14,7 @@ from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
 from flight.dynamics.jsbsim_properties import Getter, Setter
 from flight.dynamics.model_program import UnsupportedModel
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
 from flight.mission.ground_ways import GroundPhases
@@ -175,13 +175,13 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
     >>> from flight.simulation.track import TRACK_ROW
     >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
     >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
-    >>> flight = SimpleNamespace(dt=1 / 60, memory=at, path=path, block=lambda count: next(blocks))
+    >>> flight = SimpleNamespace(dt=1 / 60, memory=at, path=path, fly_block=lambda count: next(blocks))
     >>> [(len(block.rows), block.ended) for block in simulate(flight)]
     [(60, ''), (12, 'ground contact')]
     """
     end_reason = ""
     while not end_reason:
-        rows, end_reason = flight.block(round(BLOCK / flight.dt))
+        rows, end_reason = flight.fly_block(round(BLOCK / flight.dt))
         yield FlightBlock(rows, end_reason, min(float(flight.memory.distance), flight.path.length))
 
 
@@ -289,7 +289,7 @@ class Flight(Airborne):
         old_record, old_memory = self._work, self._workspace.own
         # The aircraft is in the air, even if the new mission starts with a take-off.
         self._ground_phases = GroundPhases()
-        self._lay_out(setup, self.fdm.aircraft, local_map)
+        self._prepare_route(setup, self.fdm.aircraft, local_map)
         for name in _DIVERSION_RECORDS:
             setattr(self._work, name, getattr(old_record, name))
         for name in _PATH_MEMORY_FIELDS:
@@ -308,7 +308,7 @@ class Flight(Airborne):
         if setup.autopilot.equivalent_airspeeds:
             true_airspeed = start.airspeed * setup.autopilot.airspeed_factor(start.amsl)
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true_airspeed))
-        level = straight(model, reference_airspeed, start.amsl)
+        level = steady_flight(model, reference_airspeed, start.amsl)
         if level is None:
             reason = f"no level flight at {reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=reference_airspeed)
@@ -316,7 +316,7 @@ class Flight(Airborne):
         self._start_fdm()
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
-        memory.trim_throttle = (straight(model, start.airspeed, start.amsl) or level).throttle
+        memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level).throttle
         memory.last_airspeed = -1.0
         memory.stall_speed = self.fdm.aircraft.stall_speed
 

@@ -13,7 +13,7 @@ from aircraft.catalog import Aircraft, model_hash
 from aircraft.path_limits import Limits
 from aircraft.uncertainty import DRAWS_FILE, read_draws
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
@@ -184,7 +184,7 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
     _check_draws(base)
     model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
     amsl = float(base.scenario.start[2])
-    if straight(model, base.airframe.airspeed, amsl) is None:
+    if steady_flight(model, base.airframe.airspeed, amsl) is None:
         factors = ", ".join(
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )

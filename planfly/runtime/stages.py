@@ -97,7 +97,7 @@ def progress(callback: Callable[[str, float, float, str], None]) -> AbstractCont
     """
 
     @contextmanager
-    def begin_stage(title: str, _kind: str) -> Iterator[Advance]:
+    def start_stage(title: str, _kind: str) -> Iterator[Advance]:
         yield lambda done, total, remark: callback(title, done, total, remark)
 
     return send_progress_to(Receiver(start_stage, lambda line: callback(line, 0.0, 0.0, "")))

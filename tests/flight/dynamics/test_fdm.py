@@ -13,7 +13,7 @@ from aircraft.catalog import load_aircraft
 from flight.dynamics.fdm import Fdm, Variation, check_start_position, silence
 from flight.dynamics.jsbsim_properties import FOOT, TERRAIN
 from flight.dynamics.state import STATE, Commands
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from world.errors import FlightError
 from world.kernels import Record, field_names
 
@@ -371,7 +371,7 @@ def test_variations_change_what_they_say() -> None:
         "drag": Variation(drag=1.3),
         "control": Variation(control=0.75),
     }.items():
-        found = straight(Fdm(AEROSONDE, variation=variation), 25.0, 500.0)
+        found = steady_flight(Fdm(AEROSONDE, variation=variation), 25.0, 500.0)
         assert found is not None
         level[name] = found
     lift = {name: 0.23 + 5.61 * trim.alpha + 0.13 * trim.elevator for name, trim in level.items()}

@@ -252,11 +252,11 @@ def test_a_seed_of_the_wind_wins(make_setup: MakeSetup, aerosonde: Aircraft) -> 
 def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     flight = Flight(replace(make_setup(WAY), engine="jsbsim"), aerosonde)
     for _ in range(8):
-        rows, ended = flight.block(60)
+        rows, ended = flight.fly_block(60)
         assert not ended
     flight.fdm.write(np.full(4, math.nan))
     flight.fdm.step()
-    rows, ended = flight.block(60)
+    rows, ended = flight.fly_block(60)
     assert ended == "loss of control: the state is not a number"
     assert len(rows) == 0
     assert np.isfinite(flight.memory.tolist()).all()
