@@ -280,17 +280,18 @@ class Peer:
 
     periods: intervals between messages, s; None for a message that is off.
     due: next time of each message.
-    parameter: number of the next parameter to send, if the station requested all parameters.
+    last_heard_time: time at which the station was last heard, s of the link's clock.
+    next_parameter: number of the next parameter to send, if the station requested all parameters; otherwise None.
     """
 
     address: Address
     system: int
     component: int
-    heard: float
+    last_heard_time: float
     mav: Any
     periods: dict[str, float | None] = field(default_factory=lambda: dict(PERIODS))
     due: dict[str, float] = field(default_factory=dict)
-    parameter: float | None = None
+    next_parameter: float | None = None
 
     @property
     def station(self) -> Station:
@@ -505,7 +506,7 @@ class Link:
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
         now = self.clock()
-        self.peers = {key: peer for key, peer in self.peers.items() if now - peer.heard < SILENCE}
+        self.peers = {key: peer for key, peer in self.peers.items() if now - peer.last_heard_time < SILENCE}
         peer = self.peers.get(source)
         if peer is None:
             if len(self.peers) >= MAX_PEERS:
@@ -515,7 +516,7 @@ class Link:
             # Spread over the first tenth of a second, so that not everything is sent at once.
             peer.due = {name: now + 0.1 * index / len(PERIODS) for index, name in enumerate(PERIODS)}
             self.peers[source] = peer
-        peer.heard = now
+        peer.last_heard_time = now
         return peer
 
     def _frame_sequence(self, address: Address) -> Any:
@@ -530,7 +531,7 @@ class Link:
     def remove_silent_peers(self) -> None:
         """Remove the peers that have been silent for `SILENCE`."""
         now = self.clock()
-        for key in [key for key, peer in self.peers.items() if now - peer.heard >= SILENCE]:
+        for key in [key for key, peer in self.peers.items() if now - peer.last_heard_time >= SILENCE]:
             del self.peers[key]
 
     def send(self, message: Any, peer: Peer) -> None:

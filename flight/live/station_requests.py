@@ -370,7 +370,7 @@ class Requests:
         return [StatusText(_NO_GUIDED_TARGET_TEXT, WARNING)]
 
     def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
-        peer.parameter = 0.0
+        peer.next_parameter = 0.0
         return []
 
     def _read_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:

@@ -134,14 +134,14 @@ class Downlink:
             peer.due[name] = due_time + period if now - due_time < _MAX_DELAY_S else now + period
 
     def _stream_parameters(self, peer: Peer) -> None:
-        if peer.parameter is None:
+        if peer.next_parameter is None:
             return
-        first_number, entries = int(peer.parameter), self._parameters.entries
-        peer.parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
-        for number in range(first_number, min(int(peer.parameter), len(entries))):
+        first_number, entries = int(peer.next_parameter), self._parameters.entries
+        peer.next_parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
+        for number in range(first_number, min(int(peer.next_parameter), len(entries))):
             self._link.send(self._parameters.message(number), peer)
-        if peer.parameter >= len(entries):
-            peer.parameter = None
+        if peer.next_parameter >= len(entries):
+            peer.next_parameter = None
 
 
 # ----------------------------------------------------------------------

@@ -158,12 +158,12 @@ class FlightBlock(NamedTuple):
     """Some rows of a flight, as `simulate` yields them.
 
     rows: `flight.simulation.track.TRACK_ROW` records, (t,).
-    ended: "completed", or the reason why the flight ended with these rows; "" while it continues.
+    end_reason: "completed", or the reason why the flight ended with these rows; "" while it continues.
     distance: distance along the path so far, m.
     """
 
     rows: Rows
-    ended: str
+    end_reason: str
     distance: float
 
 
@@ -176,7 +176,7 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
     >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
     >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
     >>> flight = SimpleNamespace(dt=1 / 60, memory=at, path=path, fly_block=lambda count: next(blocks))
-    >>> [(len(block.rows), block.ended) for block in simulate(flight)]
+    >>> [(len(block.rows), block.end_reason) for block in simulate(flight)]
     [(60, ''), (12, 'ground contact')]
     """
     end_reason = ""
@@ -207,7 +207,7 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
     ('completed', 12, True)
     """
     blocks = list(simulate(flight))
-    return SimulatedFlight(join_blocks(blocks), blocks[-1].ended, flight.path)
+    return SimulatedFlight(join_blocks(blocks), blocks[-1].end_reason, flight.path)
 
 
 def join_blocks(blocks: Sequence[FlightBlock]) -> Track:

@@ -349,7 +349,7 @@ class Server:
                 session.edit(message)
             case messages.Step():
                 previous_history = session.history
-                session.step(message.kind)
+                session.step_history(message.kind)
                 if session.history is not previous_history:
                     self.jobs.drop_results()
             case messages.Settings():

@@ -153,7 +153,7 @@ class Session:
         self._set_mission(mission)
         self._add_to_history(mission, text)
 
-    def step(self, kind: str) -> None:
+    def step_history(self, kind: str) -> None:
         """Undo, redo, or revert to the opened mission, if there is anything to undo, redo or revert."""
         if kind == "revert":
             if self.is_changed:

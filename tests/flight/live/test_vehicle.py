@@ -198,9 +198,9 @@ def test_the_number_of_a_text_stays_within_16_bits_and_is_never_0(clock: Clock) 
 def test_all_parameters_are_streamed_once_in_order_to_who_asked(clock: Clock) -> None:
     sending = Sending(clock)
     sending.first.periods[NAME] = None
-    sending.first.parameter = 0.0
+    sending.first.next_parameter = 0.0
     rounds = 0
-    while sending.first.parameter is not None:
+    while sending.first.next_parameter is not None:
         sending.downlink.tick(1000.0)
         rounds += 1
     streamed = [one for one in sending.link.messages if one.get_type() == "PARAM_VALUE"]

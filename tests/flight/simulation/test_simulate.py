@@ -219,7 +219,7 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
     assert _digest(join_blocks(blocks)) == first
     # A second of flight each, up to the end of the path.
     assert {len(block.rows) for block in blocks[:-1]} == {60}
-    assert [block.ended for block in blocks] == [""] * (len(blocks) - 1) + ["completed"]
+    assert [block.end_reason for block in blocks] == [""] * (len(blocks) - 1) + ["completed"]
     distances = [block.distance for block in blocks]
     assert distances == sorted(distances)
     assert distances[-1] == flight.path.length

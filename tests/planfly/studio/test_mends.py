@@ -94,7 +94,7 @@ def test_a_failed_undo_leaves_what_is_shown() -> None:
     shown, rev = session.mission, session.rev
     session.history.first = replace(shown, items=shown.items[:1])
     with pytest.raises(PlanflyError):
-        session.step("undo")
+        session.step_history("undo")
     assert session.mission is shown
     assert session.rev == rev
 
@@ -256,17 +256,17 @@ def test_an_opening_is_undone_and_each_document_is_kept_for_itself(tmp_path: Pat
     theirs = session.mission
     session.autosave(kept)
     assert open_session(str(file), MissionOptions(scenario="jacksboro"), kept)[0].mission.items == mine.items
-    session.step("undo")
+    session.step_history("undo")
     assert session.sheet()["undo"] == "open other.waypoints"
-    session.step("undo")
+    session.step_history("undo")
     assert session.mission is mine
     assert session.sheet()["name"] == "m.waypoints"
     assert session.sheet()["over"] == "waypoints"
-    session.step("redo")
-    session.step("redo")
+    session.step_history("redo")
+    session.step_history("redo")
     assert session.mission is theirs
-    session.step("undo")
-    session.step("undo")
+    session.step_history("undo")
+    session.step_history("undo")
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=1.0))
     assert session.redo_text == ""
 

@@ -50,7 +50,7 @@ def draw_edit(session: Session, rng: np.random.Generator) -> None:
                 finding = ready[int(rng.integers(len(ready)))][0]
                 session.edit(messages.Apply(kind="apply", rev=rev, finding=finding, which=0))
         case _:
-            session.step(str(kind))
+            session.step_history(str(kind))
 
 
 def test_edits_and_undos_come_to_the_verdict_of_the_api(tmp_path: Path) -> None:
@@ -85,11 +85,11 @@ def test_undo_goes_back_to_the_first_mission_itself() -> None:
     for step in range(3):
         session.edit(messages.Move(kind="move", rev=session.rev, k=k, up=900.0 + step))
     for _ in range(4):
-        session.step("undo")
+        session.step_history("undo")
     assert session.mission is first
     assert session.judged.verdict == verdict
     assert session.sheet()["redo"]
-    session.step("redo")
+    session.step_history("redo")
     assert session.is_changed
 
 
@@ -194,7 +194,7 @@ def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
     again, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert restored
     assert again.mission.items == session.mission.items
-    again.step("undo")
+    again.step_history("undo")
     assert again.mission is again.history.first
     file.write_text(mission_text(drawn_session(9, 10).mission, "waypoints"), encoding="utf-8")
     other, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
