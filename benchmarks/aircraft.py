@@ -11,7 +11,7 @@ import numpy as np
 from aircraft.catalog import load_aircraft
 from benchmarks.limits import Limit, calm_limits, wind_limits
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import linearise, straight
+from flight.dynamics.trim import linearise, steady_flight
 from tests.aircraft import beard_mclain as reference
 
 CLEAN = Variation(parasite_drag=0.0)
@@ -30,7 +30,7 @@ def against_the_book() -> dict[str, float]:
             if not 0.0 < commands[3] < 1.0:
                 continue
             fdm = Fdm(aerosonde, flat_earth=True)
-            found = straight(fdm, airspeed, 100.0, climb)
+            found = steady_flight(fdm, airspeed, 100.0, climb)
             if found is None:
                 trims.append(math.inf)
                 continue
@@ -41,12 +41,12 @@ def against_the_book() -> dict[str, float]:
                 for a in (linearise(fdm, found)[0], reference.book_linearise(states, commands, world)[0])
             )
             modes.append(np.abs((roots - book) / book).max())
-    clean = straight(Fdm(aerosonde, flat_earth=True, variation=CLEAN), 25.0, 100.0)
+    clean = steady_flight(Fdm(aerosonde, flat_earth=True, variation=CLEAN), 25.0, 100.0)
     published = math.inf
     if clean is not None:
         published = max(abs(getattr(clean, name) / value - 1.0) for name, value in PUBLISHED_TRIM.items())
     fdm = Fdm(aerosonde, flat_earth=True)
-    level = straight(fdm, 25.0, 100.0)
+    level = steady_flight(fdm, 25.0, 100.0)
     constants = math.inf
     if level is not None:
         a, b = linearise(fdm, level)

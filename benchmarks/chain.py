@@ -101,7 +101,7 @@ def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int 
             ended = ""
             for block in simulate(Flight(setup, airframe.aircraft)):
                 recorder.write_rows(block.rows)
-                ended = block.ended
+                ended = block.end_reason
             recorder.finish(ended, None)
 
     work: dict[str, Callable[[], object]] = {

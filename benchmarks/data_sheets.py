@@ -24,7 +24,7 @@ from benchmarks.real_power import fit_without
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import fastest, full_throttle, idle, straight
+from flight.dynamics.trim import fastest_level_flight, full_throttle_climb, idle_descent, steady_flight
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.workflow.data_sheets import make_data_sheet_folder
 from tests.setups import setup_maker
@@ -161,12 +161,12 @@ def performance(aircraft: Aircraft, variation: Variation | None = None) -> Perfo
     """Compute a model's performance at its cruise speed; NaN for a flight that it cannot trim."""
     fdm = Fdm(aircraft, variation=variation, tried=True)
     speed = aircraft.airspeed
-    level = straight(fdm, speed, AMSL)
+    level = steady_flight(fdm, speed, AMSL)
     power = math.nan
     if level is not None:
         fdm.balance(level.vector())
         power = float(fdm.read().power)
-    up, down = full_throttle(fdm, speed, AMSL, level), idle(fdm, speed, AMSL, level)
+    up, down = full_throttle_climb(fdm, speed, AMSL, level), idle_descent(fdm, speed, AMSL, level)
     return Performance(
         math.nan if up is None else up.climb, math.nan if down is None else -speed * math.sin(down.climb), power
     )
@@ -198,7 +198,7 @@ def sheet_of(name: str) -> DataSheet:
     Also of a Cessna, although it is not a small aircraft.
     """
     known = load_aircraft(name)
-    top = fastest(Fdm(known), AMSL)
+    top = fastest_level_flight(Fdm(known), AMSL)
     return DataSheet(
         mass=known.mass,
         span=known.wing_span,

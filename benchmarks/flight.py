@@ -231,7 +231,7 @@ def loop_cost(
     for _ in range(rounds):
         setup = replace(windy(1), guidance_hz=cast("Any", guidance_hz), autopilot=autopilot, engine=engine)
         flight = Flight(setup, aerosonde())
-        flight.block(guidance_hz)
+        flight.fly_block(guidance_hz)
         bare = Fdm(aerosonde(), rate_hz=FDM_HZ)
         trim = bare.start(36.5, -84.2, 600.0, 0.0, 25.0)
         bare.write(np.array(trim.commands()))
@@ -241,7 +241,7 @@ def loop_cost(
             bare.step(round(FDM_HZ) * TURN)
             between = time.process_time()
             for _ in range(TURN):
-                flight.block(guidance_hz)
+                flight.fly_block(guidance_hz)
             stepped, looped = stepped + between - started, looped + time.process_time() - between
         ratios.append(looped / stepped)
         closed.append(seconds / looped)

@@ -30,7 +30,7 @@ from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.parameters import NAMES, PARAMETERS
 from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from flight.simulation.track import Track
 from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
@@ -82,7 +82,7 @@ def drawn_truth(seed: int) -> Truth:
         stable = truth.pitch_stiffness > 0.5 and truth.weathercock > 0.4 and truth.roll_damping > 0.5
         if math.radians(4.0) < flown.climb[0] < math.radians(16.0) and flown.throttle[0] < 0.93 and stable:
             with tempfile.TemporaryDirectory() as name:
-                if straight(Fdm(changed_aerosonde(Path(name) / "tried", truth)), _CRUISE_MPS, AMSL) is not None:
+                if steady_flight(Fdm(changed_aerosonde(Path(name) / "tried", truth)), _CRUISE_MPS, AMSL) is not None:
                     return truth
     raise RuntimeError(f"seed {seed}: no aircraft that flies")
 

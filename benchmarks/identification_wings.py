@@ -24,7 +24,7 @@ from aircraft.identification.estimate import estimate_model
 from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_means
 from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import full_throttle, idle, straight
+from flight.dynamics.trim import full_throttle_climb, idle_descent, steady_flight
 from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.folder import AMSL, DENSITY, folder_files, make_identified
 from planfly.identification.model_text import identified_xml
@@ -66,8 +66,8 @@ def flown_like(aircraft: Aircraft) -> tuple[float, float, float] | None:
     None if it cannot fly.
     """
     fdm = Fdm(aircraft)
-    level = straight(fdm, aircraft.airspeed, AMSL)
-    up, down = (steepest(fdm, aircraft.airspeed, AMSL, level) for steepest in (full_throttle, idle))
+    level = steady_flight(fdm, aircraft.airspeed, AMSL)
+    up, down = (steepest(fdm, aircraft.airspeed, AMSL, level) for steepest in (full_throttle_climb, idle_descent))
     if level is None or up is None or down is None:
         return None
     fdm.balance(level.vector())

@@ -81,7 +81,7 @@ def _models_are_tried_here() -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         if not SOAK:
-            patch.setattr(model_check, "_try", lambda *_: (0, ""))
+            patch.setattr(model_check, "_run_trial", lambda *_: (0, ""))
         yield
 
 

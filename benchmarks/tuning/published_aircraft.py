@@ -12,7 +12,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.model_writer import AeroCoefficients, ModelNumbers, model_xml
 from aircraft.propulsion import ActuatorDisc, ShaftPower
 from flight.dynamics.fdm import Fdm
-from flight.guidance.model_gains import gains_of_model, gains_text
+from flight.guidance.model_gains import gains_from_model, gains_text
 from planfly.workflow.data_sheets import arduplane_parameters, measure_performance, servo_text
 
 # Beard and McLain, first edition, appendix E.1.  The table's drag due to elevator is linear (0.30 a radian) and would
@@ -179,7 +179,7 @@ def write(name: str) -> None:
     climb, sink = math.degrees(flown.climb.climb), math.degrees(flown.idle.climb)
     slow, fast = flown.slowest.airspeed, flown.fastest.airspeed
     print(f"{name}: level {flown.level}\n  climb {climb:.1f}, idle {sink:.1f} degrees; {slow:.2f} to {fast:.2f} m/s")
-    (folder / "gains.toml").write_text(gains_text(gains_of_model(aircraft, fdm)), encoding="utf-8")
+    (folder / "gains.toml").write_text(gains_text(gains_from_model(aircraft, fdm)), encoding="utf-8")
     (folder / "ardupilot.parm").write_text(arduplane_parameters(aircraft, flown, fdm, {}), encoding="utf-8")
     (folder / "ardupilot.toml").write_text(servo_text(aircraft, flown), encoding="utf-8")
 

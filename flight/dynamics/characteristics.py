@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.state import STATE
-from flight.dynamics.trim import Trim, linearise, straight
+from flight.dynamics.trim import Trim, linearise, steady_flight
 from world.arrays import Floats
 
 # Altitude of all measurements, m AMSL.
@@ -72,7 +72,7 @@ class StepResponse:
 
     control: a field of `flight.dynamics.state.Commands`.
     size: deflection, rad, or fraction of full throttle.
-    held: duration of the deflection, s; infinite for a step.
+    hold_time: duration of the deflection, s; infinite for a step.
     time: (t,) s.
     quantities: the k fields of `flight.dynamics.state.STATE` that are shown.
     change: (t, k) deviation of these quantities from the trim, SI and radians.
@@ -80,14 +80,14 @@ class StepResponse:
 
     control: str
     size: float
-    held: float
+    hold_time: float
     time: Floats
     quantities: tuple[str, ...]
     change: Floats
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Return the trimmed level flights at evenly spaced speeds that guidance may use, without speeds that have no trim.
+    """Return the trimmed level flights at evenly spaced guidance speeds, without speeds that have no trim.
 
     >>> from aircraft.catalog import load_aircraft
     >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
@@ -99,22 +99,22 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
     fdm = Fdm(aircraft)
     rows = []
     for airspeed in np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, count):
-        found = straight(fdm, float(airspeed), TRIM_AMSL)
-        if found is None:
+        trim = steady_flight(fdm, float(airspeed), TRIM_AMSL)
+        if trim is None:
             continue
-        fdm.balance(found.vector())
+        fdm.balance(trim.vector())
         power = float(fdm.read().power)
-        rows.append(TrimRow(found, power, 0.8 * aircraft.battery_energy / power if power > 0.0 else math.nan))
+        rows.append(TrimRow(trim, power, 0.8 * aircraft.battery_energy / power if power > 0.0 else math.nan))
     return tuple(rows)
 
 
-def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tuple[Mode, ...]:
+def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tuple[Mode, ...]:
     """Return the named modes of level flight at this airspeed (m/s) and altitude (m).
 
     Return an empty tuple if there is no such flight.
 
     >>> from aircraft.catalog import load_aircraft
-    >>> for mode in modes_at(load_aircraft("aerosonde"), 25.0):
+    >>> for mode in level_flight_modes(load_aircraft("aerosonde"), 25.0):
     ...     print(f"{mode.name}: {mode.root:.3g}")
     short period: -4.51+9.48j
     phugoid: -0.132+0.484j
@@ -123,12 +123,12 @@ def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tu
     spiral: 0.0917+0j
     """
     fdm = Fdm(aircraft)
-    found = straight(fdm, airspeed, amsl)
-    return () if found is None else name_modes(linearise(fdm, found)[0], airspeed)
+    trim = steady_flight(fdm, airspeed, amsl)
+    return () if trim is None else name_modes(linearise(fdm, trim)[0], airspeed)
 
 
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
-    """Name the modes of A (8, 8), states as in `flight.dynamics.trim.linearise`, by their eigenvectors.
+    """Name the modes of the matrix A (8, 8), by their eigenvectors; states as in `flight.dynamics.trim.linearise`.
 
     The longitudinal modes are, from fast to slow, short period and phugoid. A lateral oscillation is the Dutch roll,
     and a second, slower oscillation is the roll-spiral; the faster real root is roll, and the slower real root is
@@ -136,12 +136,12 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
     """
     roots, vectors = np.linalg.eig(a)
     # Convert speeds to angles, so that the components of an eigenvector can be compared.
-    sizes = np.abs(vectors) / np.array([airspeed] * 3 + [1.0] * 5)[:, None]
-    longitudinal_fraction = (sizes[_IS_LONGITUDINAL] ** 2).sum(axis=0) / (sizes**2).sum(axis=0)
+    magnitudes = np.abs(vectors) / np.array([airspeed] * 3 + [1.0] * 5)[:, None]
+    longitudinal_fraction = (magnitudes[_IS_LONGITUDINAL] ** 2).sum(axis=0) / (magnitudes**2).sum(axis=0)
     longitudinal_roots: list[complex] = []
     lateral_roots: list[complex] = []
     for k in np.argsort(-np.abs(roots), kind="stable"):
-        # One of each pair.
+        # One root of each complex pair.
         if roots[k].imag >= 0.0:
             (longitudinal_roots if longitudinal_fraction[k] > 0.5 else lateral_roots).append(complex(roots[k]))
     modes = [Mode("short period" if k == 0 else "phugoid", root) for k, root in enumerate(longitudinal_roots)]
@@ -153,12 +153,12 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
 
 
 def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
-    """Return the responses to each control alone, without guidance, from level flight at cruise.
+    """Return the response to each single control, without guidance, from level flight at cruise.
 
-    Each control moves by a tenth of its travel, because less would be lost in the play of some models' actuators.
-    Elevator (up) and throttle (down if it cannot open that much further) stay; aileron and rudder return after a
-    second, because no aircraft stays upright with them held. A control without effect, such as a flying wing's rudder,
-    is left out.
+    Each control moves by a tenth of its travel, because a smaller movement would be lost in the play of some models'
+    actuators. Elevator (up) and throttle (down if it cannot open that much further) stay deflected; aileron and rudder
+    return after a second, because no aircraft stays upright while they are deflected. A control without effect, such
+    as a flying wing's rudder, is omitted.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for step in step_responses(load_aircraft("aerosonde")):
@@ -172,7 +172,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     elevator, aileron, rudder = (
         0.1 * max_deflection for max_deflection in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
-    level = straight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
+    level = steady_flight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
     longitudinal_quantities, lateral_quantities = (
         ("pitch", "alpha", "airspeed", "amsl"),
@@ -188,20 +188,20 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 
 
 def _step_response(
-    aircraft: Aircraft, control: str, size: float, held: float, seconds: float, quantities: tuple[str, ...]
+    aircraft: Aircraft, control: str, size: float, hold_time: float, duration: float, quantities: tuple[str, ...]
 ) -> StepResponse:
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
     commands = fdm.start(*_POSITION_DEG, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
-    moved = commands._replace(**{control: getattr(commands, control) + size})
-    count = round(seconds * _RATE_HZ)
+    moved_commands = commands._replace(**{control: getattr(commands, control) + size})
+    count = round(duration * _RATE_HZ)
     states = np.zeros(count + 1, STATE)
     states[0] = fdm.read()
     for k in range(count):
-        fdm.write(moved if _STEP_TIME_S <= k / _RATE_HZ < _STEP_TIME_S + held else commands)
+        fdm.write(moved_commands if _STEP_TIME_S <= k / _RATE_HZ < _STEP_TIME_S + hold_time else commands)
         fdm.step()
         states[k + 1] = fdm.read()
     change = np.column_stack([_unwrap_states(states, name) - states[name][0] for name in quantities])
-    return StepResponse(control, size, held, states["time"].copy(), quantities, change)
+    return StepResponse(control, size, hold_time, states["time"].copy(), quantities, change)
 
 
 def _unwrap_states(states: NDArray[np.record], name: str) -> Floats:

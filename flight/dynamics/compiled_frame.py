@@ -48,20 +48,20 @@ FRAME = record_dtype(
     "dt",  # s
     "time",  # s
     # Motion, in inertial axes with the center of the earth at rest (ECI).
-    "attitude_real",  # of the quaternion to the body's axes
-    ("attitude", *_VECTOR),  # the other parts of it
+    "attitude_real",  # real part of the quaternion to the body's axes
+    ("attitude", *_VECTOR),  # its other parts
     "attitude_rate_real",  # 1/s
     ("attitude_rate", *_VECTOR),
     ("inertial_rates", *_VECTOR),  # about the body's axes, rad/s
     ("angular_acceleration", *_VECTOR),  # about the body's axes, rad/s^2
     ("position", *_VECTOR),  # ft
     ("velocity", *_VECTOR),  # ft/s
-    ("velocity_before", *_VECTOR),
-    ("velocity_two_before", *_VECTOR),
+    ("last_velocity", *_VECTOR),
+    ("second_last_velocity", *_VECTOR),
     ("acceleration", *_VECTOR),  # ft/s^2
-    ("acceleration_before", *_VECTOR),
+    ("last_acceleration", *_VECTOR),
     ("specific_force", *_VECTOR),  # along the body's axes, ft/s^2
-    # Place.
+    # Position.
     "earth_angle",  # rad, from inertial axes to axes fixed to the earth (ECEF)
     "earth_sin",
     "earth_cos",
@@ -99,8 +99,8 @@ FRAME = record_dtype(
     "load_factor",
     "dynamic_pressure",  # lbf/ft^2
     "pressure_area",  # lbf
-    "span_time",  # s, span by twice the airspeed
-    "chord_time",
+    "span_time",  # s, span over twice the airspeed
+    "chord_time",  # s, chord over twice the airspeed
     # Sums of the aerodynamic functions.
     ("aero_force", *_VECTOR),  # lbf, in stability axes: drag, side force, lift
     ("aero_moment", *_VECTOR),  # lbf ft, about the body's axes
@@ -117,27 +117,27 @@ FRAME = record_dtype(
 )
 # Registers of the frame.
 FRAME_NUMBERS = FRAME.itemsize // 8
-# The code begins with the number of steps in a tick and the first number of each of its sections, which follow one
-# another.
+# Header of the code: the number of steps in a tick, and the index of the first number of each section. The sections
+# follow one another.
 STEPS = 0
-FCS_BEGIN = 1
-AERO_BEGIN = 2
-EXTERNAL_BEGIN = 3
+FCS_START = 1
+AERO_START = 2
+EXTERNAL_START = 3
 # External forces and moments.
-FORCES_BEGIN = 4
+FORCES_START = 4
 # Registers of `flight.simulation.tick.READ_FIELDS`.
-READS_BEGIN = 5
+READS_START = 5
 # Registers of the fields of `flight.simulation.tick.OUTPUT`.
-WRITES_BEGIN = 6
+WRITES_START = 6
 CODE_END = 7
 # Length of this header.
 CODE_HEADER = 8
-# Numbers of an external force or moment: register of its magnitude, and first register of its axes.
+# Numbers in the code for an external force or moment: register of its magnitude, and first register of its axes.
 FORCE_NUMBERS = 2
-# Registers of the axes of an external force or moment.
+# Offsets of the directions of an external force and of an external moment among its registers.
 FORCE_DIRECTION = 0
 MOMENT_DIRECTION = 3
-# Arm from the center of gravity, ft.
+# Offset of the arm from the center of gravity, ft.
 FORCE_ARM = 6
 # Number of these registers.
 FORCE_REGISTERS = 9
@@ -149,7 +149,7 @@ FORCE_REGISTERS = 9
 GRAVITY_PARAMETER = 14.0764417572e15
 # Dynamic form factor of the earth.
 J2 = 1.08262982e-03
-# Slugs in a kilogram, as JSBSim's atmosphere has them.
+# Slugs in a kilogram, the value in JSBSim's atmosphere.
 _SLUGS = 0.06852168
 # Standard gravity, ft/s^2.
 STANDARD_GRAVITY = 9.80665 / FOOT
@@ -171,9 +171,9 @@ _PRESSURE_EXPONENT = STANDARD_GRAVITY / (_GAS_CONSTANT * _LAPSE_RATE)
 _TROPOPAUSE_PRESSURE = _SEA_LEVEL_PRESSURE * math.pow(
     _SEA_LEVEL_TEMPERATURE / (_SEA_LEVEL_TEMPERATURE + _LAPSE_RATE * (_TROPOPAUSE - 0.0)), _PRESSURE_EXPONENT
 )
-# Airspeed below which there are no angles of flow, ft/s.
+# Airspeed below which alpha and beta are zero, ft/s.
 _MIN_AIRSPEED = 0.001
-# Square of the airspeed in the plane of symmetry below which there is no angle of attack, ft^2/s^2.
+# Square of the airspeed in the plane of symmetry below which alpha is zero, ft^2/s^2.
 _MIN_SYMMETRIC_AIRSPEED_2 = 1e-6
 
 
@@ -183,70 +183,70 @@ def step(frame: Record, numbers: Floats, code: Code, contacts: Records, friction
 
     frame: the record of `FRAME` at the start of the numbers.
     numbers: registers of the model.
-    code: sections as stated above.
+    code: header and sections as described above.
     contacts, frictions: of `flight.dynamics.ground_contact`; there may be no contacts.
     """
     _integrate(frame)
-    _update_place(frame)
+    _update_position(frame)
     _update_motion(frame)
     _update_gravity(frame)
     _update_atmosphere(frame)
-    run_instructions(numbers, code, code[FCS_BEGIN], code[AERO_BEGIN])
+    run_instructions(numbers, code, code[FCS_START], code[AERO_START])
     _update_air_data(frame)
-    run_instructions(numbers, code, code[AERO_BEGIN], code[EXTERNAL_BEGIN])
+    run_instructions(numbers, code, code[AERO_START], code[EXTERNAL_START])
     force, moment = _aerodynamic_forces(frame)
     ground_force, ground_moment, count = contact_forces(frame, contacts, frictions)
-    run_instructions(numbers, code, code[EXTERNAL_BEGIN], code[FORCES_BEGIN])
+    run_instructions(numbers, code, code[EXTERNAL_START], code[FORCES_START])
     external_force, external_moment = _external_forces(numbers, code)
     force = add(add(force, ground_force), external_force)
     moment = add(add(moment, ground_moment), external_moment)
     _accelerate(frame, force, moment)
     if count > 0:
-        _rub(frame, contacts, frictions, count)
+        _add_friction(frame, contacts, frictions, count)
 
 
 @inner
 def _integrate(frame: Record) -> None:
-    """Integrate the motion: attitude and rates by Euler's method, velocity and position by Adams and Bashforth's."""
+    """Integrate attitude and rates by Euler's method, velocity and position by the Adams-Bashforth method."""
     dt = frame.dt
-    real = frame.attitude_real + dt * frame.attitude_rate_real
-    others = add(vector_of(frame.attitude), scale(dt, vector_of(frame.attitude_rate)))
-    attitude = unit_quaternion((real, others))
+    real_part = frame.attitude_real + dt * frame.attitude_rate_real
+    vector_part = add(vector_of(frame.attitude), scale(dt, vector_of(frame.attitude_rate)))
+    attitude = unit_quaternion((real_part, vector_part))
     frame.attitude_real = attitude[0]
     set_vector(frame.attitude, attitude[1])
     set_vector(
         frame.inertial_rates, add(vector_of(frame.inertial_rates), scale(dt, vector_of(frame.angular_acceleration)))
     )
-    velocity, before, two_before = frame.velocity, frame.velocity_before, frame.velocity_two_before
+    velocity, last_velocity, second_last_velocity = frame.velocity, frame.last_velocity, frame.second_last_velocity
     twelfth = (1.0 / 12.0) * dt
     for k in range(3):
-        frame.position[k] += twelfth * (23.0 * velocity[k] - 16.0 * before[k] + 5.0 * two_before[k])
-        two_before[k], before[k] = before[k], velocity[k]
-        velocity[k] += dt * (1.5 * frame.acceleration[k] - 0.5 * frame.acceleration_before[k])
-        frame.acceleration_before[k] = frame.acceleration[k]
+        frame.position[k] += twelfth * (23.0 * velocity[k] - 16.0 * last_velocity[k] + 5.0 * second_last_velocity[k])
+        second_last_velocity[k], last_velocity[k] = last_velocity[k], velocity[k]
+        velocity[k] += dt * (1.5 * frame.acceleration[k] - 0.5 * frame.last_acceleration[k])
+        frame.last_acceleration[k] = frame.acceleration[k]
     frame.earth_angle += EARTH_RATE * dt
     frame.time += dt
 
 
 @inner
-def _update_place(frame: Record) -> None:
-    """Compute the place on the ellipsoid, and the local axes."""
+def _update_position(frame: Record) -> None:
+    """Compute the position on the ellipsoid, and the local axes."""
     cos, sin = math.cos(frame.earth_angle), math.sin(frame.earth_angle)
     frame.earth_cos, frame.earth_sin = cos, sin
-    place = transform(rotation(cos, sin), vector_of(frame.position))
-    set_vector(frame.place, place)
-    x, y, z = place
+    earth_position = transform(rotation(cos, sin), vector_of(frame.position))
+    set_vector(frame.place, earth_position)
+    x, y, z = earth_position
     radius = math.sqrt(x * x + y * y + z * z)
-    equatorial = math.sqrt(x * x + y * y)
-    geocentric = math.atan2(z, equatorial)
-    frame.radius, frame.geocentric_latitude = radius, geocentric
-    frame.latitude, frame.geodetic_altitude, sin_lat, cos_lat = geodetic(place)
+    axis_distance = math.sqrt(x * x + y * y)
+    geocentric_latitude = math.atan2(z, axis_distance)
+    frame.radius, frame.geocentric_latitude = radius, geocentric_latitude
+    frame.latitude, frame.geodetic_altitude, sin_lat, cos_lat = geodetic(earth_position)
     frame.longitude = math.atan2(y, x)
-    cos_geocentric = math.cos(geocentric)
+    cos_geocentric = math.cos(geocentric_latitude)
     frame.altitude = radius - SEMI_MAJOR * AXES_RATIO / math.sqrt(
         1.0 - ECCENTRICITY_2 * cos_geocentric * cos_geocentric
     )
-    sin_lon, cos_lon = y / equatorial, x / equatorial
+    sin_lon, cos_lon = y / axis_distance, x / axis_distance
     set_matrix(frame.earth_to_local, _local_axes(sin_lat, cos_lat, sin_lon, cos_lon))
 
 
@@ -263,18 +263,18 @@ def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) 
 @inner
 def _update_motion(frame: Record) -> None:
     """Compute the axes of the body, and its motion relative to the earth."""
-    to_earth = rotation(frame.earth_cos, frame.earth_sin)
+    inertial_to_earth = rotation(frame.earth_cos, frame.earth_sin)
     quaternion = (frame.attitude_real, vector_of(frame.attitude))
-    to_body = matrix_of_quaternion(quaternion)
-    local_to_body = product_back(to_body, product(matrix_of(frame.earth_to_local), to_earth))
-    set_matrix(frame.inertial_to_body, to_body)
+    inertial_to_body = matrix_of_quaternion(quaternion)
+    local_to_body = product_back(inertial_to_body, product(matrix_of(frame.earth_to_local), inertial_to_earth))
+    set_matrix(frame.inertial_to_body, inertial_to_body)
     set_matrix(frame.local_to_body, local_to_body)
-    set_matrix(frame.earth_to_body, product_back(to_body, to_earth))
-    turning = cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position))
-    body_velocity = transform(to_body, subtract(vector_of(frame.velocity), turning))
+    set_matrix(frame.earth_to_body, product_back(inertial_to_body, inertial_to_earth))
+    earth_velocity = cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position))
+    body_velocity = transform(inertial_to_body, subtract(vector_of(frame.velocity), earth_velocity))
     set_vector(frame.body_velocity, body_velocity)
     inertial_rates = vector_of(frame.inertial_rates)
-    set_vector(frame.rates, subtract(inertial_rates, transform(to_body, (0.0, 0.0, EARTH_RATE))))
+    set_vector(frame.rates, subtract(inertial_rates, transform(inertial_to_body, (0.0, 0.0, EARTH_RATE))))
     rate = quaternion_rate(quaternion, inertial_rates)
     frame.attitude_rate_real = rate[0]
     set_vector(frame.attitude_rate, rate[1])
@@ -286,35 +286,35 @@ def _update_motion(frame: Record) -> None:
 
 @inner
 def _update_gravity(frame: Record) -> None:
-    """Compute the gravity of the flattened earth."""
+    """Compute gravity over the oblate earth."""
     radius = frame.radius
     sin_lat = math.sin(frame.geocentric_latitude)
     ratio = SEMI_MAJOR / radius
-    common = 1.5 * J2 * ratio * ratio
-    across = 1.0 - 5.0 * (sin_lat * sin_lat)
-    along = 3.0 - 5.0 * (sin_lat * sin_lat)
-    pull = GRAVITY_PARAMETER / (radius * radius)
+    j2_term = 1.5 * J2 * ratio * ratio
+    equatorial_factor = 1.0 - 5.0 * (sin_lat * sin_lat)
+    polar_factor = 3.0 - 5.0 * (sin_lat * sin_lat)
+    central_gravity = GRAVITY_PARAMETER / (radius * radius)
     place, gravity = frame.place, frame.gravity
-    gravity[0] = -pull * ((1.0 + (common * across)) * place[0] / radius)
-    gravity[1] = -pull * ((1.0 + (common * across)) * place[1] / radius)
-    gravity[2] = -pull * ((1.0 + (common * along)) * place[2] / radius)
+    gravity[0] = -central_gravity * ((1.0 + (j2_term * equatorial_factor)) * place[0] / radius)
+    gravity[1] = -central_gravity * ((1.0 + (j2_term * equatorial_factor)) * place[1] / radius)
+    gravity[2] = -central_gravity * ((1.0 + (j2_term * polar_factor)) * place[2] / radius)
 
 
 @inner
 def _update_atmosphere(frame: Record) -> None:
-    """Compute the air of the standard atmosphere of 1976, below 20 km."""
-    height = (frame.altitude * _GEOPOTENTIAL_RADIUS) / (_GEOPOTENTIAL_RADIUS + frame.altitude)
-    if height < _TROPOPAUSE:
-        if height <= 0.0:
-            temperature = _SEA_LEVEL_TEMPERATURE + height * _LAPSE_RATE
+    """Compute temperature, pressure and density in the standard atmosphere of 1976, below 20 km."""
+    geopotential_altitude = (frame.altitude * _GEOPOTENTIAL_RADIUS) / (_GEOPOTENTIAL_RADIUS + frame.altitude)
+    if geopotential_altitude < _TROPOPAUSE:
+        if geopotential_altitude <= 0.0:
+            temperature = _SEA_LEVEL_TEMPERATURE + geopotential_altitude * _LAPSE_RATE
         else:
-            share = (height - 0.0) / _TROPOPAUSE
-            temperature = share * (_STRATOSPHERE_TEMPERATURE - _SEA_LEVEL_TEMPERATURE) + _SEA_LEVEL_TEMPERATURE
-        ratio = _SEA_LEVEL_TEMPERATURE / (_SEA_LEVEL_TEMPERATURE + _LAPSE_RATE * height)
+            fraction = (geopotential_altitude - 0.0) / _TROPOPAUSE
+            temperature = fraction * (_STRATOSPHERE_TEMPERATURE - _SEA_LEVEL_TEMPERATURE) + _SEA_LEVEL_TEMPERATURE
+        ratio = _SEA_LEVEL_TEMPERATURE / (_SEA_LEVEL_TEMPERATURE + _LAPSE_RATE * geopotential_altitude)
         pressure = _SEA_LEVEL_PRESSURE * math.pow(ratio, _PRESSURE_EXPONENT)
     else:
         temperature = _STRATOSPHERE_TEMPERATURE
-        exponent = -STANDARD_GRAVITY * (height - _TROPOPAUSE) / (_GAS_CONSTANT * temperature)
+        exponent = -STANDARD_GRAVITY * (geopotential_altitude - _TROPOPAUSE) / (_GAS_CONSTANT * temperature)
         pressure = _TROPOPAUSE_PRESSURE * math.exp(exponent)
     frame.temperature, frame.pressure = temperature, pressure
     frame.density = pressure / (_GAS_CONSTANT * temperature)
@@ -322,7 +322,7 @@ def _update_atmosphere(frame: Record) -> None:
 
 @inner
 def _update_air_data(frame: Record) -> None:
-    """Compute airspeed, angles of flow, pressures and the load factor of the previous step."""
+    """Compute airspeed, alpha, beta and pressures, and the load factor of the previous step."""
     wind = add(vector_of(frame.wind), vector_of(frame.gust))
     u, v, w = subtract(vector_of(frame.body_velocity), transform(matrix_of(frame.local_to_body), wind))
     symmetric_2 = u * u + w * w
@@ -337,10 +337,10 @@ def _update_air_data(frame: Record) -> None:
     set_vector(frame.air_rates, vector_of(frame.rates))
     frame.dynamic_pressure = 0.5 * frame.density * airspeed_2
     frame.load_factor = -(frame.specific_force[2] * (1.0 / STANDARD_GRAVITY))
-    twice = 2.0 * airspeed
-    if twice != 0.0:
-        frame.span_time = frame.wing_span / twice
-        frame.chord_time = frame.wing_chord / twice
+    double_airspeed = 2.0 * airspeed
+    if double_airspeed != 0.0:
+        frame.span_time = frame.wing_span / double_airspeed
+        frame.chord_time = frame.wing_chord / double_airspeed
     frame.pressure_area = frame.wing_area * frame.dynamic_pressure
 
 
@@ -357,48 +357,56 @@ def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
 def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
     """Return the sums of the external forces along the body's axes and of their moments."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    for k in range(code[FORCES_BEGIN], code[READS_BEGIN], FORCE_NUMBERS):
-        magnitude, axes = numbers[code[k]], int(code[k + 1])
-        one = scale(magnitude, _vector_at(numbers, axes + FORCE_DIRECTION))
-        own = scale(magnitude, _vector_at(numbers, axes + MOMENT_DIRECTION))
-        force = add(force, one)
-        moment = add(moment, add(own, cross(_vector_at(numbers, axes + FORCE_ARM), one)))
+    for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
+        magnitude, first_axis = numbers[code[k]], int(code[k + 1])
+        single_force = scale(magnitude, _read_registers(numbers, first_axis + FORCE_DIRECTION))
+        pure_moment = scale(magnitude, _read_registers(numbers, first_axis + MOMENT_DIRECTION))
+        force = add(force, single_force)
+        moment = add(moment, add(pure_moment, cross(_read_registers(numbers, first_axis + FORCE_ARM), single_force)))
     return force, moment
 
 
 @inlined
-def _vector_at(numbers: Floats, begin: int) -> Vector:
+def _read_registers(numbers: Floats, first: int) -> Vector:
     """Return three registers as a vector."""
-    return numbers[begin], numbers[begin + 1], numbers[begin + 2]
+    return numbers[first], numbers[first + 1], numbers[first + 2]
 
 
 @inner
 def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
     """Compute the accelerations of the next step."""
     inertial_rates = vector_of(frame.inertial_rates)
-    spin = cross(inertial_rates, transform(matrix_of(frame.inertia), inertial_rates))
-    set_vector(frame.angular_acceleration, transform(matrix_of(frame.inverse_inertia), subtract(moment, spin)))
-    specific = scale(1.0 / frame.mass, force)
-    set_vector(frame.specific_force, specific)
+    gyroscopic_moment = cross(inertial_rates, transform(matrix_of(frame.inertia), inertial_rates))
+    set_vector(
+        frame.angular_acceleration, transform(matrix_of(frame.inverse_inertia), subtract(moment, gyroscopic_moment))
+    )
+    specific_force = scale(1.0 / frame.mass, force)
+    set_vector(frame.specific_force, specific_force)
     gravity = transform_back(rotation(frame.earth_cos, frame.earth_sin), vector_of(frame.gravity))
-    set_vector(frame.acceleration, add(transform_back(matrix_of(frame.inertial_to_body), specific), gravity))
+    set_vector(frame.acceleration, add(transform_back(matrix_of(frame.inertial_to_body), specific_force), gravity))
 
 
 @inner
-def _rub(frame: Record, contacts: Records, frictions: Records, count: int) -> None:
+def _add_friction(frame: Record, contacts: Records, frictions: Records, count: int) -> None:
     """Add the friction of the contacts to the accelerations."""
-    to_body = matrix_of(frame.inertial_to_body)
-    turning = transform(to_body, (0.0, 0.0, EARTH_RATE))
-    rates = add(vector_of(frame.rates), scale(2.0, turning))
-    body = subtract(vector_of(frame.specific_force), cross(rates, vector_of(frame.body_velocity)))
-    outward = cross((0.0, 0.0, EARTH_RATE), cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position)))
-    body = subtract(body, transform(to_body, outward))
-    body = add(body, transform(matrix_of(frame.earth_to_body), vector_of(frame.gravity)))
-    angular = add(vector_of(frame.angular_acceleration), cross(vector_of(frame.inertial_rates), turning))
-    push, twist = friction_accelerations(frame, contacts, frictions, count, body, angular)
-    set_vector(frame.specific_force, add(vector_of(frame.specific_force), push))
-    set_vector(frame.acceleration, add(vector_of(frame.acceleration), transform_back(to_body, push)))
-    set_vector(frame.angular_acceleration, add(vector_of(frame.angular_acceleration), twist))
+    inertial_to_body = matrix_of(frame.inertial_to_body)
+    earth_rates = transform(inertial_to_body, (0.0, 0.0, EARTH_RATE))
+    rates = add(vector_of(frame.rates), scale(2.0, earth_rates))
+    acceleration = subtract(vector_of(frame.specific_force), cross(rates, vector_of(frame.body_velocity)))
+    centripetal = cross((0.0, 0.0, EARTH_RATE), cross((0.0, 0.0, EARTH_RATE), vector_of(frame.position)))
+    acceleration = subtract(acceleration, transform(inertial_to_body, centripetal))
+    acceleration = add(acceleration, transform(matrix_of(frame.earth_to_body), vector_of(frame.gravity)))
+    angular_acceleration = add(
+        vector_of(frame.angular_acceleration), cross(vector_of(frame.inertial_rates), earth_rates)
+    )
+    friction_acceleration, friction_angular_acceleration = friction_accelerations(
+        frame, contacts, frictions, count, acceleration, angular_acceleration
+    )
+    set_vector(frame.specific_force, add(vector_of(frame.specific_force), friction_acceleration))
+    set_vector(
+        frame.acceleration, add(vector_of(frame.acceleration), transform_back(inertial_to_body, friction_acceleration))
+    )
+    set_vector(frame.angular_acceleration, add(vector_of(frame.angular_acceleration), friction_angular_acceleration))
 
 
 # ----------------------------------------------------------------------
@@ -406,7 +414,9 @@ def _rub(frame: Record, contacts: Records, frictions: Records, count: int) -> No
 
 
 @compiled
-def step_often(frames: Records, numbers: Floats, code: Code, contacts: Records, frictions: Records, count: int) -> None:
+def step_repeatedly(
+    frames: Records, numbers: Floats, code: Code, contacts: Records, frictions: Records, count: int
+) -> None:
     """Advance by a number of steps.
 
     frames: (1,) of `FRAME`, at the start of the numbers.
@@ -416,30 +426,30 @@ def step_often(frames: Records, numbers: Floats, code: Code, contacts: Records, 
 
 
 @compiled
-def begin_attitude(frames: Records, angles: Floats) -> None:
-    """Set the attitude of the frame as JSBSim's initial conditions leave it.
+def initialise_attitude(frames: Records, angles: Floats) -> None:
+    """Set the attitude of the frame to the attitude that JSBSim's initial conditions produce.
 
     FGInitialCondition keeps a quaternion, which cannot be read. Each angle that is set changes one Euler angle of that
-    quaternion, so that it depends on all angles that were ever set, in its last bits.
+    quaternion, so that its last bits depend on all angles that were ever set.
 
     frames: (1,) of `FRAME` with the position, the rates and the angle of the earth.
     angles: (n, 3) roll, pitch and yaw of all evaluations of an instance, rad.
     """
     frame: Record = frames[0]
-    local = (1.0, (0.0, 0.0, 0.0))
+    local_attitude = (1.0, (0.0, 0.0, 0.0))
     for row in range(angles.shape[0]):
         for k in range(3):
-            roll, pitch, yaw = euler_angles(matrix_of_quaternion(local))
+            roll, pitch, yaw = euler_angles(matrix_of_quaternion(local_attitude))
             value = angles[row, k]
             if k == 0:
-                local = quaternion_of_angles(value, pitch, yaw)
+                local_attitude = quaternion_of_angles(value, pitch, yaw)
             elif k == 1:
-                local = quaternion_of_angles(roll, value, yaw)
+                local_attitude = quaternion_of_angles(roll, value, yaw)
             else:
-                local = quaternion_of_angles(roll, pitch, value)
-    _update_place(frame)
+                local_attitude = quaternion_of_angles(roll, pitch, value)
+    _update_position(frame)
     inertial_to_local = product(matrix_of(frame.earth_to_local), rotation(frame.earth_cos, frame.earth_sin))
-    attitude = quaternion_product(quaternion_of_matrix(inertial_to_local), local)
+    attitude = quaternion_product(quaternion_of_matrix(inertial_to_local), local_attitude)
     rate = quaternion_rate(attitude, vector_of(frame.inertial_rates))
     frame.attitude_real, frame.attitude_rate_real = attitude[0], rate[0]
     set_vector(frame.attitude, attitude[1])

@@ -10,7 +10,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from flight.dynamics.compiled_frame import CODE_HEADER, FRAME, FRAME_NUMBERS, begin_attitude, step_often
+from flight.dynamics.compiled_frame import CODE_HEADER, FRAME, FRAME_NUMBERS, initialise_attitude, step_repeatedly
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.ground_contact import CONTACT, FRICTION
 from flight.dynamics.instructions import LOWER_LIMIT, Code
@@ -35,18 +35,19 @@ _PROOF_SURFACE_RAD = 0.15
 _PROOF_THROTTLE = 0.2
 # Gusts to either side, ft/s.
 _PROOF_GUST_FPS = 3.0
-# Turn from which on contacts touch the ground, and how deep the lowest one is pressed into it, ft.
-_PROOF_TURN_ON_GROUND = 16
+# Number of the first comparison with contacts on the ground.
+_PROOF_GROUND_ROUND = 16
+# Depth to which the lowest contact is then pressed into the ground, ft.
 _PROOF_DEPTH_FT = 0.05
-# Height above the reach of the contacts in which they are computed nevertheless, ft.
+# Height above the reach of the contacts in which they are still computed, ft.
 _REACH_MARGIN_FT = 1.0
-# Fields of a contact by their properties.
+# Properties of a contact by its fields.
 _CONTACT_FIELDS = {"compression": "compression-ft", "compression_speed": "compression-velocity-fps"}
-# Feet in an inch, as JSBSim has them.
+# Feet in an inch, JSBSim's value.
 _INCH = 1.0 / 12.0
 
-# Properties of JSBSim that state numbers of the frame, for fields with several numbers.
-_VECTORS = {
+# JSBSim's properties for the frame's fields of several numbers.
+_VECTOR_PROPERTIES = {
     "position": tuple(f"position/eci-{axis}-ft" for axis in "xyz"),
     "velocity": tuple(f"velocities/eci-{axis}-fps" for axis in "xyz"),
     "acceleration": tuple(f"accelerations/{axis}idot-ft_sec2" for axis in "uvw"),
@@ -56,8 +57,8 @@ _VECTORS = {
     "wind": WIND,
     "gust": GUST,
 }
-# The same for fields of one number.
-_NUMBERS = {
+# JSBSim's properties for the frame's fields of one number.
+_NUMBER_PROPERTIES = {
     "time": "simulation/sim-time-sec",
     "earth_angle": "position/epa-rad",
     "latitude": "position/lat-geod-rad",
@@ -87,49 +88,49 @@ class CompiledModel:
         steps: steps in a tick.
         gusts, terrain: True if gusts, or the altitude of the ground, are set each tick.
 
-        Raise UnsupportedModel for a model that is not covered.
+        Raises UnsupportedModel for a model that is not covered.
         """
         if fdm.flat_earth:
             raise UnsupportedModel("a flat earth")
         program = translate(fdm.model_text())
         self._fdm, self._program = fdm, program
         self.properties = _frame_properties() | program.properties
-        # Two more: a zero that is read for a quantity that the aircraft lacks, and one for outputs that are not used.
+        # Two more registers: a zero for quantities that the aircraft lacks, and one for outputs that are not used.
         self.numbers: Floats = np.array([*program.numbers, 0.0, 0.0])
-        zero = len(program.numbers)
+        zero_register = len(program.numbers)
         access = fdm.properties
         self._getters = {name: (register, access.getter(name)) for name, register in self.properties.items()}
         commands = (self._register(command.name) for command in fdm.aircraft.model.commands)
         outputs = (*commands, *map(self._register, GUST), frame_register("terrain"))
-        used = (True, True, True, True, gusts, gusts, gusts, terrain)
-        writes = [register if use else zero + 1 for register, use in zip(outputs, used, strict=True)]
+        is_used = (True, True, True, True, gusts, gusts, gusts, terrain)
+        writes = [register if is_set else zero_register + 1 for register, is_set in zip(outputs, is_used, strict=True)]
         self.contacts: Records = np.zeros(len(program.contacts), CONTACT)
         self.frictions: Records = np.zeros(2 * len(program.contacts), FRICTION)
-        self._pressed = [
+        self._contact_getters = [
             (number, field, access.getter(f"{contact.base}/{name}"))
             for number, contact in enumerate(program.contacts)
             for field, name in _CONTACT_FIELDS.items()
         ]
         self.frames: Records = self.numbers[:FRAME_NUMBERS].view(FRAME)
-        self.code = _pack(program, [self._reading(field, zero) for field in reads], writes, steps)
-        self._begin()
+        self.code = _pack_code(program, [self._state_register(field, zero_register) for field in reads], writes, steps)
+        self._copy_state()
 
     def find_differences(self) -> list[str]:
-        """Step both engines and return the properties that differ in any bit; the compiled state is as before.
+        """Step both engines and return the properties that differ in any bit; restore the compiled state.
 
-        JSBSim is left somewhere else, and cannot fly on if there is a difference.
+        JSBSim's state is not restored: it cannot fly on if there is a difference.
         """
-        begun, contacts = self.numbers.copy(), self.contacts.copy()
-        found = self.differences()
-        for turn in range(PROOF_STEPS // _PROOF_STRIDE):
-            if found:
+        initial_numbers, initial_contacts = self.numbers.copy(), self.contacts.copy()
+        differing = self.differing_properties()
+        for round_number in range(PROOF_STEPS // _PROOF_STRIDE):
+            if differing:
                 break
-            self._move_inputs(begun, turn)
+            self._move_inputs(initial_numbers, round_number)
             self._fdm.step(_PROOF_STRIDE)
-            step_often(*self.arrays, _PROOF_STRIDE)
-            found = self.differences()
-        self.numbers[:], self.contacts[:] = begun, contacts
-        return found
+            step_repeatedly(*self.arrays, _PROOF_STRIDE)
+            differing = self.differing_properties()
+        self.numbers[:], self.contacts[:] = initial_numbers, initial_contacts
+        return differing
 
     @property
     def arrays(self) -> tuple[Records, Floats, Code, Records, Records]:
@@ -143,15 +144,15 @@ class CompiledModel:
             raise UnsupportedModel(f"property {name}")
         return self.properties[name]
 
-    def _reading(self, field: str, zero: int) -> int:
+    def _state_register(self, field: str, zero_register: int) -> int:
         """Return the register of a field of the state."""
         if field in STATE_PROPERTIES:
             return self._register(STATE_PROPERTIES[field][0])
         name = self._fdm.aircraft.model.readings[MODEL_FIELDS.index(field)].name
-        return self._register(name) if name else zero
+        return self._register(name) if name else zero_register
 
-    def _begin(self) -> None:
-        """Take over the state of JSBSim."""
+    def _copy_state(self) -> None:
+        """Copy the state of JSBSim."""
         read, numbers = self._fdm.properties.read, self.numbers
         for register, getter in self._getters.values():
             numbers[register] = getter()
@@ -160,9 +161,9 @@ class CompiledModel:
         inertia = {axes: read(f"inertia/i{axes}-slugs_ft2") for axes in ("xx", "yy", "zz", "xy", "xz", "yz")}
         frame.inertia, frame.inverse_inertia = _inertia_matrices(**inertia)
         frame.specific_force = [1.0 / frame.mass * read(name) for name in FORCES]
-        # Initial conditions fill the past of the integrators with their derivatives.
-        frame.velocity_before, frame.velocity_two_before = frame.velocity, frame.velocity
-        frame.acceleration_before = frame.acceleration
+        # Initial conditions fill the last values of the integrators with the current ones.
+        frame.last_velocity, frame.second_last_velocity = frame.velocity, frame.velocity
+        frame.last_acceleration = frame.acceleration
         centre = [read(f"inertia/cg-{axis}-in") for axis in "xyz"]
         frame.aero_arm = _arm([read(f"metrics/aero-rp-{axis}-in") for axis in "xyz"], centre)
         for force in self._program.forces:
@@ -173,14 +174,14 @@ class CompiledModel:
                 axes = direction + [0.0] * 3 + _arm([read(f"{base}/location-{axis}-in") for axis in "xyz"], centre)
             numbers[force.axes : force.axes + len(axes)] = axes
         for block in self._program.actuators:
-            numbers[block.begin : block.begin + LOWER_LIMIT] = _actuator_numbers(
+            numbers[block.first_register : block.first_register + LOWER_LIMIT] = _actuator_numbers(
                 numbers[block.source], *block[2:], frame.dt
             )
-        self._begin_contacts(centre)
-        begin_attitude(self.frames, self._fdm.attitudes())
+        self._copy_contacts(centre)
+        initialise_attitude(self.frames, self._fdm.attitudes())
 
-    def _begin_contacts(self, centre: Sequence[float]) -> None:
-        """Take over the contacts, which must be above the ground: the memory of their friction cannot be read."""
+    def _copy_contacts(self, centre: Sequence[float]) -> None:
+        """Copy the contacts, which must be above the ground: the memory of their friction cannot be read."""
         read, frame = self._fdm.properties.read, self.frames[0]
         frame.centre, frame.terrain = centre, self._fdm.terrain_amsl / FOOT
         for contact, data in zip(self.contacts, self._program.contacts, strict=True):
@@ -193,44 +194,56 @@ class CompiledModel:
         arms = np.linalg.norm(self.contacts["arm"], axis=1)
         frame.contact_reach = float(np.max(arms, initial=0.0)) + _REACH_MARGIN_FT
 
-    def _move_inputs(self, begun: Floats, turn: int) -> None:
-        """Set commands and gusts in both engines, in another combination each turn."""
+    def _move_inputs(self, initial_numbers: Floats, round_number: int) -> None:
+        """Set commands and gusts in both engines, in a different combination in each round."""
         moves = [_PROOF_SURFACE_RAD] * 3 + [_PROOF_THROTTLE] + [_PROOF_GUST_FPS] * 3
         scales = [command.above for command in self._fdm.aircraft.model.commands] + [1.0] * 3
         names = [*(command.name for command in self._fdm.aircraft.model.commands), *GUST]
         for k, (name, move, scale) in enumerate(zip(names, moves, scales, strict=True)):
-            # Of Gray's code, so that few inputs move at a time and all combinations come.
-            side = 1.0 if (turn ^ (turn >> 1)) >> k % 5 & 1 else -1.0
+            # From a Gray code, so that few inputs move at a time and all combinations occur.
+            sign = 1.0 if (round_number ^ (round_number >> 1)) >> k % 5 & 1 else -1.0
             register = self.properties[name]
-            self.numbers[register] = begun[register] + side * move * scale
+            self.numbers[register] = initial_numbers[register] + sign * move * scale
             self._fdm.properties.set(name, self.numbers[register])
-        if len(self.contacts) and turn >= _PROOF_TURN_ON_GROUND:
+        if len(self.contacts) and round_number >= _PROOF_GROUND_ROUND:
             # The ground is raised until the lowest point of the aircraft touches it.
             depths = (self.contacts["arm"] @ self.frames[0].local_to_body)[:, 2]
             frame = self.frames[0]
             frame.terrain = frame.geodetic_altitude - float(depths.max()) + _PROOF_DEPTH_FT
             self._fdm.properties.set(TERRAIN, frame.terrain)
 
-    def differences(self) -> list[str]:
-        """Return the properties that differ in any bit at present."""
+    def differing_properties(self) -> list[str]:
+        """Return the properties that currently differ in any bit."""
         numbers = self.numbers.tolist()
-        found = [name for name, (register, get) in self._getters.items() if not _equal(numbers[register], get())]
+        differing = [
+            name for name, (register, getter) in self._getters.items() if not _is_equal(numbers[register], getter())
+        ]
         contacts = self.contacts
-        return found + [field for k, field, get in self._pressed if not _equal(float(contacts[k][field]), get())]
+        return differing + [
+            field
+            for number, field, getter in self._contact_getters
+            if not _is_equal(float(contacts[number][field]), getter())
+        ]
 
 
-def _equal(one: float, other: float) -> bool:
-    return one == other or (math.isnan(one) and math.isnan(other))
+def _is_equal(a: float, b: float) -> bool:
+    return a == b or (math.isnan(a) and math.isnan(b))
 
 
 def _frame_properties() -> dict[str, int]:
-    """Return the registers of the frame's properties."""
-    several = {name: frame_register(field, k) for field, names in _VECTORS.items() for k, name in enumerate(names)}
-    single = {name: frame_register(field) for field, name in _NUMBERS.items()}
-    return several | single | {name: frame_register(*place) for name, place in FRAME_PROPERTIES.items()}
+    """Return the register of each property of the frame."""
+    vector_registers = {
+        name: frame_register(field, k) for field, names in _VECTOR_PROPERTIES.items() for k, name in enumerate(names)
+    }
+    number_registers = {name: frame_register(field) for field, name in _NUMBER_PROPERTIES.items()}
+    return (
+        vector_registers
+        | number_registers
+        | {name: frame_register(*field_and_element) for name, field_and_element in FRAME_PROPERTIES.items()}
+    )
 
 
-def _pack(program: ModelProgram, reads: Sequence[int], writes: Sequence[int], steps: int) -> Code:
+def _pack_code(program: ModelProgram, reads: Sequence[int], writes: Sequence[int], steps: int) -> Code:
     """Return the code: its header, and its sections in order."""
     forces = [number for force in program.forces for number in (force.magnitude, force.axes)]
     sections = (program.fcs, program.aero, program.external, forces, reads, writes)
@@ -238,9 +251,12 @@ def _pack(program: ModelProgram, reads: Sequence[int], writes: Sequence[int], st
     return np.array([steps, *bounds, *(number for section in sections for number in section)], dtype=np.uint32)
 
 
-def _arm(place: Sequence[float], centre: Sequence[float]) -> list[float]:
-    """Return the arm along the body's axes, ft, from the center of gravity to a place, both in JSBSim's inches."""
-    return [_INCH * (centre[0] - place[0]), _INCH * (place[1] - centre[1]), _INCH * (centre[2] - place[2])]
+def _arm(position: Sequence[float], centre: Sequence[float]) -> list[float]:
+    """Return the arm from the center of gravity to a position, ft along the body's axes.
+
+    Both arguments are in JSBSim's inches and axes.
+    """
+    return [_INCH * (centre[0] - position[0]), _INCH * (position[1] - centre[1]), _INCH * (centre[2] - position[2])]
 
 
 def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> tuple[Floats, Floats]:
@@ -258,6 +274,6 @@ def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz:
 
 
 def _actuator_numbers(source: float, lag: float, rate: float, dt: float) -> list[float]:
-    """Return the memory and the factors of an actuator; initial conditions let its input through."""
+    """Return the memory and the factors of an actuator whose output equals its input, as in initial conditions."""
     divisor = 2.0 + dt * lag
     return [source, source, source, dt * lag / divisor, (2.0 - dt * lag) / divisor, dt * rate]

@@ -26,21 +26,21 @@ def geodetic(position: Vector) -> tuple[float, float, float, float]:
     One iteration of Fukushima's method (Journal of Geodesy 79, 2006).
     """
     x, y, z = position
-    equatorial = math.sqrt(x * x + y * y)
+    axis_distance = math.sqrt(x * x + y * y)
     s0 = abs(z)
-    zc, c0 = AXES_RATIO * s0, AXES_RATIO * equatorial
+    zc, c0 = AXES_RATIO * s0, AXES_RATIO * axis_distance
     c02, s02 = c0 * c0, s0 * s0
     a02 = c02 + s02
     a0 = math.sqrt(a02)
     a03 = a02 * a0
     s1 = zc * a03 + _FOCUS * s02 * s0
-    c1 = equatorial * a03 - _FOCUS * c02 * c0
+    c1 = axis_distance * a03 - _FOCUS * c02 * c0
     cs0c0 = _FOCUS * c0 * s0
-    b0 = 1.5 * cs0c0 * ((equatorial * s0 - zc * c0) * a0 - cs0c0)
+    b0 = 1.5 * cs0c0 * ((axis_distance * s0 - zc * c0) * a0 - cs0c0)
     s1 = s1 * a03 - b0 * s0
     cc = AXES_RATIO * (c1 * a03 - b0 * c0)
     s12, cc2 = s1 * s1, cc * cc
     norm = math.sqrt(s12 + cc2)
     sign = 1.0 if z >= 0.0 else -1.0
-    altitude = (equatorial * cc + s0 * s1 - SEMI_MAJOR * math.sqrt(AXES_RATIO_2 * s12 + cc2)) / norm
+    altitude = (axis_distance * cc + s0 * s1 - SEMI_MAJOR * math.sqrt(AXES_RATIO_2 * s12 + cc2)) / norm
     return sign * math.atan(s1 / cc), altitude, sign * s1 / norm, cc / norm

@@ -14,7 +14,14 @@ from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import POWERS, TABLES, Envelope
 from aircraft.uncertainty import read_uncertainty
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
-from flight.dynamics.trim import Trim, fastest, full_throttle, idle, slowest, straight
+from flight.dynamics.trim import (
+    Trim,
+    fastest_level_flight,
+    full_throttle_climb,
+    idle_descent,
+    slowest_level_flight,
+    steady_flight,
+)
 from world.arrays import Floats
 from world.files import write_whole
 
@@ -42,7 +49,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     """
     file = cache_file(aircraft, motor_braking)
     key = _cache_key(aircraft, motor_braking)
-    tables = _read(file, key, _grid_airspeeds(aircraft))
+    tables = _read_cache_file(file, key, _grid_airspeeds(aircraft))
     if tables is None:
         tables = compute_tables(aircraft, motor_braking)
         write_tables(file, key, tables)
@@ -82,25 +89,25 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     descent = climb.copy()
     powers = {name: climb.copy() for name in POWERS}
     min_level_speed, max_level_speed = np.full(_GRID_AMSL_M.size, math.nan), np.full(_GRID_AMSL_M.size, math.nan)
-    for j, amsl in enumerate(_GRID_AMSL_M.tolist()):
+    for altitude_index, amsl in enumerate(_GRID_AMSL_M.tolist()):
         last_climb: Trim | None = None
         last_descent: Trim | None = None
         last_level: Trim | None = None
         # From fast to slow, because the slowest airspeed may have no trim, and each trim starts from its neighbor.
-        for i in reversed(range(airspeeds.size)):
-            airspeed = float(airspeeds[i])
-            if found := full_throttle(fdm, airspeed, amsl, last_climb):
-                last_climb, climb[i, j] = found, found.climb
-                powers["power_full"][i, j] = _power(fdm, found)
-            if found := idle(fdm, airspeed, amsl, last_descent):
-                last_descent, descent[i, j] = found, -found.climb
-                powers["power_idle"][i, j] = _power(fdm, found)
-            if found := straight(fdm, airspeed, amsl, near=last_level):
-                last_level, powers["power_level"][i, j] = found, _power(fdm, found)
-        if found := fastest(fdm, amsl):
-            max_level_speed[j] = found.airspeed
-        if found := slowest(fdm, amsl):
-            min_level_speed[j] = found.airspeed
+        for airspeed_index in reversed(range(airspeeds.size)):
+            airspeed = float(airspeeds[airspeed_index])
+            if trim := full_throttle_climb(fdm, airspeed, amsl, last_climb):
+                last_climb, climb[airspeed_index, altitude_index] = trim, trim.climb
+                powers["power_full"][airspeed_index, altitude_index] = _power(fdm, trim)
+            if trim := idle_descent(fdm, airspeed, amsl, last_descent):
+                last_descent, descent[airspeed_index, altitude_index] = trim, -trim.climb
+                powers["power_idle"][airspeed_index, altitude_index] = _power(fdm, trim)
+            if trim := steady_flight(fdm, airspeed, amsl, near=last_level):
+                last_level, powers["power_level"][airspeed_index, altitude_index] = trim, _power(fdm, trim)
+        if trim := fastest_level_flight(fdm, amsl):
+            max_level_speed[altitude_index] = trim.airspeed
+        if trim := slowest_level_flight(fdm, amsl):
+            min_level_speed[altitude_index] = trim.airspeed
     if np.isnan(min_level_speed).all():
         # The wing stalls before the elevator reaches its stop: the slowest trim of the grid is the slowest flight.
         is_level = np.isfinite(powers["power_level"])
@@ -139,7 +146,7 @@ def _cache_key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
     }
 
 
-def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
+def _read_cache_file(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
     """Return the tables of a cache file, or None if it is incomplete, damaged or for another key."""
     grid = (airspeeds.size, _GRID_AMSL_M.size)
     shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}

@@ -50,7 +50,7 @@ from flight.dynamics.jsbsim_properties import (
 )
 from flight.dynamics.model_check import check_model, jsbsim_reason, try_model
 from flight.dynamics.state import STATE
-from flight.dynamics.trim import Engine, Trim, air_velocity, body_axes, euler, first_guess, straight
+from flight.dynamics.trim import Engine, Trim, air_velocity, body_axes, euler, first_guess, steady_flight
 from world.arrays import Floats
 from world.errors import FlightError
 from world.files import temporary_folder
@@ -60,7 +60,7 @@ from world.kernels import Record, field_names
 # Suppression of JSBSim's output.
 
 
-# Largest amount of what JSBSim prints that is read, bytes.
+# Maximum size of JSBSim's output that is read, bytes.
 _MAX_PRINTED_BYTES = 2**20
 
 
@@ -68,31 +68,31 @@ _MAX_PRINTED_BYTES = 2**20
 def silence() -> Iterator[Callable[[], str]]:
     """Keep standard output off the terminal: JSBSim prints its banner at every debug level.
 
-    JSBSim's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.  Yield a function that returns
-    what both printed.
+    JSBSim's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. Yield a function that returns the
+    output of both.
     """
     sys.stdout.flush()
-    saved = os.dup(1)
+    saved_descriptor = os.dup(1)
     try:
-        with tempfile.TemporaryFile() as printed, contextlib.redirect_stdout(io.StringIO()) as python_side:
-            os.dup2(printed.fileno(), 1)
+        with tempfile.TemporaryFile() as cpp_file, contextlib.redirect_stdout(io.StringIO()) as python_output:
+            os.dup2(cpp_file.fileno(), 1)
 
             def text() -> str:
-                own = os.pread(printed.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
-                return own + python_side.getvalue()
+                cpp_output = os.pread(cpp_file.fileno(), _MAX_PRINTED_BYTES, 0).decode(errors="replace")
+                return cpp_output + python_output.getvalue()
 
             yield text
     finally:
-        os.dup2(saved, 1)
-        os.close(saved)
+        os.dup2(saved_descriptor, 1)
+        os.close(saved_descriptor)
 
 
 # ----------------------------------------------------------------------
 # Valid start of a flight: on the globe except its poles, in the air and below the tropopause.
 
 
-def check_place(lat_deg: float, lon_deg: float, amsl: float, terrain_amsl: float) -> None:
-    """Raise FlightError for a place where no flight can begin.
+def check_start_position(lat_deg: float, lon_deg: float, amsl: float, terrain_amsl: float) -> None:
+    """Raise FlightError for a position where no flight can start.
 
     lat_deg, lon_deg: geodetic, degrees.
     amsl: altitude, m.
@@ -110,7 +110,7 @@ def check_place(lat_deg: float, lon_deg: float, amsl: float, terrain_amsl: float
 # ----------------------------------------------------------------------
 # Loading of an aircraft's model into a JSBSim instance, from a checked copy.
 
-# Largest relative difference of a stated mass from the model's mass.
+# Maximum relative difference between a stated mass and the model's mass.
 MASS_TOLERANCE = 0.01
 
 
@@ -129,12 +129,12 @@ def load_model(
 
     The model is copied because some models write into their own folder.
 
-    instance: a JSBSim instance without a model, made for this folder.
+    instance: a JSBSim instance without a model, created for this folder.
     dt: time step, s.
-    printed: returns what JSBSim has printed.
+    printed: function that returns JSBSim's output so far.
     flat_earth, tried, gear: see `Fdm`.
 
-    Raise FlightError for a model that is missing, refused or not loadable.
+    Raises FlightError for a model that is missing, refused or not loadable.
     """
     instance.set_debug_level(0)
     files = check_model(
@@ -148,10 +148,12 @@ def load_model(
     folder = copy / aircraft.name
     folder.mkdir()
     for name, data in files.items():
-        # JSBSim looks for the folder's name.
-        main = name == aircraft.model_file.name
-        own = f"{aircraft.name}.xml" if main else name
-        (folder / own).write_bytes(with_contacts(data, aircraft, gear) if main and gear is not None else data)
+        # JSBSim looks for a file with the folder's name.
+        is_main = name == aircraft.model_file.name
+        target_name = f"{aircraft.name}.xml" if is_main else name
+        (folder / target_name).write_bytes(
+            with_contacts(data, aircraft, gear) if is_main and gear is not None else data
+        )
     instance.set_aircraft_path(str(copy))
     instance.set_engine_path(str(folder))
     instance.set_systems_path(str(folder))
@@ -174,10 +176,12 @@ def load_model(
 
 def _check_mass(instance: Any, aircraft: Aircraft) -> None:
     """Raise FlightError if the stated mass differs from the model's mass, fuel included."""
-    known = instance.get_property_manager().hasNode
-    tanks = itertools.takewhile(known, (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count()))
+    has_property = instance.get_property_manager().hasNode
+    tank_properties = itertools.takewhile(
+        has_property, (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count())
+    )
     # JSBSim adds the fuel's mass when it first runs.
-    pounds = sum(map(instance.get_property_value, tanks), instance.get_property_value("inertia/weight-lbs"))
+    pounds = sum(map(instance.get_property_value, tank_properties), instance.get_property_value("inertia/weight-lbs"))
     mass = pounds * POUND
     if not abs(aircraft.mass - mass) <= MASS_TOLERANCE * mass:
         file = aircraft.folder / f"{aircraft.name}.toml"
@@ -204,11 +208,11 @@ _PACK_STATE: Callable[..., None] = struct.Struct(f"{len(_STATE_FIELDS)}d").pack_
 class Variation:
     """Changes to the published model for validation and robustness tests, as factors and as a parasite drag.
 
-    mass, drag: factors on the whole aircraft's mass and drag.
+    mass, drag: factors on the mass and drag of the whole aircraft.
     control: factor on the moments of the control surfaces.
-    parasite_drag: parasite drag coefficient; None keeps the model's own.
+    parasite_drag: parasite drag coefficient; None keeps the model's value.
     volts: factor on the battery's voltage.
-    properties: values of the model's own properties by their names, such as ``ident/thrust``.
+    properties: names and values of further properties of the model, such as ``ident/thrust``.
     """
 
     mass: float = 1.0
@@ -242,17 +246,17 @@ class Fdm:
 
     rate_hz: steps per second.
     motor_braking: True if the motor may brake the propeller (current below zero).
-    flat_earth: the textbook's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane without
-        rotation, for validation; degrees of latitude are then 157 times longer. Otherwise WGS84 and the standard
+    flat_earth: True for the textbook's world, for validation: a plane without rotation, with constant density 1.2682
+        kg/m^3 and gravity 9.81 m/s^2; degrees of latitude are then 157 times longer. False for WGS 84 and the standard
         atmosphere.
     tried: True if a user's model is known not to abort JSBSim; otherwise `flight.dynamics.model_check` tests it.
-    gear: gear for ground contact if the model has none; None for a flight in the air only.
+    gear: gear to add for ground contact if the model has none; None for a flight without ground contact.
 
     properties: JSBSim's own properties by name, in its units.
     dt: time step, s.
 
-    Raise FlightError for a model that is missing, refused by `flight.dynamics.model_check`, or not loadable, and for an
-    undefined property that the model or this class reads.
+    Raises FlightError for a model that is missing, refused by `flight.dynamics.model_check`, or not loadable, and for
+    an undefined property that the model or this class reads.
     """
 
     def __init__(
@@ -285,23 +289,23 @@ class Fdm:
         _apply_variation(access, aircraft, variation or Variation())
         readings = zip(MODEL_FIELDS, aircraft.model.readings, strict=True)
         properties = STATE_PROPERTIES | {field: (reading.name, reading.factor) for field, reading in readings}
-        self._readers = [access.getter(properties[field][0]) for field in _STATE_FIELDS]
+        self._state_getters = [access.getter(properties[field][0]) for field in _STATE_FIELDS]
         self._factors = np.array([properties[field][1] for field in _STATE_FIELDS])
-        self._writers = [access.command_setter(command) for command in aircraft.model.commands]
-        self._winds = [access.setter(name) for name in WIND]
-        self._gusts = [access.setter(name) for name in GUST]
+        self._command_setters = [access.command_setter(command) for command in aircraft.model.commands]
+        self._wind_setters = [access.setter(name) for name in WIND]
+        self._gust_setters = [access.setter(name) for name in GUST]
         self._ic_position = [access.setter(name) for name in IC_POSITION]
         self._ic_motion = [access.setter(name) for name in IC_MOTION]
-        self._rates = [access.getter(name) for name in RATES]
-        self._height = access.getter(HEIGHT)
-        self._forces = [access.getter(name) for name in FORCES]
-        self._mass = access.getter(MASS)
+        self._rate_getters = [access.getter(name) for name in RATES]
+        self._read_height = access.getter(HEIGHT)
+        self._force_getters = [access.getter(name) for name in FORCES]
+        self._read_mass = access.getter(MASS)
         self._run = self._exec.run
         self._engine = Engine(self._exec, self.dt, access.getter, access.setter) if aircraft.model.settles else None
         self._wind = np.zeros(3)
         self._heading = 0.0
-        # lat_deg, lon_deg, terrain amsl: far below, where neither ground effect nor wheels act.
-        self._at = (45.0, 0.0, -1000.0)
+        # lat_deg, lon_deg, terrain AMSL. The ground is far below, without ground effect or contact.
+        self._start_position = (45.0, 0.0, -1000.0)
 
     def start(
         self,
@@ -314,7 +318,7 @@ class Fdm:
         wind_ned: Sequence[float] = (0.0, 0.0, 0.0),
         terrain_amsl: float = 0.0,
     ) -> Trim:
-        """Begin a flight in steady flight along this path over the ground, and return its trim.
+        """Start a flight in steady flight along a straight path over the ground, and return its trim.
 
         lat_deg: geodetic.
         amsl, terrain_amsl: m.
@@ -331,14 +335,14 @@ class Fdm:
         if len(numbers) != 10 or not all(math.isfinite(number) for number in numbers):
             message = f"the start takes ten finite numbers, three of them the wind, and has {numbers}"
             raise FlightError(message, field="start", value=numbers)
-        check_place(lat_deg, lon_deg, amsl, terrain_amsl)
+        check_start_position(lat_deg, lon_deg, amsl, terrain_amsl)
         velocity = air_velocity(course, climb_angle, airspeed, wind)
         climb = math.asin(-velocity[2] / airspeed)
-        self._at = (lat_deg, lon_deg, terrain_amsl)
+        self._start_position = (lat_deg, lon_deg, terrain_amsl)
         self._wind = wind
         self._heading = math.atan2(velocity[1], velocity[0])
-        found = straight(self, airspeed, amsl, climb)
-        if found is None:
+        trim = steady_flight(self, airspeed, amsl, climb)
+        if trim is None:
             raise FlightError(
                 f"{self.aircraft.name} cannot hold steady flight at {airspeed:.1f} m/s,"
                 f" {math.degrees(climb):+.1f} degrees relative to the air and {amsl:.0f} m above sea level",
@@ -346,11 +350,11 @@ class Fdm:
                 field="airspeed",
                 value=airspeed,
             )
-        self.balance(found.vector())
+        self.balance(trim.vector())
         self._release_motion()
-        return found
+        return trim
 
-    def begin_at(
+    def start_untrimmed(
         self,
         *,
         attitude: Sequence[float],
@@ -360,7 +364,7 @@ class Fdm:
         amsl: float,
         commands: Sequence[float],
     ) -> None:
-        """Begin a flight in any state, trimmed or not, with surfaces and motor at these commands (4,).
+        """Start a flight in any state, trimmed or not, with surfaces and motor at these commands (4,).
 
         attitude: roll, pitch, yaw, rad.
         velocity: north, east, down over the ground, m/s.
@@ -383,7 +387,7 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Begin a flight anywhere, also on the ground, at rest or thrown.
+        """Start a flight anywhere, also on the ground, at rest or thrown.
 
         Surfaces and motor start at these commands.
 
@@ -393,16 +397,16 @@ class Fdm:
         wind: (3,) m/s, direction of air motion; it stays as the steady wind.
         terrain_amsl: m.
 
-        Raise FlightError for values that are not finite, and for an invalid place.
+        Raises FlightError for values that are not finite, and for an invalid place.
         """
         numbers = (*place, *attitude, *velocity, *wind, terrain_amsl, *commands)
         if len(numbers) != 17 or not all(math.isfinite(number) for number in numbers):
             raise FlightError(f"a release takes 17 finite numbers and has {numbers}", field="start", value=numbers)
         lat_deg, lon_deg, amsl = place
         # On the ground the aircraft's reference point may be at ground level: its contacts reach below it.
-        check_place(lat_deg, lon_deg, amsl, min(terrain_amsl, amsl - 1.0))
-        self._at = (lat_deg, lon_deg, terrain_amsl)
-        self.begin_at(
+        check_start_position(lat_deg, lon_deg, amsl, min(terrain_amsl, amsl - 1.0))
+        self._start_position = (lat_deg, lon_deg, terrain_amsl)
+        self.start_untrimmed(
             attitude=attitude, velocity=velocity, rates=(0.0, 0.0, 0.0), wind=wind, amsl=amsl, commands=commands
         )
 
@@ -416,32 +420,32 @@ class Fdm:
         self.set_wind(*self._wind)
         self.set_gust(0.0, 0.0, 0.0)
 
-    def step(self, n: int = 1) -> None:
-        """Advance by n steps of ``dt`` seconds."""
-        run = self._run
-        for _ in range(n):
-            run()
+    def step(self, count: int = 1) -> None:
+        """Advance by ``count`` steps of ``dt`` seconds."""
+        run_step = self._run
+        for _ in range(count):
+            run_step()
 
     def read(self) -> Record:
         """Read the state, a record of `flight.dynamics.state.STATE`."""
         values = np.empty(len(_STATE_FIELDS))
-        _PACK_STATE(values, 0, *[reader() for reader in self._readers])
+        _PACK_STATE(values, 0, *[getter() for getter in self._state_getters])
         np.multiply(values, self._factors, values)
         return values.view(STATE)[0]
 
     def write(self, commands: Iterable[float]) -> None:
         """Set four commands, in the order of `flight.dynamics.state.Commands`; they act in the next step."""
-        for writer, value in zip(self._writers, commands, strict=True):
-            writer(value)
+        for setter, value in zip(self._command_setters, commands, strict=True):
+            setter(value)
 
     def set_wind(self, north: float, east: float, down: float) -> None:
         """Set the steady wind, m/s, direction of air motion."""
-        for setter, value in zip(self._winds, (north, east, down), strict=True):
+        for setter, value in zip(self._wind_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def set_gust(self, north: float, east: float, down: float) -> None:
         """Set the gust that is added to the steady wind, m/s, direction of air motion."""
-        for setter, value in zip(self._gusts, (north, east, down), strict=True):
+        for setter, value in zip(self._gust_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def loop_access(self) -> LoopAccess:
@@ -449,7 +453,7 @@ class Fdm:
         commands = self.aircraft.model.commands
         names = [*(command.name for command in commands), *GUST, TERRAIN]
         return LoopAccess(
-            getters=dict(zip(_STATE_FIELDS, self._readers, strict=True)),
+            getters=dict(zip(_STATE_FIELDS, self._state_getters, strict=True)),
             factors=self._factors.view(STATE),
             setters=tuple(self.properties.setter(name) for name in names),
             scales=(*((command.above, command.below) for command in commands), *4 * [(1.0 / FOOT, 1.0 / FOOT)]),
@@ -459,7 +463,7 @@ class Fdm:
     @property
     def terrain_amsl(self) -> float:
         """Altitude of the ground in the initial conditions, m."""
-        return self._at[2]
+        return self._start_position[2]
 
     def model_text(self) -> bytes:
         """Return the XML of the model with its contacts."""
@@ -472,13 +476,13 @@ class Fdm:
 
     def specific_force(self) -> tuple[float, float, float]:
         """Return the specific force along the body axes, as measured at the center of gravity, m/s^2."""
-        x, y, z = self._forces
-        share = FOOT / self._mass()
-        return x() * share, y() * share, z() * share
+        x, y, z = self._force_getters
+        factor = FOOT / self._read_mass()
+        return x() * factor, y() * factor, z() * factor
 
     def height(self) -> float:
-        """Return the height above the last ground set, m; negative below ground, where JSBSim flies on."""
-        return self._height() * FOOT
+        """Return the height above the ground that was set last, m; negative below ground, where JSBSim flies on."""
+        return self._read_height() * FOOT
 
     # Functions for trims and linearization.
 
@@ -487,12 +491,12 @@ class Fdm:
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
     def first_guess(self) -> Floats:
-        """Return a trim vector (8,) to start from: level at cruise."""
+        """Return a trim vector (8,) as the initial guess: level at cruise."""
         return first_guess(self.aircraft.airspeed)
 
     def move_to(self, amsl: float) -> None:
-        """Move the point of evaluation for `balance` and `derivatives` to this altitude; this ends any flight."""
-        lat_deg, lon_deg, terrain = self._at
+        """Move the point of evaluation of `balance` and `derivatives` to an altitude, m; this ends any flight."""
+        lat_deg, lon_deg, terrain = self._start_position
         for setter, value in zip(self._ic_position, (lat_deg, lon_deg, terrain / FOOT, amsl / FOOT), strict=True):
             setter(value)
         self.set_gust(*self._wind)
@@ -522,27 +526,27 @@ class Fdm:
         self,
         angles: Sequence[float],
         velocity: Floats,
-        pqr: Sequence[float],
+        rotation_rates: Sequence[float],
         commands: Iterable[float],
         settle: bool = False,
     ) -> Floats:
         self._attitudes.extend(angles)
         # Trim status bypasses the lag of the actuators.
         self.write(commands)
-        for setter, value in zip(self._ic_motion, (*angles, *(velocity / FOOT), *pqr), strict=True):
+        for setter, value in zip(self._ic_motion, (*angles, *(velocity / FOOT), *rotation_rates), strict=True):
             setter(value)
         self._exec.run_ic()
         if self._engine:
             self._engine.settle(spin=settle)
             self._exec.run_ic()
-        return np.array([rate() for rate in self._rates]) * RATE_FACTORS
+        return np.array([getter() for getter in self._rate_getters]) * RATE_FACTORS
 
 
 def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) -> None:
     if variation.mass != 1.0:
-        extra = (variation.mass - 1.0) * aircraft.mass
-        there = properties.getter("inertia/pointmass-weight-lbs")()
-        properties.set("inertia/pointmass-weight-lbs", there + extra / POUND)
+        extra_mass = (variation.mass - 1.0) * aircraft.mass
+        point_mass = properties.getter("inertia/pointmass-weight-lbs")()
+        properties.set("inertia/pointmass-weight-lbs", point_mass + extra_mass / POUND)
     properties.set_optional("aero/drag-factor", variation.drag, 1.0)
     properties.set_optional("aero/control-factor", variation.control, 1.0)
     if variation.parasite_drag is not None:
@@ -554,7 +558,7 @@ def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: 
 
 
 def _new_instance(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool, gear: Gear | None) -> jsbsim.FGFDMExec:
-    with silence() as printed, temporary_folder("planfly-model-") as copy:
-        instance = jsbsim.FGFDMExec(str(copy))
-        load_model(instance, copy, aircraft, dt, printed, flat_earth=flat_earth, tried=tried, gear=gear)
+    with silence() as read_output, temporary_folder("planfly-model-") as folder:
+        instance = jsbsim.FGFDMExec(str(folder))
+        load_model(instance, folder, aircraft, dt, read_output, flat_earth=flat_earth, tried=tried, gear=gear)
     return instance

@@ -32,7 +32,7 @@ MAX_CONTACTS = 16
 # A contact, its memory and its friction.
 CONTACT = record_dtype(
     ("arm", np.float64, (3,)),  # ft, along the body's axes from the center of gravity
-    ("place", np.float64, (3,)),  # in, of the structure
+    ("place", np.float64, (3,)),  # in, in the structure's axes
     "spring",  # lbf/ft
     "damping",  # lbf s/ft
     "static_friction",
@@ -42,7 +42,7 @@ CONTACT = record_dtype(
     "compression",  # ft
     "compression_speed",  # ft/s
     "slip_angle",  # degrees, of a wheel
-    # Last values of the friction along the wheel, across it, and against the motion, lbf.
+    # Last friction forces along the wheel, across it, and against the motion, lbf.
     ("friction", np.float64, (3,)),
 )
 # Friction of a contact in one direction.
@@ -51,8 +51,8 @@ FRICTION = record_dtype(
     ("kind", np.int64),  # element of the contact's friction
     ("direction", np.float64, (3,)),
     ("arm", np.float64, (3,)),  # ft
-    "least",  # lbf
-    "most",
+    "min_force",  # lbf
+    "max_force",
     "right_side",  # of its equation
     ("row", np.float64, (2 * MAX_CONTACTS,)),  # of the matrix of the equations
 )
@@ -60,14 +60,15 @@ FRICTION = record_dtype(
 _ALONG = 0
 _ACROSS = 1
 _AGAINST = 2
-# Speed along the ground above which a point of the structure slides, ft/s.
+# Speed along the ground above which a contact slides, ft/s.
 _MIN_SLIDING_SPEED = 1e-3
 # Stiffness, shape and curvature of the side force of a tyre, by Pacejka's formula.
 _TYRE_STIFFNESS = 0.06
 _TYRE_SHAPE = 2.8
 _TYRE_CURVATURE = 1.03
-# Largest number of iterations, and the change at which they end, lbf.
+# Maximum number of iterations.
 _MAX_ITERATIONS = 50
+# Total change of an iteration below which the solution has converged, lbf.
 _CONVERGED_LBF = 1e-5
 # Feet in an inch.
 _INCH = 1.0 / 12.0
@@ -76,31 +77,31 @@ _DEGREES = 180.0 / math.pi
 
 @inner
 def contact_forces(frame: Record, contacts: Records, frictions: Records) -> tuple[Vector, Vector, int]:
-    """Return the force of all contacts along the body's axes, its moment, and the number of frictions to solve."""
+    """Return the force of all contacts along the body's axes, its moment, and the number of frictions to solve for."""
     force, moment, count = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0
     if frame.geodetic_altitude - frame.terrain > frame.contact_reach:
         for k in range(contacts.size):
-            _release(contacts[k])
+            _clear_contact(contacts[k])
         return force, moment, count
     for k in range(contacts.size):
         contact = contacts[k]
-        local = transform_back(matrix_of(frame.local_to_body), vector_of(contact.arm))
-        place = add(transform_back(matrix_of(frame.earth_to_local), local), vector_of(frame.place))
-        latitude, altitude, _, _ = geodetic(place)
+        local_arm = transform_back(matrix_of(frame.local_to_body), vector_of(contact.arm))
+        contact_position = add(transform_back(matrix_of(frame.earth_to_local), local_arm), vector_of(frame.place))
+        latitude, altitude, _, _ = geodetic(contact_position)
         height = altitude - frame.terrain
         if height >= 0.0:
-            _release(contact)
+            _clear_contact(contact)
             continue
-        longitude = math.atan2(place[1], place[0])
+        longitude = math.atan2(contact_position[1], contact_position[0])
         cos_lat = math.cos(latitude)
         normal = (cos_lat * math.cos(longitude), cos_lat * math.sin(longitude), math.sin(latitude))
-        one, own, count = _press(frame, contact, height, normal, frictions, k, count)
-        force, moment = add(force, one), add(moment, own)
+        contact_force, contact_moment, count = _contact_force(frame, contact, height, normal, frictions, k, count)
+        force, moment = add(force, contact_force), add(moment, contact_moment)
     return force, moment, count
 
 
 @inlined
-def _release(contact: Record) -> None:
+def _clear_contact(contact: Record) -> None:
     """Clear the memory of a contact that is above the ground."""
     contact.compression = contact.compression_speed = contact.slip_angle = 0.0
     friction = contact.friction
@@ -108,55 +109,67 @@ def _release(contact: Record) -> None:
 
 
 @inner
-def _press(
-    frame: Record, contact: Record, height: float, normal: Vector, frictions: Records, number: int, count: int
+def _contact_force(
+    frame: Record,
+    contact: Record,
+    height_above_ground: float,
+    normal: Vector,
+    frictions: Records,
+    contact_index: int,
+    friction_count: int,
 ) -> tuple[Vector, Vector, int]:
-    """Return the force of a contact below the ground, its moment, and the number of frictions with its own.
+    """Return the force of a contact below the ground, its moment, and the number of frictions including those added.
 
-    height: above the ground, ft.
-    normal: of the ground, in axes fixed to the earth.
+    height_above_ground: ft, negative.
+    normal: normal of the ground, in axes fixed to the earth.
     """
     upward = transform(matrix_of(frame.earth_to_body), normal)
     normal_z = transform(matrix_of(frame.earth_to_local), normal)[2]
-    leg = -upward[2]
+    strut_cosine = -upward[2]
     if contact.is_wheel:
-        compression = height * normal_z / leg if leg > 0.0 else 0.0
+        compression = height_above_ground * normal_z / strut_cosine if strut_cosine > 0.0 else 0.0
         displacement = (0.0, 0.0, -compression)
     else:
-        compression = height * normal_z / dot(normal, normal)
+        compression = height_above_ground * normal_z / dot(normal, normal)
         displacement = scale(compression, upward)
-    touching = add(vector_of(contact.arm), displacement)
-    velocity = add(cross(vector_of(frame.rates), touching), vector_of(frame.body_velocity))
-    across = cross(upward, (1.0, 0.0, 0.0))
-    along = subtract((1.0, 0.0, 0.0), scale(dot((1.0, 0.0, 0.0), upward), upward))
-    along, across = unit(along), unit(across)
+    contact_arm = add(vector_of(contact.arm), displacement)
+    velocity = add(cross(vector_of(frame.rates), contact_arm), vector_of(frame.body_velocity))
+    lateral = cross(upward, (1.0, 0.0, 0.0))
+    longitudinal = subtract((1.0, 0.0, 0.0), scale(dot((1.0, 0.0, 0.0), upward), upward))
+    longitudinal, lateral = unit(longitudinal), unit(lateral)
     axes = (
-        (along[0], across[0], upward[0]),
-        (along[1], across[1], upward[1]),
-        (along[2], across[2], upward[2]),
+        (longitudinal[0], lateral[0], upward[0]),
+        (longitudinal[1], lateral[1], upward[1]),
+        (longitudinal[2], lateral[2], upward[2]),
     )
-    sliding = transform_back(axes, velocity)
-    speed = -sliding[2]
+    ground_velocity = transform_back(axes, velocity)
+    speed = -ground_velocity[2]
     if contact.is_wheel:
-        speed /= leg
-    largest = compression / frame.dt
-    if abs(speed) > largest:
-        speed = (1.0 if speed >= 0.0 else -1.0) * largest
+        speed /= strut_cosine
+    max_speed = compression / frame.dt
+    if abs(speed) > max_speed:
+        speed = (1.0 if speed >= 0.0 else -1.0) * max_speed
     contact.compression, contact.compression_speed = compression, speed
-    strut = -compression * contact.spring + -speed * contact.damping
-    strut = 0.0 if strut > 0.0 else strut
-    pressure = strut / upward[2] if contact.is_wheel else -strut
-    force = transform(axes, (0.0, 0.0, pressure))
+    strut_force = -compression * contact.spring + -speed * contact.damping
+    strut_force = 0.0 if strut_force > 0.0 else strut_force
+    normal_force = strut_force / upward[2] if contact.is_wheel else -strut_force
+    force = transform(axes, (0.0, 0.0, normal_force))
     moment = cross(_moment_arm(frame, contact, displacement), force)
-    return force, moment, _add_frictions(contact, axes, sliding, pressure, touching, frictions, number, count)
+    return (
+        force,
+        moment,
+        _add_frictions(
+            contact, axes, ground_velocity, normal_force, contact_arm, frictions, contact_index, friction_count
+        ),
+    )
 
 
 @inlined
 def _moment_arm(frame: Record, contact: Record, displacement: Vector) -> Vector:
-    """Return the arm of a contact, by way of its place in the structure, as JSBSim rounds it."""
-    place, centre, inches = contact.place, frame.centre, 1.0 / _INCH
-    x, y = place[0] + -inches * displacement[0], place[1] + inches * displacement[1]
-    z = place[2] + -inches * displacement[2]
+    """Return the arm of a contact, computed from its position in the structure so that it rounds as in JSBSim."""
+    position, centre, inches = contact.place, frame.centre, 1.0 / _INCH
+    x, y = position[0] + -inches * displacement[0], position[1] + inches * displacement[1]
+    z = position[2] + -inches * displacement[2]
     return _INCH * (centre[0] - x), _INCH * (y - centre[1]), _INCH * (centre[2] - z)
 
 
@@ -164,116 +177,133 @@ def _moment_arm(frame: Record, contact: Record, displacement: Vector) -> Vector:
 def _add_frictions(
     contact: Record,
     axes: Matrix,
-    sliding: Vector,
-    pressure: float,
+    ground_velocity: Vector,
+    normal_force: float,
     arm: Vector,
     frictions: Records,
-    number: int,
-    count: int,
+    contact_index: int,
+    friction_count: int,
 ) -> int:
-    """Append the frictions of a contact, and return their number.
+    """Append the frictions of a contact, and return the new number of frictions.
 
-    sliding: velocity along the axes of the ground, ft/s.
+    ground_velocity: velocity along the axes of the ground, ft/s.
     """
-    along = math.sqrt(sliding[0] * sliding[0] + sliding[1] * sliding[1])
-    moves = along > _MIN_SLIDING_SPEED
-    if moves and not contact.is_wheel:
-        direction = transform(axes, unit((sliding[0], sliding[1], 0.0)))
-        least = -abs(contact.dynamic_friction * pressure)
-        _append(contact, frictions[count], number, _AGAINST, direction, arm, least, 0.0)
-        return count + 1
-    forward = abs(contact.static_friction * pressure)
-    sideways = forward
+    ground_speed = math.sqrt(ground_velocity[0] * ground_velocity[0] + ground_velocity[1] * ground_velocity[1])
+    is_sliding = ground_speed > _MIN_SLIDING_SPEED
+    if is_sliding and not contact.is_wheel:
+        direction = transform(axes, unit((ground_velocity[0], ground_velocity[1], 0.0)))
+        min_force = -abs(contact.dynamic_friction * normal_force)
+        _set_friction(contact, frictions[friction_count], contact_index, _AGAINST, direction, arm, min_force, 0.0)
+        return friction_count + 1
+    max_longitudinal = abs(contact.static_friction * normal_force)
+    max_lateral = max_longitudinal
     if contact.is_wheel:
-        if moves:
-            contact.slip_angle = -math.atan2(sliding[1], abs(sliding[0])) * _DEGREES
-        stiff = _TYRE_STIFFNESS * contact.slip_angle
-        bend = math.atan(stiff - _TYRE_CURVATURE * (stiff - math.atan(stiff)))
-        sideways = abs(contact.static_friction * math.sin(_TYRE_SHAPE * bend) * pressure)
-        forward = abs(contact.rolling_friction * pressure)
-    _append(contact, frictions[count], number, _ALONG, transform(axes, (1.0, 0.0, 0.0)), arm, -forward, forward)
-    side = transform(axes, (0.0, 1.0, 0.0))
-    _append(contact, frictions[count + 1], number, _ACROSS, side, arm, -sideways, sideways)
-    return count + 2
+        if is_sliding:
+            contact.slip_angle = -math.atan2(ground_velocity[1], abs(ground_velocity[0])) * _DEGREES
+        scaled_slip = _TYRE_STIFFNESS * contact.slip_angle
+        slip_argument = math.atan(scaled_slip - _TYRE_CURVATURE * (scaled_slip - math.atan(scaled_slip)))
+        max_lateral = abs(contact.static_friction * math.sin(_TYRE_SHAPE * slip_argument) * normal_force)
+        max_longitudinal = abs(contact.rolling_friction * normal_force)
+    _set_friction(
+        contact,
+        frictions[friction_count],
+        contact_index,
+        _ALONG,
+        transform(axes, (1.0, 0.0, 0.0)),
+        arm,
+        -max_longitudinal,
+        max_longitudinal,
+    )
+    lateral = transform(axes, (0.0, 1.0, 0.0))
+    _set_friction(
+        contact, frictions[friction_count + 1], contact_index, _ACROSS, lateral, arm, -max_lateral, max_lateral
+    )
+    return friction_count + 2
 
 
 @inner
-def _append(
+def _set_friction(
     contact: Record,
     friction: Record,
-    number: int,
+    contact_index: int,
     kind: int,
     direction: Vector,
     arm: Vector,
-    least: float,
-    most: float,
+    min_force: float,
+    max_force: float,
 ) -> None:
-    """Fill a friction, and limit the contact's last value of it."""
-    friction.contact, friction.kind, friction.least, friction.most = number, kind, least, most
+    """Fill a friction record, and limit the contact's last friction force to its range."""
+    friction.contact, friction.kind, friction.min_force, friction.max_force = contact_index, kind, min_force, max_force
     set_vector(friction.direction, direction)
     set_vector(friction.arm, arm)
-    contact.friction[kind] = _constrain(least, contact.friction[kind], most)
+    contact.friction[kind] = _limit(min_force, contact.friction[kind], max_force)
 
 
 @inlined
-def _constrain(least: float, value: float, most: float) -> float:
-    if value < least:
-        return least
-    return most if value > most else value
+def _limit(lower: float, value: float, upper: float) -> float:
+    if value < lower:
+        return lower
+    return upper if value > upper else value
 
 
 @inner
 def friction_accelerations(
-    frame: Record, contacts: Records, frictions: Records, count: int, body: Vector, angular: Vector
+    frame: Record, contacts: Records, frictions: Records, count: int, acceleration: Vector, angular_acceleration: Vector
 ) -> tuple[Vector, Vector]:
-    """Return the accelerations by friction, along and about the body's axes.
+    """Return the linear and angular accelerations by friction, in the body's axes.
 
-    count: number of the frictions.
-    body, angular: accelerations without friction, relative to the earth and about the body's axes.
+    count: number of frictions.
+    acceleration, angular_acceleration: accelerations without friction, relative to the earth.
     """
-    mass, inverse = 1.0 / frame.mass, matrix_of(frame.inverse_inertia)
+    inverse_mass, inverse_inertia = 1.0 / frame.mass, matrix_of(frame.inverse_inertia)
     for i in range(count):
-        one = frictions[i]
-        direction = vector_of(one.direction)
-        moved = scale(mass, direction)
-        turned = transform(inverse, cross(vector_of(one.arm), direction))
+        friction = frictions[i]
+        direction = vector_of(friction.direction)
+        unit_acceleration = scale(inverse_mass, direction)
+        unit_angular_acceleration = transform(inverse_inertia, cross(vector_of(friction.arm), direction))
         for j in range(i):
-            one.row[j] = frictions[j].row[i]
+            friction.row[j] = frictions[j].row[i]
         for j in range(i, count):
-            other = frictions[j]
-            one.row[j] = dot(vector_of(other.direction), add(moved, cross(turned, vector_of(other.arm))))
-    step = 1.0 / frame.dt
-    body = add(body, scale(step, vector_of(frame.body_velocity)))
-    angular = add(angular, scale(step, vector_of(frame.rates)))
+            other_friction = frictions[j]
+            friction.row[j] = dot(
+                vector_of(other_friction.direction),
+                add(unit_acceleration, cross(unit_angular_acceleration, vector_of(other_friction.arm))),
+            )
+    rate = 1.0 / frame.dt
+    acceleration = add(acceleration, scale(rate, vector_of(frame.body_velocity)))
+    angular_acceleration = add(angular_acceleration, scale(rate, vector_of(frame.rates)))
     for i in range(count):
-        one = frictions[i]
-        own = one.row[i]
-        one.right_side = -dot(vector_of(one.direction), add(body, cross(angular, vector_of(one.arm)))) / own
+        friction = frictions[i]
+        diagonal = friction.row[i]
+        friction.right_side = (
+            -dot(vector_of(friction.direction), add(acceleration, cross(angular_acceleration, vector_of(friction.arm))))
+            / diagonal
+        )
         for j in range(count):
-            one.row[j] /= own
-    _solve(contacts, frictions, count)
+            friction.row[j] /= diagonal
+    _solve_frictions(contacts, frictions, count)
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(count):
-        one = frictions[i]
-        part = scale(contacts[one.contact].friction[one.kind], vector_of(one.direction))
-        force, moment = add(force, part), add(moment, cross(vector_of(one.arm), part))
-    return scale(mass, force), transform(inverse, moment)
+        friction = frictions[i]
+        friction_force = scale(contacts[friction.contact].friction[friction.kind], vector_of(friction.direction))
+        force, moment = add(force, friction_force), add(moment, cross(vector_of(friction.arm), friction_force))
+    return scale(inverse_mass, force), transform(inverse_inertia, moment)
 
 
 @inner
-def _solve(contacts: Records, frictions: Records, count: int) -> None:
-    """Find the frictions by Gauss and Seidel's method, each within its limits."""
+def _solve_frictions(contacts: Records, frictions: Records, count: int) -> None:
+    """Solve for the friction forces by the Gauss-Seidel method, each within its limits."""
     for _ in range(_MAX_ITERATIONS):
-        changed = 0.0
+        total_change = 0.0
         for i in range(count):
-            one = frictions[i]
-            values = contacts[one.contact].friction
-            before = values[one.kind]
-            change = one.right_side
+            friction = frictions[i]
+            forces = contacts[friction.contact].friction
+            last_force = forces[friction.kind]
+            increment = friction.right_side
             for j in range(count):
-                other = frictions[j]
-                change -= one.row[j] * contacts[other.contact].friction[other.kind]
-            values[one.kind] = _constrain(one.least, before + change, one.most)
-            changed += abs(values[one.kind] - before)
-        if changed < _CONVERGED_LBF:
+                other_friction = frictions[j]
+                increment -= friction.row[j] * contacts[other_friction.contact].friction[other_friction.kind]
+            forces[friction.kind] = _limit(friction.min_force, last_force + increment, friction.max_force)
+            total_change += abs(forces[friction.kind] - last_force)
+        if total_change < _CONVERGED_LBF:
             break

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from world.arrays import Floats
 from world.kernels import inlined, inner
 
-# Instructions, one after the other.
+# Consecutive instructions.
 Code = NDArray[np.uint32]
 
 
@@ -39,16 +39,19 @@ class Operation(IntEnum):
     CLIP = 13
 
 
-# Registers of an actuator, from its first register on: last input and output of its lag.
+# Offsets from an actuator's first register: last input of its lag.
 LAG_INPUT = 0
+# Last output of its lag.
 LAG_OUTPUT = 1
 # Last output of its rate limit.
 RATE_OUTPUT = 2
-# Factors of the lag for its inputs and for its last output; NaN without a lag.
+# Factor of the lag for its inputs; NaN without a lag.
 INPUT_FACTOR = 3
+# Factor of the lag for its last output; NaN without a lag.
 OUTPUT_FACTOR = 4
-# Largest change in a step; infinite without a rate limit.
-LARGEST_CHANGE = 5
+# Maximum change in a step; infinite without a rate limit.
+MAX_CHANGE = 5
+# Limits of its output.
 LOWER_LIMIT = 6
 UPPER_LIMIT = 7
 # Numbers before the operands of an instruction.
@@ -56,55 +59,55 @@ HEADER = 3
 
 
 @inner
-def run_instructions(numbers: Floats, code: Code, begin: int, end: int) -> None:
-    """Run the instructions of a range of the code.
+def run_instructions(numbers: Floats, code: Code, start: int, end: int) -> None:
+    """Run the instructions in code[start:end].
 
     numbers: registers.
     """
-    at = begin
-    while at < end:
-        operation, count = code[at], code[at + 2]
-        first = at + HEADER
-        after = first + count
-        value = numbers[code[first]]
+    position = start
+    while position < end:
+        operation, count = code[position], code[position + 2]
+        first_operand = position + HEADER
+        next_position = first_operand + count
+        value = numbers[code[first_operand]]
         if operation == Operation.PRODUCT:
-            for k in range(first + 1, after):
+            for k in range(first_operand + 1, next_position):
                 value *= numbers[code[k]]
         elif operation == Operation.SUM:
             value = 0.0 + value
-            for k in range(first + 1, after):
+            for k in range(first_operand + 1, next_position):
                 value += numbers[code[k]]
         elif operation == Operation.DIFFERENCE:
-            for k in range(first + 1, after):
+            for k in range(first_operand + 1, next_position):
                 value -= numbers[code[k]]
         elif operation == Operation.QUOTIENT:
-            divisor = numbers[code[first + 1]]
+            divisor = numbers[code[first_operand + 1]]
             value = value / divisor if divisor != 0.0 else math.inf
         elif operation == Operation.MAX:
-            for k in range(first + 1, after):
-                other = numbers[code[k]]
-                value = other if other > value else value
+            for k in range(first_operand + 1, next_position):
+                operand = numbers[code[k]]
+                value = operand if operand > value else value
         elif operation == Operation.MIN:
-            for k in range(first + 1, after):
-                other = numbers[code[k]]
-                value = other if other < value else value
+            for k in range(first_operand + 1, next_position):
+                operand = numbers[code[k]]
+                value = operand if operand < value else value
         elif operation == Operation.TABLE:
-            value = _look_up(numbers, code[first + 1], code[first + 2], value)
+            value = _interpolate_table(numbers, code[first_operand + 1], code[first_operand + 2], value)
         elif operation == Operation.ACTUATOR:
-            value = _actuate(numbers, code[first + 1], value)
+            value = _step_actuator(numbers, code[first_operand + 1], value)
         elif operation == Operation.CLIP:
-            value = _clip(value, numbers[code[first + 1]], numbers[code[first + 2]])
+            value = _clip(value, numbers[code[first_operand + 1]], numbers[code[first_operand + 2]])
         elif operation == Operation.POW:
-            value = math.pow(value, numbers[code[first + 1]])
+            value = math.pow(value, numbers[code[first_operand + 1]])
         else:
-            value = _function(operation, value)
-        numbers[code[at + 1]] = value
-        at = after
+            value = _apply_function(operation, value)
+        numbers[code[position + 1]] = value
+        position = next_position
 
 
 @inlined
-def _function(operation: int, value: float) -> float:
-    """Return a function of one number."""
+def _apply_function(operation: int, value: float) -> float:
+    """Apply a function of one number."""
     if operation == Operation.ABS:
         return abs(value)
     if operation == Operation.SQRT:
@@ -113,49 +116,52 @@ def _function(operation: int, value: float) -> float:
 
 
 @inlined
-def _clip(value: float, low: float, high: float) -> float:
+def _clip(value: float, lower: float, upper: float) -> float:
     """Return a value within limits."""
-    if value < low:
-        return low
-    return high if value > high else value
+    if value < lower:
+        return lower
+    return upper if value > upper else value
 
 
 @inlined
-def _look_up(numbers: Floats, begin: int, rows: int, key: float) -> float:
-    """Return the value of a table between its rows, and of its first or last row outside them."""
-    last = begin + 2 * (rows - 1)
-    if key <= numbers[begin]:
-        return numbers[begin + 1]
-    if key >= numbers[last]:
-        return numbers[last + 1]
-    low, high = 0, rows - 1
-    while high - low > 1:
-        middle = (low + high) >> 1
-        if numbers[begin + 2 * middle] < key:
-            low = middle
+def _interpolate_table(numbers: Floats, first: int, row_count: int, key: float) -> float:
+    """Interpolate a table linearly; beyond its ends, return the value of the first or last row."""
+    last_row = first + 2 * (row_count - 1)
+    if key <= numbers[first]:
+        return numbers[first + 1]
+    if key >= numbers[last_row]:
+        return numbers[last_row + 1]
+    lower, upper = 0, row_count - 1
+    while upper - lower > 1:
+        middle = (lower + upper) >> 1
+        if numbers[first + 2 * middle] < key:
+            lower = middle
         else:
-            high = middle
-    below, above = begin + 2 * low, begin + 2 * high
-    share = (key - numbers[below]) / (numbers[above] - numbers[below])
-    return share * (numbers[above + 1] - numbers[below + 1]) + numbers[below + 1]
+            upper = middle
+    row_below, row_above = first + 2 * lower, first + 2 * upper
+    fraction = (key - numbers[row_below]) / (numbers[row_above] - numbers[row_below])
+    return fraction * (numbers[row_above + 1] - numbers[row_below + 1]) + numbers[row_below + 1]
 
 
 @inlined
-def _actuate(numbers: Floats, begin: int, value: float) -> float:
-    """Return the output of an actuator: its lag, its rate limit, and its limits, which leave its memory as it is."""
-    factor = numbers[begin + INPUT_FACTOR]
+def _step_actuator(numbers: Floats, first: int, value: float) -> float:
+    """Advance an actuator by a step, and return its output after lag, rate limit and limits.
+
+    The limits do not change its memory.
+    """
+    factor = numbers[first + INPUT_FACTOR]
     if not math.isnan(factor):
-        lagged = factor * (value + numbers[begin + LAG_INPUT])
-        lagged += numbers[begin + LAG_OUTPUT] * numbers[begin + OUTPUT_FACTOR]
-        numbers[begin + LAG_INPUT], numbers[begin + LAG_OUTPUT] = value, lagged
+        lagged = factor * (value + numbers[first + LAG_INPUT])
+        lagged += numbers[first + LAG_OUTPUT] * numbers[first + OUTPUT_FACTOR]
+        numbers[first + LAG_INPUT], numbers[first + LAG_OUTPUT] = value, lagged
         value = lagged
-    largest = numbers[begin + LARGEST_CHANGE]
-    if largest < math.inf:
-        before = numbers[begin + RATE_OUTPUT]
-        change = value - before
-        if change > largest:
-            value = before + largest
-        if change < -largest:
-            value = before - largest
-        numbers[begin + RATE_OUTPUT] = value
-    return _clip(value, numbers[begin + LOWER_LIMIT], numbers[begin + UPPER_LIMIT])
+    max_change = numbers[first + MAX_CHANGE]
+    if max_change < math.inf:
+        last_output = numbers[first + RATE_OUTPUT]
+        change = value - last_output
+        if change > max_change:
+            value = last_output + max_change
+        if change < -max_change:
+            value = last_output - max_change
+        numbers[first + RATE_OUTPUT] = value
+    return _clip(value, numbers[first + LOWER_LIMIT], numbers[first + UPPER_LIMIT])

@@ -112,33 +112,33 @@ class PropertyAccess:
         return node
 
     def getter(self, name: str) -> Getter:
-        """Return a function that reads a property; "" reads as zero. Raise FlightError if it is undefined."""
+        """Return a function that reads a property; "" reads as zero. Raises FlightError if it is undefined."""
         if not name:
             return _read_zero
         return self._node(name).get_double_value
 
     def setter(self, name: str) -> Setter:
-        """Return a function that sets a property. Raise FlightError if it is undefined."""
+        """Return a function that sets a property. Raises FlightError if it is undefined."""
         return self._node(name).set_double_value
 
     def command_setter(self, command: CommandProperty) -> Setter:
         """Return a function that sets a command in rad, or a throttle, scaled to the property's units."""
-        setter, above, below = self.setter(command.name), command.above, command.below
+        set_value, above, below = self.setter(command.name), command.above, command.below
         if above == below == 1.0:
-            return setter
-        return lambda value: setter(value * (above if value > 0.0 else below))
+            return set_value
+        return lambda value: set_value(value * (above if value > 0.0 else below))
 
     def read(self, name: str) -> float:
-        """Return the present value of a property. Raise FlightError if it is undefined."""
+        """Return the current value of a property. Raises FlightError if it is undefined."""
         return self.getter(name)()
 
     def set(self, name: str, value: float) -> None:
         """Set a property once."""
         self.setter(name)(value)
 
-    def set_optional(self, name: str, value: float, usual: float) -> None:
-        """Set a property that a model may lack if the value is the usual one."""
-        if value != usual or self._manager.hasNode(name):
+    def set_optional(self, name: str, value: float, default: float) -> None:
+        """Set a property; do nothing if the model lacks it and the value is the default."""
+        if value != default or self._manager.hasNode(name):
             self.set(name, value)
 
 

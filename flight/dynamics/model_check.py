@@ -46,9 +46,9 @@ class _Reader:
     def __init__(self, file: Path, *, main: bool = True, remove_channels: bool = False) -> None:
         self.file = file
         self.data = b""
-        self.read_names: dict[str, int] = {}  # with the line of the first use
-        self.made_names: set[str] = set()
-        self.brings: dict[str, str] = {}  # file names, and where in this file they are named
+        self.used_names: dict[str, int] = {}  # property names, with the line of their first use
+        self.created_names: set[str] = set()
+        self.included_files: dict[str, str] = {}  # names of included files, and their locations in this file
         self.has_parts = False
         self._main, self._remove_channels = main, remove_channels
         self._channel_start = -1  # first byte of the channel that is being removed
@@ -57,10 +57,10 @@ class _Reader:
         self._text: list[str] = []
         self._declares = False
         self._parser = expat.ParserCreate()
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
+        self._parser.StartElementHandler = self._start_element
+        self._parser.EndElementHandler = self._end_element
         self._parser.CharacterDataHandler = self._collect_text
-        self._parser.StartDoctypeDeclHandler = self._doctype
+        self._parser.StartDoctypeDeclHandler = self._check_doctype
 
     def read(self) -> None:
         try:
@@ -82,57 +82,57 @@ class _Reader:
             data[start:end] = bytes(byte if byte == 10 else 32 for byte in data[start:end])
         return bytes(data)
 
-    def _refuse(self, what: str) -> None:
-        where = f"{self.file}:{self._parser.CurrentLineNumber}"
-        raise FlightError(f"{where}: {what}; the model is refused", file=self.file)
+    def _refuse_model(self, reason: str) -> None:
+        location = f"{self.file}:{self._parser.CurrentLineNumber}"
+        raise FlightError(f"{location}: {reason}; the model is refused", file=self.file)
 
-    def _doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
+    def _check_doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
         # A declaration that only names a document type is never read; JSBSim's own files hold a few harmless entities.
         if internal and not self._remove_channels:
-            self._refuse("a document type declaration may expand without end")
+            self._refuse_model("a document type declaration may expand without end")
 
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
+    def _start_element(self, name: str, attributes: dict[str, str]) -> None:
         depth = len(self._path)
         self._path.append(name)
         self._text = []
         if self._channel_start >= 0:
             return
         if self._main and depth == 0 and name != "fdm_config":
-            self._refuse(f"the root element is <{name}>, not <fdm_config>")
+            self._refuse_model(f"the root element is <{name}>, not <fdm_config>")
         # Inside a flight control component, <input> and <output> hold a property's name and no attribute.
         if name in {"input", "output"} and (depth < 3 or attributes):
             if not self._remove_channels:
-                self._refuse(f"<{name}> opens a port or writes a file")
+                self._refuse_model(f"<{name}> opens a port or writes a file")
             self._channel_start = self._parser.CurrentByteIndex
             return
         if "file" in attributes:
-            where = f'{self._parser.CurrentLineNumber}: <{name} file="{attributes["file"]}">'
-            self.brings.setdefault(attributes["file"], where)
+            location = f'{self._parser.CurrentLineNumber}: <{name} file="{attributes["file"]}">'
+            self.included_files.setdefault(attributes["file"], location)
         self.has_parts |= name in _PART_ELEMENTS
         # Functions and flight control components create a property of their name; the latter prefix fcs/ to a bare
         # name.
-        if name not in _ELEMENTS_WITHOUT_PROPERTY and (made := attributes.get("name")):
-            self.made_names |= {made, "fcs/" + made.lower().replace(" ", "-")}
+        if name not in _ELEMENTS_WITHOUT_PROPERTY and (property_name := attributes.get("name")):
+            self.created_names |= {property_name, "fcs/" + property_name.lower().replace(" ", "-")}
         # A <property> directly below a section declares one; elsewhere it reads one.
         self._declares = name == "property" and depth == (2 if self._main else 1)
 
-    def _end(self, name: str) -> None:
+    def _end_element(self, name: str) -> None:
         self._path.pop()
         match = _PROPERTY_NAME.fullmatch("".join(self._text).strip())
         self._text = []
         if self._channel_start >= 0:
             if name in {"input", "output"} and len(self._path) < 3:
                 # An empty-element tag ends where it began; otherwise the parser is before the end tag.
-                here = self._parser.CurrentByteIndex
-                self._spans.append((self._channel_start, self.data.index(b">", here) + 1))
+                byte_index = self._parser.CurrentByteIndex
+                self._spans.append((self._channel_start, self.data.index(b">", byte_index) + 1))
                 self._channel_start = -1
             return
         if match is None:
             return
         if self._declares or name == "output":
-            self.made_names.add(match[1])
+            self.created_names.add(match[1])
         elif name in _READING_ELEMENTS:
-            self.read_names.setdefault(match[1], self._parser.CurrentLineNumber)
+            self.used_names.setdefault(match[1], self._parser.CurrentLineNumber)
 
     def _collect_text(self, text: str) -> None:
         self._text.append(text)
@@ -147,29 +147,29 @@ def check_model(
     folders: folders of the files that the model includes.
     shipped: True for JSBSim's own model, whose channels are removed and whose names are known to be valid.
 
-    Raise FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
+    Raises FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
     declaration, for an ``<input>`` or ``<output>`` channel, for an included file that is not in the folders, and for a
     property that is read and that neither JSBSim nor the model creates.
     """
-    readers = {file.name: _read(file, main=True, remove_channels=shipped)}
-    waiting = [readers[file.name]]
-    while waiting:
-        reader = waiting.pop()
-        for name, where in reader.brings.items():
-            found = _find_file(name, folders)
-            if found is None:
-                message = f"{reader.file}:{where} includes another file, which is not in the aircraft's folder"
+    readers = {file.name: _read_model(file, main=True, remove_channels=shipped)}
+    pending = [readers[file.name]]
+    while pending:
+        reader = pending.pop()
+        for name, location in reader.included_files.items():
+            path = _find_file(name, folders)
+            if path is None:
+                message = f"{reader.file}:{location} includes another file, which is not in the aircraft's folder"
                 raise FlightError(message, file=reader.file, field="file", value=name)
-            if found.name not in readers:
-                readers[found.name] = _read(found, main=False, remove_channels=shipped)
-                waiting.append(readers[found.name])
+            if path.name not in readers:
+                readers[path.name] = _read_model(path, main=False, remove_channels=shipped)
+                pending.append(readers[path.name])
     if not shipped:
-        _check_names(list(readers.values()), provided)
+        _check_property_names(list(readers.values()), provided)
     return {name: reader.without_channels() for name, reader in readers.items()}
 
 
 def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
-    """Return the files of a model that ships with JSBSim by name, so that `check_model` accepts a copy of them.
+    """Return the files, by name, of a model that ships with JSBSim, such that `check_model` accepts a copy.
 
     Channels are removed, and entities of a document type are written out.
     """
@@ -177,7 +177,7 @@ def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
     return {name: ElementTree.tostring(ElementTree.fromstring(data)) for name, data in files.items()}
 
 
-def _read(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
+def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader
@@ -187,16 +187,18 @@ def _find_file(name: str, folders: Sequence[Path]) -> Path | None:
     """Return the file of this name, with or without its suffix, if it is inside the folders."""
     if Path(name).name != name or name.startswith("."):
         return None
-    names = (name, f"{name}.xml")
-    return next((folder / one for folder in folders for one in names if (folder / one).is_file()), None)
+    file_names = (name, f"{name}.xml")
+    return next(
+        (folder / file_name for folder in folders for file_name in file_names if (folder / file_name).is_file()), None
+    )
 
 
-def _check_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) -> None:
-    made = set().union(*(reader.made_names for reader in readers))
-    parts = any(reader.has_parts for reader in readers)
+def _check_property_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) -> None:
+    created_names = set().union(*(reader.created_names for reader in readers))
+    has_parts = any(reader.has_parts for reader in readers)
     for reader in readers:
-        for name, line in reader.read_names.items():
-            if name in made or (parts and _PART_PROPERTIES.match(name)) or provided(name):
+        for name, line in reader.used_names.items():
+            if name in created_names or (has_parts and _PART_PROPERTIES.match(name)) or provided(name):
                 continue
             message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model defines it"
             raise FlightError(message, file=reader.file, field=name)
@@ -232,24 +234,26 @@ except FlightError:
 def try_model(aircraft: Aircraft) -> None:
     """Load and step a model in another process, once for each version of the model.
 
-    Raise FlightError if that process dies. If it only refuses the model, nothing is raised, because loading the model
+    Raises FlightError if that process dies. If it only refuses the model, nothing is raised, because loading the model
     in this process will refuse it again, with the reason.
     """
-    code, reason = _try(str(aircraft.folder), model_hash(aircraft))
+    code, reason = _run_trial(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:
-        how = "hangs" if code is None else "aborts the process"
-        why = reason or "probably because of an undefined property"
-        raise FlightError(f"{aircraft.model_file}: JSBSim {how} with this model: {why}", file=aircraft.model_file)
+        failure = "hangs" if code is None else "aborts the process"
+        reason_text = reason or "probably because of an undefined property"
+        raise FlightError(
+            f"{aircraft.model_file}: JSBSim {failure} with this model: {reason_text}", file=aircraft.model_file
+        )
 
 
 @cache
-def _try(folder: str, _version: str) -> tuple[int | None, str]:
+def _run_trial(folder: str, _version: str) -> tuple[int | None, str]:
     """Return the exit code of the process, or None on timeout, and the reason that JSBSim prints."""
     # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             [sys.executable, "-c", _TRIAL_PROGRAM, folder],
             env=os.environ | {"PYTHONPATH": paths},
             capture_output=True,
@@ -258,30 +262,32 @@ def _try(folder: str, _version: str) -> tuple[int | None, str]:
         )
     except subprocess.TimeoutExpired:
         return None, ""
-    printed = b"\n".join(part for part in (done.stdout, done.stderr) if part)
-    return done.returncode, jsbsim_reason(printed.decode(errors="replace"))
+    printed = b"\n".join(part for part in (process.stdout, process.stderr) if part)
+    return process.returncode, jsbsim_reason(printed.decode(errors="replace"))
 
 
-# End of JSBSim's banner.
+# Last line of JSBSim's banner.
 _END_OF_BANNER = "JSBSim startup beginning ..."
-# Lines that state no reason: notes, the frames of C++ and of Python.
+# Lines that state no reason: notes, and the stack traces of C++ and Python.
 _NO_REASON = re.compile(
     r"(?:Engine|Tank) \w+ ignored|terminate called|Traceback|Fatal Python error|\s*File |Current thread"
 )
 # Folders before a file's name: a model is loaded from a copy.
 _FOLDERS = re.compile(r"(?:[^\s\"']*/)+")
-# Sequences that colour a terminal.
+# Escape sequences for terminal colors.
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 # Largest number of lines of a reason.
 _MAX_REASON_LINES = 4
 
 
 def jsbsim_reason(printed: str) -> str:
-    r"""Return the reason for which JSBSim does not load a model, from what it prints, in a line; "" if it states none.
+    r"""Return in one line why JSBSim does not load a model, from its output; "" if it states no reason.
 
     >>> jsbsim_reason("JSBSim startup beginning ...\n\nIn file /tmp/a/m.xml: line 91\n Unknown engine type\n")
     'In file m.xml: line 91 Unknown engine type'
     """
-    said = _COLOURS.sub("", printed).rpartition(_END_OF_BANNER)[2].splitlines()
-    lines = [" ".join(_FOLDERS.sub("", line).split()) for line in said if line.strip() and not _NO_REASON.match(line)]
+    output_lines = _COLOURS.sub("", printed).rpartition(_END_OF_BANNER)[2].splitlines()
+    lines = [
+        " ".join(_FOLDERS.sub("", line).split()) for line in output_lines if line.strip() and not _NO_REASON.match(line)
+    ]
     return " ".join(line.removeprefix("what(): ") for line in lines[:_MAX_REASON_LINES])

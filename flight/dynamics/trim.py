@@ -196,14 +196,14 @@ class Simulator(Protocol):
 
 def solve_trim(
     balance: Callable[[Floats], Floats],
-    held: Mapping[TrimQuantity, float],
+    fixed_values: Mapping[TrimQuantity, float],
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
     """Find the trim vector (8,) with two quantities fixed, or None if the iteration does not converge.
 
     balance: function from a trim vector to its accelerations, (6,).
-    held: values of the fixed quantities.
+    fixed_values: values of the fixed quantities.
     limits: elevator, aileron and rudder limits.
     start: first guess, (8,).
 
@@ -211,9 +211,9 @@ def solve_trim(
     not reduce the residual.
     """
     values = (first_guess(25.0) if start is None else start).copy()
-    for quantity, value in held.items():
+    for quantity, value in fixed_values.items():
         values[QUANTITIES.index(quantity)] = value
-    free_indices = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in held])
+    free_indices = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in fixed_values])
     lower_bounds, upper_bounds = _trim_bounds(limits)
     residual = balance(values)
     min_residual, stalled_steps, failed_steps = math.inf, 0, 0
@@ -230,11 +230,11 @@ def solve_trim(
             break
         columns = []
         for k in free_indices:
-            moved = values.copy()
+            shifted = values.copy()
             # Difference away from the stops: a surface beyond its stop does not move, and its column would be zero.
             difference = _DIFFERENCE_RATIO * _MAX_NEWTON_STEP[k] * (-1.0 if values[k] >= 0.0 else 1.0)
-            moved[k] += difference
-            columns.append((balance(moved) - residual) / difference)
+            shifted[k] += difference
+            columns.append((balance(shifted) - residual) / difference)
         step = least_squares(np.stack(columns, axis=1), -residual)
         step /= max(1.0, float(np.abs(step / _MAX_NEWTON_STEP[free_indices]).max()))
         for _ in range(6):
@@ -259,7 +259,7 @@ def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
 
 
 def trim(
-    simulator: Simulator, amsl: float, held: Mapping[TrimQuantity, float], near: Trim | None = None
+    simulator: Simulator, amsl: float, fixed_values: Mapping[TrimQuantity, float], near: Trim | None = None
 ) -> Trim | None:
     """Return the steady flight at an altitude with two quantities fixed, or None if no trim is found.
 
@@ -267,7 +267,7 @@ def trim(
     """
     simulator.move_to(amsl)
     start = near.vector() if near else simulator.first_guess()
-    values = solve_trim(simulator.balance, held, simulator.surface_limits(), start)
+    values = solve_trim(simulator.balance, fixed_values, simulator.surface_limits(), start)
     return None if values is None else from_vector(values, amsl)
 
 
@@ -277,7 +277,7 @@ def from_vector(values: Floats, amsl: float) -> Trim:
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
 
 
-def straight(
+def steady_flight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
     """Return the steady flight at an airspeed (m/s), altitude (m) and climb angle (rad), or None.
@@ -287,67 +287,82 @@ def straight(
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.fdm import Fdm
     >>> model = Fdm(load_aircraft("aerosonde"))
-    >>> level = straight(model, 25.0, 500.0)
-    >>> 0.3 < level.throttle < 0.9, straight(model, 90.0, 500.0) is None
+    >>> level = steady_flight(model, 25.0, 500.0)
+    >>> 0.3 < level.throttle < 0.9, steady_flight(model, 90.0, 500.0) is None
     (True, True)
     """
     found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
     if found_trim is None and near is None:
         # With little excess power the search fails from a distant start, and succeeds from the climb at the same
         # airspeed.
-        steepest_climb = full_throttle(simulator, airspeed, amsl)
+        steepest_climb = full_throttle_climb(simulator, airspeed, amsl)
         if steepest_climb is not None and steepest_climb.climb >= climb:
             found_trim = trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, steepest_climb)
     return found_trim
 
 
-def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+def full_throttle_climb(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
     """Return the steepest steady climb at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
 
 
-def idle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
     """Return the steepest steady descent, with closed throttle, at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
-def fastest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return level flight at full throttle, or None."""
+def fastest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Return level flight at full throttle, or None if there is no trim.
+
+    amsl: altitude, m.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, near)
 
 
-def slowest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return level flight with the elevator at its upper stop, or None."""
+def slowest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Return level flight with the elevator at its upper stop, or None if there is no trim.
+
+    amsl: altitude, m.
+    """
     return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, near)
 
 
-def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
+def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     """Return the matrices A (8, 8) and B (8, 4) of the linear dynamics about a trim, by central differences.
 
     The states are u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air). The commands are in
     the order of `flight.dynamics.state.Commands`, without actuator and motor lags. Altitude and course are held.
     """
-    simulator.move_to(at.amsl)
-    roll, pitch = attitude(at)
+    simulator.move_to(trim_point.amsl)
+    roll, pitch = attitude(trim_point)
     states = np.array(
-        [at.airspeed * math.cos(at.alpha), 0.0, at.airspeed * math.sin(at.alpha), 0.0, 0.0, 0.0, roll, pitch]
+        [
+            trim_point.airspeed * math.cos(trim_point.alpha),
+            0.0,
+            trim_point.airspeed * math.sin(trim_point.alpha),
+            0.0,
+            0.0,
+            0.0,
+            roll,
+            pitch,
+        ]
     )
-    commands = np.array(at.commands())
+    commands = np.array(trim_point.commands())
 
     def column(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
-        low, high = vector.copy(), vector.copy()
-        low[index] -= 1e-4
-        high[index] += 1e-4
-        return (rate(high) - rate(low)) / 2e-4
+        lower, upper = vector.copy(), vector.copy()
+        lower[index] -= 1e-4
+        upper[index] += 1e-4
+        return (rate(upper) - rate(lower)) / 2e-4
 
-    a = [column(i, states, lambda moved: simulator.derivatives(moved, commands)) for i in range(8)]
-    b = [column(i, commands, lambda moved: simulator.derivatives(states, moved)) for i in range(len(commands))]
+    a = [column(i, states, lambda shifted: simulator.derivatives(shifted, commands)) for i in range(8)]
+    b = [column(i, commands, lambda shifted: simulator.derivatives(states, shifted)) for i in range(len(commands))]
     return np.array(a).T, np.array(b).T
 
 
-def attitude(at: Trim) -> tuple[float, float]:
+def attitude(trim_point: Trim) -> tuple[float, float]:
     """Return roll and pitch of a trim, rad."""
-    roll, pitch, _ = euler(body_axes(0.0, at.climb, at.bank, at.alpha))
+    roll, pitch, _ = euler(body_axes(0.0, trim_point.climb, trim_point.bank, trim_point.alpha))
     return roll, pitch
 
 
@@ -363,9 +378,15 @@ def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats
     level_right = (-sh, ch, 0.0)
     level_down = (ch * sc, sh * sc, cc)
     rows = []
-    for ahead, aside, below in zip(forward, level_right, level_down, strict=True):
-        down = cb * below - sb * aside
-        rows.append((ca * ahead - sa * down, cb * aside + sb * below, sa * ahead + ca * down))
+    for forward_part, right_part, level_down_part in zip(forward, level_right, level_down, strict=True):
+        down_part = cb * level_down_part - sb * right_part
+        rows.append(
+            (
+                ca * forward_part - sa * down_part,
+                cb * right_part + sb * level_down_part,
+                sa * forward_part + ca * down_part,
+            )
+        )
     return np.array(rows)
 
 
@@ -385,12 +406,12 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
     airspeed: m/s.
     wind: (3,) m/s, direction of air motion.
 
-    Raise FlightError if the airspeed cannot overcome the wind along the path.
+    Raises FlightError if the airspeed cannot overcome the wind along the path.
     """
-    along = np.array([math.cos(climb) * math.cos(course), math.cos(climb) * math.sin(course), -math.sin(climb)])
-    tailwind = float((along * wind).sum())
-    square = airspeed**2 - float((wind * wind).sum()) + tailwind**2
-    speed = tailwind + math.sqrt(square) if airspeed > 0.0 and square > 0.0 else -1.0
+    direction = np.array([math.cos(climb) * math.cos(course), math.cos(climb) * math.sin(course), -math.sin(climb)])
+    tailwind = float((direction * wind).sum())
+    discriminant = airspeed**2 - float((wind * wind).sum()) + tailwind**2
+    speed = tailwind + math.sqrt(discriminant) if airspeed > 0.0 and discriminant > 0.0 else -1.0
     if speed <= 0.0:
         raise FlightError(
             f"no progress along the course of {math.degrees(course):.0f} degrees:"
@@ -398,4 +419,4 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
             field="airspeed",
             value=airspeed,
         )
-    return speed * along - wind
+    return speed * direction - wind

@@ -10,9 +10,9 @@ from world.arrays import Floats
 from world.kernels import inlined
 
 Vector = tuple[float, float, float]
-# Rows.
+# Rows of a matrix.
 Matrix = tuple[Vector, Vector, Vector]
-# Real part, and the other three.
+# Real part and vector part.
 Quaternion = tuple[float, Vector]
 
 
@@ -121,7 +121,7 @@ def product_back(a: Matrix, b: Matrix) -> Matrix:
 
 @inlined
 def rotation(cos: float, sin: float) -> Matrix:
-    """Return the matrix into axes that are turned about the third axis."""
+    """Return the matrix that transforms into axes rotated about the third axis, from the angle's cosine and sine."""
     return (cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -160,7 +160,7 @@ def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 @inlined
 def quaternion_rate(q: Quaternion, rates: Vector) -> Quaternion:
-    """Return the rate of a quaternion of a body that rotates at these rates about its axes."""
+    """Return the time derivative of the quaternion of a body that rotates at these rates about its axes."""
     w, (x, y, z) = q
     roll, pitch, yaw = rates
     return (
@@ -208,7 +208,7 @@ def quaternion_of_matrix(m: Matrix) -> Quaternion:
 
 @inlined
 def euler_angles(m: Matrix) -> Vector:
-    """Return roll, pitch and yaw (0 to 2 pi) of the matrix into the axes of a body, rad.
+    """Return roll, pitch and yaw (0 to 2 pi), rad, from the matrix that transforms into the axes of a body.
 
     With the nose straight up or down, yaw is 0.
     """

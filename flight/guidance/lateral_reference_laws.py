@@ -78,7 +78,7 @@ def l1_length(speed: float, period: float, damping: float) -> float:
 
 @inner
 def l1_angles(
-    estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, l1_distance: float
+    motion: Record, a_east: float, a_north: float, b_east: float, b_north: float, l1_distance: float
 ) -> tuple[float, float]:
     """Return the angle from the ground velocity to the leg or waypoint, and from the leg to the aim point, rad.
 
@@ -91,15 +91,15 @@ def l1_angles(
     leg_east, leg_north = b_east - a_east, b_north - a_north
     leg_length = max(1e-6, math.hypot(leg_east, leg_north))
     leg_east, leg_north = leg_east / leg_length, leg_north / leg_length
-    from_a_east, from_a_north = estimated.east - a_east, estimated.north - a_north
-    distance_along = from_a_east * leg_east + from_a_north * leg_north
-    cross_track = from_a_east * leg_north - from_a_north * leg_east
-    distance = math.hypot(from_a_east, from_a_north)
-    course = math.atan2(estimated.velocity_east, estimated.velocity_north)
+    offset_east, offset_north = motion.east - a_east, motion.north - a_north
+    distance_along = offset_east * leg_east + offset_north * leg_north
+    cross_track = offset_east * leg_north - offset_north * leg_east
+    distance = math.hypot(offset_east, offset_north)
+    course = math.atan2(motion.velocity_east, motion.velocity_north)
     if distance > l1_distance and distance_along < -_CAPTURE_SINE * max(1.0, distance):
-        return wrap(course - math.atan2(-from_a_east, -from_a_north)), math.nan
-    if distance_along > leg_length + _PASSED_TIME_S * math.hypot(estimated.velocity_east, estimated.velocity_north):
-        return wrap(course - math.atan2(b_east - estimated.east, b_north - estimated.north)), math.nan
+        return wrap(course - math.atan2(-offset_east, -offset_north)), math.nan
+    if distance_along > leg_length + _PASSED_TIME_S * math.hypot(motion.velocity_east, motion.velocity_north):
+        return wrap(course - math.atan2(b_east - motion.east, b_north - motion.north)), math.nan
     aim_angle = math.asin(min(_CAPTURE_SINE, max(-_CAPTURE_SINE, cross_track / max(0.1, l1_distance))))
     return wrap(course - math.atan2(leg_east, leg_north)), aim_angle
 
@@ -123,7 +123,7 @@ def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: flo
 
 
 @inner
-def has_l1_reached(estimated: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
+def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
     """Return True if the aircraft is within the turn distance of waypoint b, or past the line across the leg there.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -131,7 +131,7 @@ def has_l1_reached(estimated: Record, a: Record, b: Record, l1_distance: float, 
     radius: turn distance for a turn of 90 degrees, m; smaller turns start later.
     """
     leg_east, leg_north = b.east - a.east, b.north - a.north
-    to_b_east, to_b_north = b.east - estimated.east, b.north - estimated.north
+    to_b_east, to_b_north = b.east - motion.east, b.north - motion.north
     if to_b_east * leg_east + to_b_north * leg_north <= 0.0:
         return True
     turn_distance = min(radius, l1_distance) * min(1.0, b.turn / (0.5 * math.pi))

@@ -11,7 +11,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import Trim, linearise, straight
+from flight.dynamics.trim import Trim, linearise, steady_flight
 from flight.guidance.gains import Gains
 from world.arrays import Floats
 from world.errors import FlightError
@@ -93,18 +93,18 @@ def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, floa
     Raises FlightError if the aircraft cannot hold level flight at cruise.
     """
     fdm = Fdm(aircraft) if fdm is None else fdm
-    return _gains_of_matrices(aircraft, *linearise(fdm, _level_cruise(aircraft, fdm)))
+    return _gains_from_matrices(aircraft, *linearise(fdm, _level_cruise(aircraft, fdm)))
 
 
 def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
-    level = straight(fdm, aircraft.airspeed, AMSL)
+    level = steady_flight(fdm, aircraft.airspeed, AMSL)
     if level is None:
         message = f"{aircraft.name} cannot hold level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
         raise FlightError(message, file=aircraft.model_file, field="airspeed", value=aircraft.airspeed)
     return level
 
 
-def _gains_of_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
+def _gains_from_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
     speed = aircraft.airspeed
     _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
@@ -137,7 +137,7 @@ def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
     return 0.0
 
 
-def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
+def gains_from_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     """Return all gains of an aircraft from its model.
 
     fdm: simulation of the aircraft with its engine at rest; None creates one.
@@ -147,7 +147,7 @@ def gains_of_model(aircraft: Aircraft, fdm: Fdm | None = None) -> Gains:
     fdm = Fdm(aircraft) if fdm is None else fdm
     level = _level_cruise(aircraft, fdm)
     a, b = linearise(fdm, level)
-    airframe = _gains_of_matrices(aircraft, a, b)
+    airframe = _gains_from_matrices(aircraft, a, b)
     gains = (
         gains_at_airspeed(aircraft.airspeed)
         | airframe

@@ -31,8 +31,8 @@ def start_navigation(noise: Floats, lags: Record) -> None:
 
 @inner
 def navigate(
-    true: Record,
-    estimated: Record,
+    true_motion: Record,
+    estimated_motion: Record,
     lags: Record,
     noise: Floats,
     sigma: float,
@@ -41,23 +41,23 @@ def navigate(
 ) -> None:
     """Set the estimated state to the true state plus the error, and advance the error.
 
-    true, estimated: records of `MOTION`.
+    true_motion, estimated_motion: records of `MOTION`.
     lags: a record of `NAVIGATION_LAGS`.
     noise: (3,) unit normals.
     """
     if sigma == 0.0:
         for name in literal_unroll(_MOTION_FIELDS):
-            estimated[name] = true[name]
+            estimated_motion[name] = true_motion[name]
         return
     east, velocity_east = _step_error(lags, 0, noise, sigma, time_constant, dt)
     north, velocity_north = _step_error(lags, 1, noise, sigma, time_constant, dt)
     up, velocity_up = _step_error(lags, 2, noise, sigma, time_constant, dt)
-    estimated.east = true.east + east
-    estimated.north = true.north + north
-    estimated.up = true.up + up
-    estimated.velocity_east = true.velocity_east + velocity_east
-    estimated.velocity_north = true.velocity_north + velocity_north
-    estimated.velocity_up = true.velocity_up + velocity_up
+    estimated_motion.east = true_motion.east + east
+    estimated_motion.north = true_motion.north + north
+    estimated_motion.up = true_motion.up + up
+    estimated_motion.velocity_east = true_motion.velocity_east + velocity_east
+    estimated_motion.velocity_north = true_motion.velocity_north + velocity_north
+    estimated_motion.velocity_up = true_motion.velocity_up + velocity_up
 
 
 @inner

@@ -81,7 +81,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 
 @inner
-def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
+def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
     """Update the position along the path in the memory, and return the path's course at that position, rad.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
@@ -89,10 +89,10 @@ def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
     index = memory.piece
-    distance, cross_track, course = project(pieces[index], estimated.east, estimated.north)
+    distance, cross_track, course = project(pieces[index], motion.east, motion.north)
     while distance > pieces[index].length and index + 1 < pieces.shape[0]:
         index += 1
-        distance, cross_track, course = project(pieces[index], estimated.east, estimated.north)
+        distance, cross_track, course = project(pieces[index], motion.east, motion.north)
     piece = pieces[index]
     memory.piece = index
     memory.distance = piece.start + distance
@@ -172,7 +172,7 @@ def profile(nodes: Records, distance: float) -> tuple[float, float, float]:
 
 
 # Maximum turn per chord of an arc, rad.
-CHORD = math.radians(5.0)
+MAX_CHORD_TURN_RAD = math.radians(5.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -548,17 +548,17 @@ def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
     return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
 
 
-def _points_at(path: FlyByPath, distances: Floats) -> Floats:
+def _path_points(path: FlyByPath, distances: Floats) -> Floats:
     """Return the points (n, 3) of the path at distances (n,) along it, m."""
     pieces = path.pieces[_piece_index(path, distances)]
     course, curvature, distances_along = pieces["course"], pieces["curvature"], distances - pieces["start"]
     is_straight = curvature == 0.0
-    nonzero_curvature, course_at = np.where(is_straight, 1.0, curvature), course + curvature * distances_along
+    nonzero_curvature, end_course = np.where(is_straight, 1.0, curvature), course + curvature * distances_along
     east = np.where(
-        is_straight, distances_along * np.sin(course), (np.cos(course) - np.cos(course_at)) / nonzero_curvature
+        is_straight, distances_along * np.sin(course), (np.cos(course) - np.cos(end_course)) / nonzero_curvature
     )
     north = np.where(
-        is_straight, distances_along * np.cos(course), (np.sin(course_at) - np.sin(course)) / nonzero_curvature
+        is_straight, distances_along * np.cos(course), (np.sin(end_course) - np.sin(course)) / nonzero_curvature
     )
     up = [profile(path.nodes, float(s))[0] for s in distances]
     return np.column_stack([pieces["east"] + east, pieces["north"] + north, up])
@@ -567,7 +567,7 @@ def _points_at(path: FlyByPath, distances: Floats) -> Floats:
 def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     """Return the path as a polyline of points (n, 3), and the leg of each of its n - 1 segments.
 
-    Chords of arcs turn by at most `CHORD`; on a 160 m radius they deviate from the arc by 0.15 m.
+    Chords of arcs turn by at most `MAX_CHORD_TURN_RAD`; on a 160 m radius they deviate from the arc by 0.15 m.
 
     >>> level = np.array([(0.0, 500.0, 0.0, 0.0), (900.0, 500.0, 0.0, 0.0)], NODE)
     >>> north = np.array([(0.0, 900.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)], PIECE)
@@ -578,7 +578,7 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     unsorted_distances = [0.0, path.length]
     columns = (path.pieces[name].tolist() for name in ("start", "length", "curvature", "leg_change"))
     for start, length, curvature, leg_change in zip(*columns, strict=True):
-        chord_count = max(1, math.ceil(abs(curvature) * length / CHORD))
+        chord_count = max(1, math.ceil(abs(curvature) * length / MAX_CHORD_TURN_RAD))
         unsorted_distances += [start + length * index / chord_count for index in range(chord_count + 1)]
         if math.isfinite(leg_change):
             unsorted_distances.append(leg_change)
@@ -586,7 +586,7 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
         unsorted_distances += [node.distance + node.half_length * fraction for fraction in (-1.0, -0.5, 0.0, 0.5, 1.0)]
     clipped_distances = np.clip(np.array(unsorted_distances), 0.0, path.length)
     distances = np.unique(np.round(clipped_distances, 6))
-    points = _points_at(path, distances)
+    points = _path_points(path, distances)
     midpoints = 0.5 * (distances[1:] + distances[:-1])
     pieces = path.pieces[_piece_index(path, midpoints)]
     return points, (pieces["leg"] + (midpoints > pieces["leg_change"])).astype(np.int64)
@@ -605,8 +605,8 @@ def arc_point(piece: Record, distance_along: float) -> tuple[float, float]:
     course, curvature = piece.course, piece.curvature
     if curvature == 0.0:
         return piece.east + distance_along * math.sin(course), piece.north + distance_along * math.cos(course)
-    course_at = course + curvature * distance_along
+    end_course = course + curvature * distance_along
     return (
-        piece.east + (math.cos(course) - math.cos(course_at)) / curvature,
-        piece.north + (math.sin(course_at) - math.sin(course)) / curvature,
+        piece.east + (math.cos(course) - math.cos(end_course)) / curvature,
+        piece.north + (math.sin(end_course) - math.sin(course)) / curvature,
     )

@@ -121,13 +121,13 @@ class ArmingState:
         self.mode = mode
         return CommandResult(ACCEPTED, "AUTO: arming starts the mission" if mode == AUTO and not self.armed else "")
 
-    def start(self) -> CommandResult:
+    def start_mission(self) -> CommandResult:
         """Start the mission (MAV_CMD_MISSION_START)."""
         if not self.armed:
             return CommandResult(DENIED, "start denied: not armed")
         return self.set_mode(AUTO)
 
-    def pause(self, should_continue: bool) -> CommandResult:
+    def pause_or_continue(self, should_continue: bool) -> CommandResult:
         """Loiter at the aircraft's position, or continue the mission (MAV_CMD_DO_PAUSE_CONTINUE)."""
         if self.flying:
             return self._change_flight_mode(AUTO if should_continue else LOITER)

@@ -1,6 +1,6 @@
 """Run the flight of the live vehicle in its own process, because JSBSim holds the interpreter's lock.
 
-Requests arrive over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends
+Requests arrive over a pipe and events go back: a state snapshot as packed bytes, everything else pickled. Both ends
 belong to planfly; nothing from a station is ever unpickled.
 
 | request | meaning |
@@ -149,7 +149,7 @@ class MissionJudged:
 class FlightDiverted:
     """Event: the aircraft is on another route, or stays on its route because it cannot be diverted.
 
-    mode: present mode of the flight.
+    mode: current mode of the flight.
     problem: reason why the flight cannot be diverted, or "".
     items: seq of the item at each waypoint, -1 for no item.
     """
@@ -250,8 +250,8 @@ def serve_flights(connection: Connection, factory: FlightFactory) -> None:
         while True:
             request = requests.next()
             if isinstance(request, JudgeMission):
-                prepared, judged = factory.prepare(request)
-                send_event(connection, judged)
+                prepared, verdict = factory.prepare(request)
+                send_event(connection, verdict)
             elif isinstance(request, StartFlight) and prepared is not None:
                 if not _run_flight(connection, requests, prepared, factory):
                     return
@@ -355,8 +355,8 @@ class _LoggedFlight:
         self._connection, self._requests, self._factory = connection, requests, factory
         self._flight, self._mode = flight, AUTO
         self._snapshots = SnapshotMaker(flight.setup, flight.map)
-        # The last log is written; the others are judged after the flight, with their ends in `_ends`.
-        self._logs, self._ends = [log], list[str]()
+        # The last log is written; the others are judged after the flight, with their ends in `_end_reasons`.
+        self._logs, self._end_reasons = [log], list[str]()
         self._unwritten_rows: list[Rows] = []
         # The current loiter, or None, and the number of its logs.
         self._loiter: DivertFlight | None = None
@@ -376,14 +376,14 @@ class _LoggedFlight:
                 time_origin += (due_ticks - max_due_ticks) * TICK / speed
                 due_ticks = max_due_ticks
             if due_ticks > 0:
-                rows, end_reason = self._flight.block(due_ticks)
+                rows, end_reason = self._flight.fly_block(due_ticks)
                 ticks += due_ticks
                 if len(rows):
                     self._unwritten_rows.append(rows)
                     self._connection.send_bytes(_PACKED_MARK + self._snapshots.snapshot(rows[-1]).pack())
             if end_reason == "completed" and self._loiter is not None and self._loiter_logs < _MAX_LOITER_LOGS:
                 self._loiter_logs += 1
-                end_reason = "" if self._begin_route(self._loiter, STILL_LOITERING_TEXT) else end_reason
+                end_reason = "" if self._start_route(self._loiter, STILL_LOITERING_TEXT) else end_reason
             request = self._requests.poll()
             if isinstance(request, EndFlight):
                 end_reason = end_reason or (SHUT_DOWN if request.quit else STOPPED)
@@ -404,11 +404,11 @@ class _LoggedFlight:
 
         should_abort: see `LogSink.finish`.
         """
-        end_reasons = (*self._ends, end_reason)
+        end_reasons = (*self._end_reasons, end_reason)
         return [log.finish(reason, should_abort) for log, reason in zip(self._logs, end_reasons, strict=True)]
 
     def abandon(self) -> None:
-        """Close the logs in their present state."""
+        """Close the logs in their current state, without a verdict."""
         for log in self._logs:
             log.abandon()
 
@@ -417,7 +417,7 @@ class _LoggedFlight:
         self._unwritten_rows.clear()
 
     def _divert(self, request: DivertFlight) -> None:
-        if not self._begin_route(request, DIVERTED_TEXT + MODE_NAMES[request.mode]):
+        if not self._start_route(request, DIVERTED_TEXT + MODE_NAMES[request.mode]):
             return
         route = self._flight.setup.route
         self._mode, self._loiter, self._loiter_logs = request.mode, None, 1
@@ -427,7 +427,7 @@ class _LoggedFlight:
             self._loiter = replace(request, center=center)
         send_event(self._connection, FlightDiverted(request.mode, "", tuple(int(item) for item in route.items)))
 
-    def _begin_route(self, request: DivertFlight, end_reason: str) -> bool:
+    def _start_route(self, request: DivertFlight, end_reason: str) -> bool:
         """Start a route at the aircraft's position, with its own log; return False if there is no such route.
 
         end_reason: text on the end of the current route.
@@ -443,5 +443,5 @@ class _LoggedFlight:
         self._flight.divert(prepared.setup, prepared.local_map)
         self._snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
         self._logs.append(log)
-        self._ends.append(end_reason)
+        self._end_reasons.append(end_reason)
         return True

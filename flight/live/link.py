@@ -1,7 +1,7 @@
 """Serve the vehicle's stations on one UDP socket.
 
 A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or, on this machine, any message addressed
-to the vehicle, from an address that is allowed, and signed if a key is set.  The table of stations is bounded; a silent
+to the vehicle, from an address that is allowed, and signed if a key is set. The table of stations is bounded; a silent
 station is removed from it.
 """
 
@@ -78,7 +78,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
     data = data[:MAX_DATAGRAM_BYTES]
     offset = 0
     while offset < len(data) and len(frames) < MAX_FRAMES:
-        frame = _parse_frame_at(data, offset) if data[offset] in (MAGIC_V1, MAGIC_V2) else None
+        frame = _parse_frame(data, offset) if data[offset] in (MAGIC_V1, MAGIC_V2) else None
         if frame is None:
             offset += 1
         else:
@@ -87,7 +87,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
     return frames
 
 
-def _parse_frame_at(data: bytes, offset: int) -> MavlinkFrame | None:
+def _parse_frame(data: bytes, offset: int) -> MavlinkFrame | None:
     """Return the frame that starts at an offset, or None if no complete frame starts there."""
     is_v2 = data[offset] == MAGIC_V2
     header_size = 10 if is_v2 else 6
@@ -141,7 +141,7 @@ _MAX_KEY_BYTES = 1024
 def read_key(path: Path) -> bytes:
     """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
 
-    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way.  Raises FlightError if the file
+    MAVProxy's "signing setup" and Mission Planner hash a passphrase in the same way. Raises FlightError if the file
     cannot be read, if another user could read it, or if it holds fewer than 8 or more than 1024 bytes.
 
     >>> import tempfile
@@ -206,7 +206,7 @@ class Signing:
     def find_refusal(self, frame: MavlinkFrame, wall: float) -> RefusalReason | None:
         """Return the reason to distrust a frame, or None if the frame is signed with the key and newer than its stream.
 
-        A stream is a system, its component and its link id.  A frame with a bad signature changes nothing.
+        A stream is a system, its component and its link id. A frame with a bad signature changes nothing.
 
         wall: time since 1970, s.
         """
@@ -280,17 +280,18 @@ class Peer:
 
     periods: intervals between messages, s; None for a message that is off.
     due: next time of each message.
-    parameter: number of the next parameter to send, if the station requested all parameters.
+    last_heard_time: time at which the station was last heard, s of the link's clock.
+    next_parameter: number of the next parameter to send, if the station requested all parameters; otherwise None.
     """
 
     address: Address
     system: int
     component: int
-    heard: float
+    last_heard_time: float
     mav: Any
     periods: dict[str, float | None] = field(default_factory=lambda: dict(PERIODS))
     due: dict[str, float] = field(default_factory=dict)
-    parameter: float | None = None
+    next_parameter: float | None = None
 
     @property
     def station(self) -> Station:
@@ -337,7 +338,7 @@ def check_access(access: Access) -> None:
     """Raise FlightError if access to the vehicle from other machines is not protected.
 
     Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and an address to send to needs
-    a key or must be on that list.  The error names the argument to give.
+    a key or must be on that list. The error names the argument to give.
 
     >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
     >>> check_access(Access(("0.0.0.0", 14551), ()))
@@ -426,7 +427,7 @@ class Link:
             except BlockingIOError:
                 break
             except OSError:
-                # A station's port is closed: its ICMP answer comes up here.
+                # A station's port is closed: its ICMP answer is reported here.
                 continue
             messages += self.decode_datagram(data, (str(source[0]), int(source[1])))
         return messages
@@ -489,8 +490,8 @@ class Link:
             f"{host} signs with timestamps more than a day ahead of this machine's clock: such frames are dropped"
         )
 
-    def take_notices(self) -> list[str]:
-        """Return the notices since the last call on senders without an answer."""
+    def pop_notices(self) -> list[str]:
+        """Return the notices since the last call on senders that get no answer."""
         notices, self._notices = self._notices, []
         return notices
 
@@ -505,7 +506,7 @@ class Link:
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
         now = self.clock()
-        self.peers = {key: peer for key, peer in self.peers.items() if now - peer.heard < SILENCE}
+        self.peers = {key: peer for key, peer in self.peers.items() if now - peer.last_heard_time < SILENCE}
         peer = self.peers.get(source)
         if peer is None:
             if len(self.peers) >= MAX_PEERS:
@@ -515,7 +516,7 @@ class Link:
             # Spread over the first tenth of a second, so that not everything is sent at once.
             peer.due = {name: now + 0.1 * index / len(PERIODS) for index, name in enumerate(PERIODS)}
             self.peers[source] = peer
-        peer.heard = now
+        peer.last_heard_time = now
         return peer
 
     def _frame_sequence(self, address: Address) -> Any:
@@ -530,7 +531,7 @@ class Link:
     def remove_silent_peers(self) -> None:
         """Remove the peers that have been silent for `SILENCE`."""
         now = self.clock()
-        for key in [key for key, peer in self.peers.items() if now - peer.heard >= SILENCE]:
+        for key in [key for key, peer in self.peers.items() if now - peer.last_heard_time >= SILENCE]:
             del self.peers[key]
 
     def send(self, message: Any, peer: Peer) -> None:

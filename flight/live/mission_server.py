@@ -1,7 +1,7 @@
 """Implement the vehicle's side of the MAVLink mission protocol, as a state machine without socket and clock.
 
 A mission, a fence and rally points are each accepted whole or not at all: an upload is collected next to the current
-list and replaces it only when its last item has arrived and every item is valid.  One station uploads at a time;
+list and replaces it only when its last item has arrived and every item is valid. One station uploads at a time;
 another is denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)  pymavlink has
 the messages and a station's lists (`mavwp`), but not the vehicle's side.
 """
@@ -31,10 +31,10 @@ from flight.mission.items import (
 from world.errors import MissionError
 
 # ----------------------------------------------------------------------
-# Mission items as messages: make and parse MISSION_ITEM_INT, parse MISSION_ITEM (MAVLink mission protocol).
+# Mission items as messages: create and parse MISSION_ITEM_INT, parse MISSION_ITEM (MAVLink mission protocol).
 #
-# Only the INT form is made: the float MISSION_ITEM moves a waypoint by up to 0.5 m.  pymavlink is imported when a
-# message is made, so that reading files does not wait for it.
+# Only the INT form is created: the float MISSION_ITEM moves a waypoint by up to 0.5 m. pymavlink is imported when a
+# message is created, so that reading files does not wait for it.
 
 _INT32_MAX = 2**31 - 1
 
@@ -95,8 +95,8 @@ def from_message(message: Any, source: str) -> MissionItem:
 
     source: name of the sender in messages.
 
-    INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude are rounded to the
-    nearest 1e-7 degrees.  Raises MissionError with one line that names item, field, value, and allowed values.
+    INT32_MAX in an integer x or y is NaN (MAVLink's "unset"). A float's latitude and longitude are rounded to the
+    nearest 1e-7 degrees. Raises MissionError with one line that names item, field, value, and allowed values.
     """
     command, frame = int(message.command), int(message.frame)
     has_coordinates = is_located(command, frame)
@@ -114,14 +114,14 @@ def from_message(message: Any, source: str) -> MissionItem:
         if math.isinf(value):
             problem = ItemProblem(name, value, "a finite number, or NaN for unset")
             raise MissionError(**problem.at(source, f"{source}: item {item.seq}"))
-    fault = item_problem(item)
-    if fault is not None:
-        raise MissionError(**fault.at(source, f"{source}: item {item.seq}"))
+    item_fault = item_problem(item)
+    if item_fault is not None:
+        raise MissionError(**item_fault.at(source, f"{source}: item {item.seq}"))
     return item
 
 
 # ----------------------------------------------------------------------
-# Missions as numbered by stations and as flown: conversion of home, seq and jumps.
+# Conversion between the stations' numbers and the flown mission: home, seq and jumps.
 
 
 def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home: Home) -> tuple[Mission, int]:
@@ -195,10 +195,10 @@ def start_problem(mission: Mission, first_seq: int, *, in_flight: bool = False) 
     if not mission.items or not 0 <= first_seq <= mission.items[-1].seq:
         return "the mission has no such item"
     positions = [item for item in mission.items if item.seq >= first_seq and item.has_position]
-    min_place_count = 1 if in_flight else 2
+    min_position_count = 1 if in_flight else 2
     return (
         ""
-        if first_seq <= mission.items[0].seq or len(positions) >= min_place_count
+        if first_seq <= mission.items[0].seq or len(positions) >= min_position_count
         else "no leg is left to fly from there"
     )
 
@@ -222,11 +222,11 @@ def mission_from_item(mission: Mission, first_seq: int) -> Mission:
 # Maximum number of items of an upload: bounds the memory that a station can use (some 2 MB a list).
 MAX_UPLOADED = 5_000
 # Minimum time before a request is repeated, s.  The first repetition comes after 1.5 times the time that the last item
-# took, the next after twice as long each time, up to `SLOWEST_RETRY`.  Not sooner, as a slow station may give up:
+# took, the next after twice as long each time, up to `MAX_RETRY`.  Not sooner, as a slow station may give up:
 # MAVSDK does at the sixth request for an item.
 RETRY = 0.05
 # Maximum time before a request is repeated, s.
-SLOWEST_RETRY = 0.4
+MAX_RETRY = 0.4
 # Number of extra requests for an upload's last item.  The last ACK may be lost, while the station waits for it in
 # silence, as MAVSDK does for five times 0.5 s.  If other messages of the upload were lost, its last item is requested
 # again, until the station sends something else.  Not on a good link: a station with the ACK does not need it, and
@@ -236,7 +236,7 @@ CONFIRMATIONS = 4
 CONFIRM = 0.4
 # Time within which a last item that arrives again is a duplicate and gets no second ACK, s: that ACK would end the next
 # upload.
-ACK_AGAIN = 0.3
+DUPLICATE_ITEM_TIME_S = 0.3
 # Number of unanswered requests for a first item before MISSION_REQUEST replaces MISSION_REQUEST_INT.
 _INT_REQUEST_ATTEMPTS = 4
 # Silence of a station after which another one may upload, s.
@@ -245,10 +245,10 @@ LOCK = 1.0
 UPLOAD_TIMEOUT = 8.0
 
 # `current` of an item with a position to fly to now.
-_GO_TO_PLACE = 2
+_GO_TO_POSITION = 2
 # `current` of an item with an altitude to fly at now.
 _GO_TO_ALTITUDE = 3
-_GUIDED = (_GO_TO_PLACE, _GO_TO_ALTITUDE)
+_GO_TO_VALUES = (_GO_TO_POSITION, _GO_TO_ALTITUDE)
 _FLOAT_WARNING = (
     "the upload came as MISSION_ITEM, whose positions are floats: up to 0.5 m off; MISSION_ITEM_INT is exact"
 )
@@ -257,7 +257,7 @@ _ALLOWED_COMMANDS = {
     MissionType.FENCE: FENCES | {_FENCE_RETURN},
     MissionType.RALLY: frozenset({int(Command.NAV_RALLY_POINT)}),
 }
-_NAMES = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionType.RALLY: "rally points"}
+_TITLES = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionType.RALLY: "rally points"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,7 +331,7 @@ class MissionServer:
     changed: lists that an upload replaced since the caller last cleared this set.
     locked: reason why the mission must not change now, or "".
     go_to: function that flies to an item's position and altitude, and loiters there; latitude and longitude are NaN
-        for the aircraft's position.  It returns the reason for a refusal, or "".
+        for the aircraft's position. It returns the reason for a refusal, or "".
     """
 
     lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
@@ -347,7 +347,7 @@ class MissionServer:
 
         now: time of any clock that never goes back, s.
         """
-        if message.get_type() in _HANDLERS and message.get_type() not in _ITEMS:
+        if message.get_type() in _HANDLERS and message.get_type() not in _ITEM_MESSAGES:
             self._stop_confirmations(station)
         try:
             kind = MissionType(getattr(message, "mission_type", 0))
@@ -367,11 +367,11 @@ class MissionServer:
             if now - upload.last_message_time > UPLOAD_TIMEOUT:
                 del self._uploads[kind]
                 text = (
-                    f"{_NAMES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
+                    f"{_TITLES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
                 )
                 replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, text))
             elif now - upload.last_request_time >= upload.wait:
-                upload.wait = min(2.0 * upload.wait, SLOWEST_RETRY)
+                upload.wait = min(2.0 * upload.wait, MAX_RETRY)
                 upload.was_repeated = True
                 upload.unanswered_count += not upload.items
                 replies.append(self._request(upload, kind, now))
@@ -404,7 +404,7 @@ class MissionServer:
             item = from_message(message, "go-to")
         except MissionError as error:
             return self._ack(station, mavlink.MAV_MISSION_INVALID, kind, str(error))
-        if message.current != _GO_TO_PLACE:
+        if message.current != _GO_TO_POSITION:
             item = replace(item, lat_deg=math.nan, lon_deg=math.nan)
         problem = self.go_to(item)
         result = mavlink.MAV_MISSION_DENIED if problem else mavlink.MAV_MISSION_ACCEPTED
@@ -412,12 +412,12 @@ class MissionServer:
 
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
-        if message.current in _GUIDED and (upload is None or upload.station != station):
+        if message.current in _GO_TO_VALUES and (upload is None or upload.station != station):
             return [self._answer_go_to(message, station, kind)]
         if upload is None or upload.station != station:
             finished = self._finished.get(kind)
             is_last_item = finished is not None and (finished.station, finished.count) == (station, message.seq + 1)
-            if finished is not None and is_last_item and now - finished.last_ack_time >= ACK_AGAIN:
+            if finished is not None and is_last_item and now - finished.last_ack_time >= DUPLICATE_ITEM_TIME_S:
                 # The station repeats its last item, because the ACK was lost.
                 finished.last_ack_time = now
                 return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
@@ -427,7 +427,7 @@ class MissionServer:
             # A duplicate, or an item out of order; the missing one is requested again in time.
             return []
         try:
-            item = from_message(message, _NAMES[kind])
+            item = from_message(message, _TITLES[kind])
         except MissionError as error:
             return [self._reject_upload(upload, kind, _refusal_result(message), str(error))]
         placement_problem = _placement_problem(item, kind)
@@ -435,7 +435,7 @@ class MissionServer:
             return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, placement_problem)]
         upload.items.append(item)
         upload.has_floats = message.get_type() == "MISSION_ITEM"
-        upload.wait = min(max(RETRY, 1.5 * (now - upload.first_request_time)), SLOWEST_RETRY)
+        upload.wait = min(max(RETRY, 1.5 * (now - upload.first_request_time)), MAX_RETRY)
         upload.first_request_time = now
         if len(upload.items) < upload.count:
             return [self._request(upload, kind, now)]
@@ -545,7 +545,7 @@ def _placement_problem(item: MissionItem, kind: MissionType) -> str:
         if kind in _ALLOWED_COMMANDS
         else item.command not in _ALLOWED_COMMANDS[MissionType.FENCE]
     )
-    return "" if is_allowed else f"{_NAMES[kind]}: item {item.seq}: command {item.command} does not belong there"
+    return "" if is_allowed else f"{_TITLES[kind]}: item {item.seq}: command {item.command} does not belong there"
 
 
 def _refusal_result(message: Any) -> int:
@@ -558,7 +558,7 @@ def _refusal_result(message: Any) -> int:
     return int(mavlink.MAV_MISSION_INVALID)
 
 
-_ITEMS = ("MISSION_ITEM_INT", "MISSION_ITEM")
+_ITEM_MESSAGES = ("MISSION_ITEM_INT", "MISSION_ITEM")
 _HANDLERS = {
     "MISSION_COUNT": MissionServer._start_upload,
     "MISSION_ITEM_INT": MissionServer._receive_item,

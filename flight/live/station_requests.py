@@ -38,18 +38,18 @@ _FIXED_REASON = "is fixed by the aircraft or the scenario"
 class Parameter:
     """One parameter; values are sent as float32.
 
-    low, high: range that a station may set; high is None for a fixed parameter.
-    fixed: reason why the parameter is fixed.
-    flies: True for a parameter of the simulated autopilot, which may be set only on the ground; the mission is then
-        judged again.
+    min_value, max_value: range that a station may set; max_value is None for a fixed parameter.
+    fixed_reason: reason why the parameter is fixed.
+    is_simulated: True for a parameter of the simulated autopilot, which may be set only on the ground; the mission is
+        then judged again.
     """
 
     name: str
     value: float
-    low: float = 0.0
-    high: float | None = None
-    fixed: str = _FIXED_REASON
-    flies: bool = False
+    min_value: float = 0.0
+    max_value: float | None = None
+    fixed_reason: str = _FIXED_REASON
+    is_simulated: bool = False
 
 
 def _empty_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
@@ -115,21 +115,21 @@ class Parameters:
             return None, f"{_decode_name(name)}: no such parameter"
         entry = self.entries[number]
         unchanged_text = f"{entry.value:g} kept"
-        if entry.flies:
+        if entry.is_simulated:
             if in_flight:
                 return (
                     number,
                     f"{entry.name} {value:g} refused in flight, which is logged with one set; {unchanged_text}",
                 )
-            return number, self._set_law_parameter(entry, value)
-        if entry.high is None:
-            return number, f"{entry.name} {entry.fixed}: {unchanged_text}"
-        if not (math.isfinite(value) and entry.low <= value <= entry.high):
-            return number, f"{entry.name} {value:g}: allowed {entry.low:g}..{entry.high:g}; {unchanged_text}"
+            return number, self._set_autopilot_parameter(entry, value)
+        if entry.max_value is None:
+            return number, f"{entry.name} {entry.fixed_reason}: {unchanged_text}"
+        if not (math.isfinite(value) and entry.min_value <= value <= entry.max_value):
+            return number, f"{entry.name} {value:g}: allowed {entry.min_value:g}..{entry.max_value:g}; {unchanged_text}"
         self.set_value(entry.name, value)
         return number, ""
 
-    def _set_law_parameter(self, entry: Parameter, value: float) -> str:
+    def _set_autopilot_parameter(self, entry: Parameter, value: float) -> str:
         """Set a parameter of the simulated autopilot, and return the reason for a refusal, or ""."""
         if not math.isfinite(value):
             return f"{entry.name} {value:g}: expected a finite number; {entry.value:g} kept"
@@ -142,8 +142,8 @@ class Parameters:
         if values[entry.name] != stated_values[entry.name]:
             return f"{entry.name} {_FIXED_REASON}: {entry.value:g} kept"
         self.stated = stated_values
-        for name, law_value in values.items():
-            self.set_value(name, law_value)
+        for name, autopilot_value in values.items():
+            self.set_value(name, autopilot_value)
         return ""
 
 
@@ -198,7 +198,9 @@ def vehicle_parameters(
     entries = {entry.name: entry for entry in vehicle_entries}
     unflown_names = set(not_flown)
     for name, value in autopilot_values({}).items():
-        entries[name] = Parameter(name, value, fixed="is read, but no flight shows it", flies=name not in unflown_names)
+        entries[name] = Parameter(
+            name, value, fixed_reason="is read, but no flight shows it", is_simulated=name not in unflown_names
+        )
     return Parameters([entries[name] for name in sorted(entries)], autopilot_values)
 
 
@@ -246,13 +248,13 @@ class _WaitingArmCommand:
 class Requests:
     """Answer requests with messages for the requesting station, and with texts for all stations.
 
-    start_at: function that sets the item at which the next flight starts, by the station's number.
+    set_start_item: function that sets the item at which the next flight starts, by the station's number.
     """
 
     arming: ArmingState
     parameters: Parameters
     status: Status
-    start_at: Callable[[int], CommandResult]
+    set_start_item: Callable[[int], CommandResult]
     _waiting_commands: list[_WaitingArmCommand] = field(default_factory=list)
 
     def handle(self, message: Any, peer: Peer, now: float) -> list[Response]:
@@ -295,17 +297,17 @@ class Requests:
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self.arming.set_mode(_to_integer(message.param2))
         if number == mavlink.MAV_CMD_MISSION_START:
-            return self.arming.start()
+            return self.arming.start_mission()
         if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
-            return self.arming.pause(message.param1 == 1)
+            return self.arming.pause_or_continue(message.param1 == 1)
         if number in _MODE_COMMANDS:
             return self.arming.set_mode(_MODE_COMMANDS[number])
         if number == mavlink.MAV_CMD_DO_REPOSITION:
-            place = _parse_loiter_center(message)
-            return CommandResult(DENIED, _NO_PLACE) if place is None else self.arming.go_to(place)
+            center = _parse_loiter_center(message)
+            return CommandResult(DENIED, _INVALID_POSITION_TEXT) if center is None else self.arming.go_to(center)
         if number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
-            return self.start_at(_to_integer(message.param1))
-        return CommandResult(UNSUPPORTED, _NOT_FLOWN.get(number, ""))
+            return self.set_start_item(_to_integer(message.param1))
+        return CommandResult(UNSUPPORTED, _UNSUPPORTED_COMMAND_TEXTS.get(number, ""))
 
     def _run_message_command(
         self, number: int, message: Any, peer: Peer, now: float
@@ -355,7 +357,7 @@ class Requests:
         return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
     def _on_mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
-        reply = self.start_at(int(message.seq))
+        reply = self.set_start_item(int(message.seq))
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
         # The message has no refusal, and MAVSDK repeats it without end, at each MISSION_CURRENT of another item; MAVSDK
@@ -365,10 +367,10 @@ class Requests:
         return [StatusText(reply.text, WARNING)]
 
     def _refuse_guided_item(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
-        return [StatusText(_NO_GUIDED, WARNING)]
+        return [StatusText(_NO_GUIDED_TARGET_TEXT, WARNING)]
 
     def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
-        peer.parameter = 0.0
+        peer.next_parameter = 0.0
         return []
 
     def _read_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
@@ -433,12 +435,14 @@ def _to_integer(value: float) -> int:
 _MISSION_CURRENT_PAUSE_S = 3.0
 # MAV_CMD_DO_ORBIT, which pymavlink 2.4.41 does not have.
 _DO_ORBIT = 34
-_NO_GUIDED = "target refused: MAV_CMD_DO_REPOSITION, or a MISSION_ITEM_INT with current 2, sends it to a place"
-_NO_PLACE = "go-to denied: expected a latitude of -90..90, a longitude of -180..180 and a finite height"
+_NO_GUIDED_TARGET_TEXT = (
+    "target refused: MAV_CMD_DO_REPOSITION, or a MISSION_ITEM_INT with current 2, sends it to a place"
+)
+_INVALID_POSITION_TEXT = "go-to denied: expected a latitude of -90..90, a longitude of -180..180 and a finite height"
 # Commands that are equivalent to a mode.
 _MODE_COMMANDS = {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: RTL, mavlink.MAV_CMD_NAV_LOITER_UNLIM: LOITER}
 # Commands that do not control this aircraft, with an alternative.
-_NOT_FLOWN: dict[int, str] = {
+_UNSUPPORTED_COMMAND_TEXTS: dict[int, str] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "speed change refused: put DO_CHANGE_SPEED into the mission",
     _DO_ORBIT: "orbit refused: put a loiter into the mission",
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "height change refused: a go-to has a height",

@@ -74,7 +74,7 @@ class Snapshot:
         return Snapshot(*_SNAPSHOT_FORMAT.unpack(data))
 
     @property
-    def finite(self) -> bool:
+    def is_finite(self) -> bool:
         """True if all values are finite and may be sent to stations; a flight may end with other values."""
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
@@ -94,7 +94,7 @@ class SnapshotMaker:
         self._origin: GeoOrigin = setup.scenario.origin
         self._map = local_map
 
-    def before_start(self, setup: FlightSetup) -> Snapshot:
+    def start_snapshot(self, setup: FlightSetup) -> Snapshot:
         """Return the snapshot of an aircraft at the start of the route, on the course of its first leg."""
         points = setup.route.waypoints
         first_leg = points[1] - points[0]
@@ -183,7 +183,7 @@ class StatusText(NamedTuple):
 def status_texts(text: str, severity: int, number: int) -> list[Any]:
     """Return the STATUSTEXT messages of a text, in pieces of 50 bytes that stations join again.
 
-    number: 1..65535, new for each text.  Ground stations show ASCII: any other character becomes "?", a degree sign
+    number: 1..65535, new for each text. Ground stations show ASCII: any other character becomes "?", a degree sign
     " deg", and bytes beyond 400 are omitted.
 
     >>> [message.text for message in status_texts("climb of 9° at leg 3", 4, 1)]
@@ -338,7 +338,7 @@ def telemetry_message(name: str, status: Status) -> Any:
     >>> message.lat, message.alt, message.relative_alt
     (460000000, 500000, 100000)
     """
-    maker = _MAKERS.get(name)
+    maker = _MESSAGE_MAKERS.get(name)
     return maker(status) if maker else None
 
 
@@ -385,13 +385,13 @@ def _mission_current_message(status: Status) -> Any:
 
 
 def _sys_status_message(status: Status) -> Any:
-    health = _SENSORS | (_PREARM if status.ready else 0)
+    healthy_sensors = _SENSORS | (_PREARM if status.ready else 0)
     remaining_fraction = max(0.0, 1.0 - status.snapshot.energy / status.battery)
-    present = _SENSORS | _PREARM
+    present_sensors = _SENSORS | _PREARM
     return mavlink.MAVLink_sys_status_message(
-        present,
-        present,
-        health,
+        present_sensors,
+        present_sensors,
+        healthy_sensors,
         min(1000, round(status.load * 1000)),
         44_400,
         _to_int16(status.snapshot.current * 100),
@@ -424,8 +424,8 @@ def _gps_message(status: Status) -> Any:
 def _wind_message(status: Status) -> Any:
     snapshot = status.snapshot
     # Direction from which the wind blows.
-    source = math.degrees(math.atan2(-snapshot.wind_east, -snapshot.wind_north))
-    return mavlink.MAVLink_wind_message(source, math.hypot(snapshot.wind_east, snapshot.wind_north), 0.0)
+    from_direction = math.degrees(math.atan2(-snapshot.wind_east, -snapshot.wind_north))
+    return mavlink.MAVLink_wind_message(from_direction, math.hypot(snapshot.wind_east, snapshot.wind_north), 0.0)
 
 
 def _wind_cov_message(status: Status) -> Any:
@@ -445,8 +445,8 @@ def _wind_cov_message(status: Status) -> Any:
 
 
 def _extended_state_message(status: Status) -> Any:
-    landed = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
-    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
+    landed_state = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed_state)
 
 
 def _home_message(status: Status) -> Any:
@@ -484,7 +484,7 @@ def _to_degrees(angle: float) -> float:
     return math.degrees(angle) % 360.0
 
 
-_MAKERS = {
+_MESSAGE_MAKERS = {
     "HEARTBEAT": heartbeat,
     "ATTITUDE": _attitude_message,
     "GLOBAL_POSITION_INT": _position_message,

@@ -97,16 +97,16 @@ class Downlink:
         for peer in self._link.peers.values():
             self._link.send(message, peer)
 
-    def heartbeat_now(self) -> None:
-        """Send the next heartbeat immediately, because its contents have changed."""
+    def request_heartbeat(self) -> None:
+        """Make the next heartbeat due now, because its contents have changed."""
         self._next_heartbeat = self._link.clock()
 
-    def wait(self, now: float, patience: float) -> float:
-        """Return the time until the next message is due, s, at most ``patience``."""
+    def wait_time(self, now: float, max_wait: float) -> float:
+        """Return the time until the next message is due, s, at most ``max_wait``."""
         due_time = min(
-            (time for peer in self._link.peers.values() for time in peer.due.values()), default=now + patience
+            (time for peer in self._link.peers.values() for time in peer.due.values()), default=now + max_wait
         )
-        return max(0.0, min(patience, due_time - now, self._next_heartbeat - now))
+        return max(0.0, min(max_wait, due_time - now, self._next_heartbeat - now))
 
     def tick(self, now: float) -> None:
         """Send all messages that are due."""
@@ -134,14 +134,14 @@ class Downlink:
             peer.due[name] = due_time + period if now - due_time < _MAX_DELAY_S else now + period
 
     def _stream_parameters(self, peer: Peer) -> None:
-        if peer.parameter is None:
+        if peer.next_parameter is None:
             return
-        first_number, entries = int(peer.parameter), self._parameters.entries
-        peer.parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
-        for number in range(first_number, min(int(peer.parameter), len(entries))):
+        first_number, entries = int(peer.next_parameter), self._parameters.entries
+        peer.next_parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
+        for number in range(first_number, min(int(peer.next_parameter), len(entries))):
             self._link.send(self._parameters.message(number), peer)
-        if peer.parameter >= len(entries):
-            peer.parameter = None
+        if peer.next_parameter >= len(entries):
+            peer.next_parameter = None
 
 
 # ----------------------------------------------------------------------
@@ -229,7 +229,7 @@ class MissionProgress:
 # Maximum wait for the network or the flight, s.
 _MAX_WAIT_S = 0.02
 # Time for the flight process to close its log when the vehicle is shut down, s.
-CLOSING = 0.8
+CLOSE_TIMEOUT_S = 0.8
 # Number of crashes in a row after which the vehicle gives up.
 _MAX_CRASHES = 3
 # Time within which the same text is sent only once, s.
@@ -285,8 +285,8 @@ class Vehicle:
         self._awaits_verdict = self._is_brief = False
         # Upload for which the start item of the next flight was chosen.
         self._start_item_upload: tuple[MissionItem, ...] = ()
-        # Parameters of the law with which the mission is judged and flown.
-        self._law_parameters: tuple[tuple[str, float], ...] = ()
+        # Parameters of the autopilot with which the mission is judged and flown.
+        self._autopilot_parameters: tuple[tuple[str, float], ...] = ()
         self._last_text, self._last_text_time = "", 0.0
         self._progress = MissionProgress(self.server, self.arming, self.status, self.downlink)
 
@@ -308,7 +308,7 @@ class Vehicle:
 
     def close(self) -> None:
         """End the flight and its process, and show the process's last texts at the terminal."""
-        deadline = self._clock() + CLOSING
+        deadline = self._clock() + CLOSE_TIMEOUT_S
         with contextlib.suppress(OSError, EOFError):
             if self._ready:
                 self._flight.send(EndFlight(quit=True))
@@ -318,25 +318,25 @@ class Vehicle:
                     self._send_texts(event.texts)
         self._flight.close()
 
-    def step(self, patience: float) -> None:
-        """Wait for an event, at most ``patience`` s, and handle it."""
-        watched: list[Any] = [self.link, self._flight]
-        readable: list[Any] = wait(watched, self.downlink.wait(self._clock(), patience))
+    def step(self, max_wait: float) -> None:
+        """Wait for events, at most ``max_wait`` s, and handle them."""
+        sources: list[Any] = [self.link, self._flight]
+        ready_sources: list[Any] = wait(sources, self.downlink.wait_time(self._clock(), max_wait))
         now = self._clock()
         self.status.boot, self.status.wall = now - self._start_time, time.time()
-        if self._flight in readable:
+        if self._flight in ready_sources:
             self._receive_events()
-        if self.link in readable:
+        if self.link in ready_sources:
             for message, peer in self.link.receive():
                 self._handle_message(message, peer, now)
-            for notice in self.link.take_notices():
+            for notice in self.link.pop_notices():
                 self._show(notice)
         for reply in self.server.tick(now):
             self._send_reply(reply.station, reply.message, reply.text)
         self._judge_changes()
         self.downlink.tick(now)
         busy_time = self._clock() - now
-        self.status.load += 0.01 * (busy_time / max(busy_time, patience) - self.status.load)
+        self.status.load += 0.01 * (busy_time / max(busy_time, max_wait) - self.status.load)
 
     def _handle_message(self, message: Any, peer: Peer, now: float) -> None:
         self.server.locked = "in flight: the mission cannot change" if self.arming.flying else ""
@@ -345,7 +345,10 @@ class Vehicle:
             self._send_reply(reply.station, reply.message, reply.text)
         self._judge_changes()
         self._send_responses(self.requests.handle(message, peer, now))
-        if self._law_parameters != tuple(self._parameters.stated.items()) and self.server.lists[MissionType.MISSION]:
+        if (
+            self._autopilot_parameters != tuple(self._parameters.stated.items())
+            and self.server.lists[MissionType.MISSION]
+        ):
             self.server.changed.add(MissionType.MISSION)
             self._judge_changes()
         self._apply_state()
@@ -411,8 +414,8 @@ class Vehicle:
         self._is_brief = MissionType.MISSION not in changed_lists and (self._is_brief or not self.arming.is_judging)
         self.arming.on_mission_uploaded()
         self._awaits_verdict = True
-        self._law_parameters = tuple(self._parameters.stated.items())
-        self._send_request(JudgeMission(mission, self._mission_number, self._law_parameters))
+        self._autopilot_parameters = tuple(self._parameters.stated.items())
+        self._send_request(JudgeMission(mission, self._mission_number, self._autopilot_parameters))
         self._refresh_status()
 
     def _divert(self, center: LoiterCenter) -> None:
@@ -489,7 +492,7 @@ class Vehicle:
 
     def _handle_event(self, event: Snapshot | Event) -> None:
         if isinstance(event, Snapshot):
-            if event.finite:
+            if event.is_finite:
                 self.status.snapshot = event
                 self._progress.report_leg(int(event.leg))
         elif isinstance(event, MissionJudged):
@@ -513,8 +516,8 @@ class Vehicle:
             # The verdict is about a mission that was replaced.
             self._judge_changes()
             return
-        previous = self.arming.last_verdict
-        if not self._is_brief or previous is None or previous.texts != verdict.texts:
+        previous_verdict = self.arming.last_verdict
+        if not self._is_brief or previous_verdict is None or previous_verdict.texts != verdict.texts:
             self._send_texts(verdict.texts)
         disarm_reason = self.arming.on_mission_judged(verdict)
         if disarm_reason:
@@ -542,7 +545,7 @@ class Vehicle:
         arming, status = self.arming, self.status
         if (status.mode, status.armed, status.flying) != (arming.mode, arming.armed, arming.flying):
             # Send a change immediately.
-            self.downlink.heartbeat_now()
+            self.downlink.request_heartbeat()
         status.mode, status.armed, status.flying = arming.mode, arming.armed, arming.flying
         status.ready, status.mission_state = arming.can_arm or arming.armed, arming.mission_state
         self._progress.refresh()

@@ -23,7 +23,7 @@ from flight.guidance.path import fly_by_path, waypoint_records
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.start import Start, find_start, start_trimmed
-from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, longest_circling
+from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace, rtl_loiter_timeout
 from flight.simulation.track import Rows, join_rows, quantise
 from flight.simulation.turbulence import start_gusts
 from world.arrays import Floats
@@ -39,7 +39,7 @@ TIME_LIMIT_BASE_S = 60.0
 
 
 class Airborne(ABC):
-    """One flight in progress, advanced by `block`.
+    """One flight in progress, advanced by `fly_block`.
 
     dt: duration of a tick, s.
     setup: setup of the flight, with the program that flies once that is known.
@@ -48,7 +48,7 @@ class Airborne(ABC):
     memory: memory of the guidance, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the simulated aircraft.
     max_ticks: time limit, ticks.
-    engine: flight model that flies, and the reason, as in "JSBSim, as chosen".
+    engine: flight model in use, and the reason for it, as in "JSBSim, as chosen".
     """
 
     engine: str = "JSBSim, for a flight by a program"
@@ -74,7 +74,7 @@ class Airborne(ABC):
         self._steps = setup.fdm_hz // setup.guidance_hz
         self.dt = self._steps / setup.fdm_hz
         self._gains = gains
-        self._lay_out(setup, aircraft, local_map or LocalMap.around(setup))
+        self._prepare_route(setup, aircraft, local_map or LocalMap.around(setup))
         self._new_fdm = partial(
             Fdm,
             aircraft,
@@ -85,8 +85,8 @@ class Airborne(ABC):
         )
         self.fdm = self._new_fdm()
 
-    def _lay_out(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
-        """Make the workspace for a route, and set the time limit of the flight."""
+    def _prepare_route(self, setup: FlightSetup, aircraft: Aircraft, local_map: LocalMap) -> None:
+        """Create the workspace for a route, and set the flight's time limit."""
         self.setup, self.map = setup, local_map
         # An autopilot with its own turns does not follow the arcs after fly-over waypoints.
         follows_arcs = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
@@ -118,9 +118,9 @@ class Airborne(ABC):
         if setup.route.return_to is not None:
             # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
             radius_factor = true_by_equivalent(setup.route.return_to.up) ** 2
-            time_limit += longest_circling(radius_factor * setup.route.return_to.radius)
+            time_limit += rtl_loiter_timeout(radius_factor * setup.route.return_to.radius)
         if waypoints["is_mission_end"][-1]:
-            time_limit += longest_circling(setup.autopilot.loiter_rules.radius)
+            time_limit += rtl_loiter_timeout(setup.autopilot.loiter_rules.radius)
         self.max_ticks = int(time_limit / self.dt)
 
     def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
@@ -135,22 +135,29 @@ class Airborne(ABC):
 
     @abstractmethod
     def _fly_ticks(self, count: int) -> int:
-        """Fly up to a number of ticks into the workspace's rows; return the last tick's status, 0 to fly on."""
+        """Fly up to ``count`` ticks, fill the workspace's rows, and return the last status, 0 if the flight goes on."""
 
     def _start_disturbances(self, setup: FlightSetup) -> None:
         """Set the wind, and start turbulence and navigation error."""
-        wind, work = setup.scenario.wind, self._work
+        wind, record = setup.scenario.wind, self._work
         wind_course = wind.to_course
         w20 = W20[wind.turbulence]
-        work.wind = (wind.speed, math.cos(wind_course), math.sin(wind_course), wind.gradient, wind.reference_amsl, w20)
+        record.wind = (
+            wind.speed,
+            math.cos(wind_course),
+            math.sin(wind_course),
+            wind.gradient,
+            wind.reference_amsl,
+            w20,
+        )
         self._windy = bool(wind.speed or wind.gradient or w20)
         self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
-        start_gusts(self._random.standard_normal(5), work.gusts)
+        start_gusts(self._random.standard_normal(5), record.gusts)
         sigma, time_constant = ERRORS[setup.nav]
-        work.settings.navigation_sigma, work.settings.navigation_time = sigma, time_constant
+        record.settings.navigation_sigma, record.settings.navigation_time = sigma, time_constant
         self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
         if self._navigation_random is not None:
-            start_navigation(self._navigation_random.standard_normal(6), work.navigation)
+            start_navigation(self._navigation_random.standard_normal(6), record.navigation)
 
     def _find_start(self, setup: FlightSetup) -> Start:
         """Return the start of the route. Raises StartError if the start is not above the terrain."""
@@ -164,7 +171,7 @@ class Airborne(ABC):
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         return trimmed
 
-    def block(self, count: int) -> tuple[Rows, str]:
+    def fly_block(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks, and return their rows and the reason for the flight's end, "" if it continues."""
         row_blocks: list[Rows] = []
         end_reason = ""
@@ -175,7 +182,7 @@ class Airborne(ABC):
         return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
 
     def _fill_workspace(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `block`."""
+        """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `fly_block`."""
         workspace = self._workspace
         workspace.turbulence[:count] = self._random.standard_normal((count, 3))
         if self._navigation_random is not None:
@@ -200,7 +207,7 @@ class Airborne(ABC):
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
-    """Return the extra length of loiters that are too tight for the bank limit, beyond their length in the path, m.
+    """Return the length that loiters too tight for the bank limit add to the path, m.
 
     An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires,
     and once more until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing, because
@@ -215,7 +222,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
     # Process waypoints of one loiter that agree in these fields only once.
     first_indices = np.unique(circles[["item", "loiter_radius", "airspeed", "up"]], return_index=True)[1]
     for waypoint in circles[first_indices]:
-        path_radius, speed, altitude = (
+        stated_radius, speed, altitude = (
             abs(float(waypoint["loiter_radius"])),
             float(waypoint["airspeed"]),
             float(waypoint["up"]),
@@ -225,9 +232,9 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
         )
         # Autopilots hold an equivalent airspeed: the true airspeed is higher in thinner air.
         flown_radius *= true_by_equivalent(altitude) ** 2
-        if path_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
+        if stated_radius < flown_radius < math.inf and not waypoint["is_rtl"]:
             extra_length = (
-                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - path_radius) + flown_radius)
+                2.0 * math.pi * (float(waypoint["loiter_turns"]) * (flown_radius - stated_radius) + flown_radius)
             )
             extra_lengths[int(waypoint["item"])] = max(extra_length, extra_lengths.get(int(waypoint["item"]), 0.0))
     return sum(extra_lengths.values())

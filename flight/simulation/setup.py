@@ -193,7 +193,7 @@ class ImportedLog:
 
 # JSBSim steps per second, except in campaigns.
 FDM_HZ: Literal[120] = 120
-# Flight model that flies: "auto" is the compiled model if it equals JSBSim, "jsbsim" is JSBSim.
+# Flight model to use: "auto" is the compiled model if it equals JSBSim, "jsbsim" is JSBSim.
 EngineChoice = Literal["auto", "jsbsim"]
 
 
@@ -213,7 +213,7 @@ class FlightSetup:
     nav: accuracy of the navigation, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: guidance ticks per second, and track rows per second.
     fdm_hz: steps of JSBSim per second.
-    engine: flight model that flies; both give the same flight.
+    engine: flight model to use; both give the same flight.
     source: the imported log that the flight comes from; None for a flight by planfly.
     path: reference path from route and limits.
     """
@@ -302,10 +302,10 @@ class FlightSetup:
     @property
     def started(self) -> str:
         """Description of the flight's start, with the reasons why the scenario's launch or landing is not flown."""
-        ground_phases, started = self.ground_phases, self.route.started
+        ground_phases, description = self.ground_phases, self.route.started
         if ground_phases.take_off is not None:
-            started = ground_phases.take_off.description()
-        return "; ".join([*([started] if started else []), *ground_phases.notes])
+            description = ground_phases.take_off.description()
+        return "; ".join([*([description] if description else []), *ground_phases.notes])
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -318,7 +318,7 @@ class FlightSetup:
         object.__setattr__(setup, "scenario", scenario)
         return setup
 
-    def turned_to_other_side(self) -> "FlightSetup":
+    def with_long_reversals(self) -> "FlightSetup":
         """Return a copy of the setup with the longer turn at each course reversal."""
         setup = copy.copy(self)
         path = fly_by_path(self.route, self.limits, self.scenario.terrain, swing="long")

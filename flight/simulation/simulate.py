@@ -14,7 +14,7 @@ from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
 from flight.dynamics.jsbsim_properties import Getter, Setter
 from flight.dynamics.model_program import UnsupportedModel
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import FlyByPath
 from flight.mission.ground_ways import GroundPhases
@@ -130,9 +130,9 @@ def make_loop(
     return fly
 
 
-# Tick of the usual guidance, s; `Flight.dt` is the tick of one flight.
+# Default guidance tick, s; `Flight.dt` is the tick of one flight.
 TICK = 1.0 / 60.0
-# Duration of the rows of a block from `simulate`, s.
+# Duration of one block of rows from `simulate`, s.
 BLOCK = 1.0
 # Bank that guidance may add to the bank of planned turns in order to correct an error, rad.
 BANK_RESERVE = math.radians(3.0)
@@ -158,12 +158,12 @@ class FlightBlock(NamedTuple):
     """Some rows of a flight, as `simulate` yields them.
 
     rows: `flight.simulation.track.TRACK_ROW` records, (t,).
-    ended: "completed", or the reason why the flight ended with these rows; "" while it continues.
+    end_reason: "completed", or the reason why the flight ended with these rows; "" while it continues.
     distance: distance along the path so far, m.
     """
 
     rows: Rows
-    ended: str
+    end_reason: str
     distance: float
 
 
@@ -175,18 +175,18 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
     >>> from flight.simulation.track import TRACK_ROW
     >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
     >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
-    >>> flight = SimpleNamespace(dt=1 / 60, memory=at, path=path, block=lambda count: next(blocks))
-    >>> [(len(block.rows), block.ended) for block in simulate(flight)]
+    >>> flight = SimpleNamespace(dt=1 / 60, memory=at, path=path, fly_block=lambda count: next(blocks))
+    >>> [(len(block.rows), block.end_reason) for block in simulate(flight)]
     [(60, ''), (12, 'ground contact')]
     """
     end_reason = ""
     while not end_reason:
-        rows, end_reason = flight.block(round(BLOCK / flight.dt))
+        rows, end_reason = flight.fly_block(round(BLOCK / flight.dt))
         yield FlightBlock(rows, end_reason, min(float(flight.memory.distance), flight.path.length))
 
 
 def fly_to_end(flight: Airborne) -> SimulatedFlight:
-    """Fly until the flight ends.  The same setup gives the same track, bit for bit.
+    """Fly until the flight ends. The same setup gives the same track, bit for bit.
 
     Raises FlightError if a program does not fly to the end.
 
@@ -207,7 +207,7 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
     ('completed', 12, True)
     """
     blocks = list(simulate(flight))
-    return SimulatedFlight(join_blocks(blocks), blocks[-1].ended, flight.path)
+    return SimulatedFlight(join_blocks(blocks), blocks[-1].end_reason, flight.path)
 
 
 def join_blocks(blocks: Sequence[FlightBlock]) -> Track:
@@ -263,7 +263,7 @@ class Flight(Airborne):
         if self._ground_phases:
             gear = default_gear(self._ground_phases)
             contacts = contacts_of(aircraft, gear)
-            self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts)
+            self._ground_autopilot = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts)
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ground_phases:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
@@ -286,17 +286,17 @@ class Flight(Airborne):
         setup: setup with the same aircraft, autopilot, wind and rates.
         local_map: local map of that setup.
         """
-        previous, previous_memory = self._work, self._workspace.own
+        old_record, old_memory = self._work, self._workspace.own
         # The aircraft is in the air, even if the new mission starts with a take-off.
         self._ground_phases = GroundPhases()
-        self._lay_out(setup, self.fdm.aircraft, local_map)
+        self._prepare_route(setup, self.fdm.aircraft, local_map)
         for name in _DIVERSION_RECORDS:
-            setattr(self._work, name, getattr(previous, name))
+            setattr(self._work, name, getattr(old_record, name))
         for name in _PATH_MEMORY_FIELDS:
             setattr(self.memory, name, 0)
         autopilot = setup.autopilot.law
         autopilot.initialise_records(self.memory, self._workspace.own)
-        autopilot.transfer_state(previous_memory, self._workspace.own, setup.route.waypoints[0])
+        autopilot.transfer_state(old_memory, self._workspace.own, setup.route.waypoints[0])
         self._loop = self._make_loop(autopilot)
 
     def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
@@ -308,7 +308,7 @@ class Flight(Airborne):
         if setup.autopilot.equivalent_airspeeds:
             true_airspeed = start.airspeed * setup.autopilot.airspeed_factor(start.amsl)
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true_airspeed))
-        level = straight(model, reference_airspeed, start.amsl)
+        level = steady_flight(model, reference_airspeed, start.amsl)
         if level is None:
             reason = f"no level flight at {reference_airspeed:.1f} m/s and {start.amsl:.0f} m AMSL"
             raise StartError(setup.aircraft, reason, field="airspeed", value=reference_airspeed)
@@ -316,7 +316,7 @@ class Flight(Airborne):
         self._start_fdm()
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha
-        memory.trim_throttle = (straight(model, start.airspeed, start.amsl) or level).throttle
+        memory.trim_throttle = (steady_flight(model, start.airspeed, start.amsl) or level).throttle
         memory.last_airspeed = -1.0
         memory.stall_speed = self.fdm.aircraft.stall_speed
 
@@ -325,12 +325,12 @@ class Flight(Airborne):
         self._start_trimmed(setup.mission.source, start)
         if self._ground_phases.take_off is not None:
             release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ground_phases.take_off)
-            commands = (elevator, 0.0, 0.0, self._from_ground.released_throttle)
+            commands = (elevator, 0.0, 0.0, self._ground_autopilot.released_throttle)
             self._work.commands = release(self.fdm, release_state, commands)
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
 
     def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
-        return self._from_ground if self._ground_phases else setup.autopilot
+        return self._ground_autopilot if self._ground_phases else setup.autopilot
 
     def _fly_ticks(self, count: int) -> int:
         return self._loop(count)
@@ -356,21 +356,21 @@ class Flight(Airborne):
         return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} in {PROOF_STEPS} steps"
 
     def _make_loop(self, autopilot: Autopilot) -> Callable[[int], int]:
-        """Return a function that flies a number of ticks, fills the workspace's rows, and returns the last status."""
-        work, space, access = self._work, self._workspace, self.fdm.loop_access()
-        work.state_factors = access.factors[0]
-        work.scale_above, work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
+        """Return a function that flies ``count`` ticks, fills the workspace's rows, and returns the last status."""
+        record, workspace, access = self._work, self._workspace, self.fdm.loop_access()
+        record.state_factors = access.factors[0]
+        record.scale_above, record.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
         if self._compiled is not None and autopilot.loop is not None:
             model = self._compiled
-            return partial(autopilot.loop, space.block, self._ground.heights, *model.arrays)
-        # Do not set gusts in still air, or unknown ground.
+            return partial(autopilot.loop, workspace.block, self._ground.heights, *model.arrays)
+        # Do not set gusts in still air, nor the altitude of unknown ground.
         is_used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
         setters = [setter if use else _discard for setter, use in zip(access.setters, is_used, strict=True)]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
-            partial(autopilot.tick, space.block, self._ground.heights),
-            space,
+            partial(autopilot.tick, workspace.block, self._ground.heights),
+            workspace,
             access.run,
             self._steps,
         )

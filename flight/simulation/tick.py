@@ -214,7 +214,7 @@ LOITER_TIMEOUT_FACTOR = 5.0
 _CIRCLING_SPEED_MPS = 10.0
 # A mission that ends in a loiter about its last waypoint ends when the course has turned by this angle, rad: a quarter
 # turn onto the loiter, and one full circle.
-AROUND_END = 2.5 * math.pi
+END_LOITER_ANGLE_RAD = 2.5 * math.pi
 # Texts for the ends of a flight.
 ENDS = {
     COMPLETED: "completed",
@@ -227,27 +227,27 @@ ENDS = {
     NO_MOTOR: "not launched: the motor never started",
     END_TIPPED_OVER: "ground contact: not on its belly or wheels",
 }
-# Names of the state's fields.
+# Names of the fields of `STATE`.
 _STATE_FIELDS = field_names(STATE)
-# Names of the output's fields.
+# Names of the fields of `OUTPUT`.
 _OUTPUT_FIELDS = field_names(OUTPUT)
 
 
 @inner
-def begin_tick(work: Record, heights: Heights) -> bool:
+def begin_tick(workspace: Record, heights: Heights) -> bool:
     """Convert the state from JSBSim's units, and estimate the motion; return False if a value is not finite.
 
-    work: a record of `WORKSPACE`.
+    workspace: a record of `WORKSPACE`.
     heights: altitudes of the terrain.
     """
-    settings, timing = work.settings, work.timing
-    if not _read_sensors(work, heights):
+    settings, timing = workspace.settings, workspace.timing
+    if not _read_sensors(workspace, heights):
         return False
     navigate(
-        work.true,
-        work.estimated,
-        work.navigation,
-        work.noise[timing.row].navigation,
+        workspace.true,
+        workspace.estimated,
+        workspace.navigation,
+        workspace.noise[timing.row].navigation,
         settings.navigation_sigma,
         settings.navigation_time,
         timing.dt,
@@ -256,28 +256,34 @@ def begin_tick(work: Record, heights: Heights) -> bool:
 
 
 @inner
-def _read_sensors(work: Record, heights: Heights) -> bool:
+def _read_sensors(workspace: Record, heights: Heights) -> bool:
     """Convert the state to SI and to the map, and look up the ground; return False if a value is not finite.
 
-    Fill the state, the true motion and the place of a record of `flight.simulation.tick.WORKSPACE`.
+    Sets ``state``, ``true`` and ``place`` of a record of `flight.simulation.tick.WORKSPACE`.
     """
-    state, true, air, settings, place = work.state, work.true, work.air, work.settings, work.place
-    if not _to_si(state, work.state_factors):
+    state, true, air, settings, place = (
+        workspace.state,
+        workspace.true,
+        workspace.air,
+        workspace.settings,
+        workspace.place,
+    )
+    if not _to_si(state, workspace.state_factors):
         return False
     state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
     state.wind_down = air.gust_down
     # Relative to the local map's center, so that a flight may cross the 180th meridian.
     state.longitude = settings.center_longitude + wrap(state.longitude - settings.center_longitude)
     # Map course of true north.
-    north_course, _ = polymap(work.north_map, state.latitude, state.longitude)
+    north_course, _ = polymap(workspace.north_map, state.latitude, state.longitude)
     cos, sin = math.cos(north_course), math.sin(north_course)
     state.yaw = wrap(state.yaw + north_course)
-    true.east, true.north = polymap(work.position_map, state.latitude, state.longitude)
+    true.east, true.north = polymap(workspace.position_map, state.latitude, state.longitude)
     true.up = state.amsl
     true.velocity_east = state.velocity_east * cos + state.velocity_north * sin
     true.velocity_north = state.velocity_north * cos - state.velocity_east * sin
     true.velocity_up = -state.velocity_down
-    column, row = polymap(work.pixel_map, true.east, true.north)
+    column, row = polymap(workspace.pixel_map, true.east, true.north)
     place.north_cos, place.north_sin = cos, sin
     place.ground = pixel_height(heights, column, row)
     place.clearance = true.up - place.ground
@@ -285,39 +291,45 @@ def _read_sensors(work: Record, heights: Heights) -> bool:
 
 
 @inner
-def end_tick(work: Record) -> int:
+def end_tick(workspace: Record) -> int:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
-    Return a key of `ENDS`, or 0 to fly on.
+    Return a key of `ENDS`, or 0 if the flight continues.
     """
-    fill_tick(work)
-    return status_in_air(work)
+    fill_tick(workspace)
+    return status_in_air(workspace)
 
 
 @inner
-def status_in_air(work: Record) -> int:
-    """Return a key of `ENDS` if a flight in the air has ended, or 0 to fly on."""
-    settings, air = work.settings, work.air
+def status_in_air(workspace: Record) -> int:
+    """Return a key of `ENDS` if a flight in the air has ended, otherwise 0."""
+    settings, air = workspace.settings, workspace.air
     return _air_status(
-        work.state, work.memory, work.place.clearance, settings.min_airspeed, air.energy >= settings.battery
+        workspace.state,
+        workspace.memory,
+        workspace.place.clearance,
+        settings.min_airspeed,
+        air.energy >= settings.battery,
     )
 
 
 @inner
-def fill_tick(work: Record) -> None:
+def fill_tick(workspace: Record) -> None:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units."""
-    state, true, air, timing, place = work.state, work.true, work.air, work.timing, work.place
+    state, true, air, timing, place = workspace.state, workspace.true, workspace.air, workspace.timing, workspace.place
     cos, sin = place.north_cos, place.north_sin
-    row = work.rows[timing.row]
-    turbulence = work.noise[timing.row].turbulence
-    _update_wind(state, work.wind, work.gusts, turbulence, place.clearance, true.up, cos, sin, air, timing.dt)
+    row = workspace.rows[timing.row]
+    turbulence = workspace.noise[timing.row].turbulence
+    _update_wind(state, workspace.wind, workspace.gusts, turbulence, place.clearance, true.up, cos, sin, air, timing.dt)
     air.ground = place.ground if not math.isnan(place.ground) else air.ground
     air.energy += state.power * timing.dt / 3600.0
-    _fill_row(row, state, true, work.commands, work.memory, timing.tick * timing.dt, air.energy, place.clearance)
+    _fill_row(
+        row, state, true, workspace.commands, workspace.memory, timing.tick * timing.dt, air.energy, place.clearance
+    )
     _fill_wind(row, state, cos, sin)
     timing.tick += 1
     timing.row += 1
-    _set_output(work.output, work.commands, air, work.scale_above, work.scale_below)
+    _set_output(workspace.output, workspace.commands, air, workspace.scale_above, workspace.scale_below)
 
 
 @inner
@@ -326,7 +338,7 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
 
     This is for an autopilot that flies an RTL by its own control law or its own program, which follows no line: there
     is no cross-track error. The flight ends once the aircraft has arrived at the loiter and flown a full circle at its
-    altitude, and after `longest_circling` at the latest.
+    altitude, and after `rtl_loiter_timeout` at the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -344,14 +356,14 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
     if memory.loiter_time > 0.0 or (is_near and abs(motion.up - waypoint.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
         memory.loiter_time += dt
     is_full_circle = abs(memory.loiter_angle) >= 2.0 * math.pi
-    memory.is_finished = (is_full_circle and memory.loiter_time > UNLIMITED) or memory.loiter_time > longest_circling(
+    memory.is_finished = (is_full_circle and memory.loiter_time > UNLIMITED) or memory.loiter_time > rtl_loiter_timeout(
         radius
     )
 
 
 @inner
 def end_around(motion: Record, memory: Record, dt: float) -> None:
-    """Track the course change since the last waypoint was reached, and end the flight at `AROUND_END`.
+    """Track the course change since the last waypoint was reached, and end the flight at `END_LOITER_ANGLE_RAD`.
 
     The course is used instead of the bearing from the waypoint: if the loiter is too tight for the aircraft, it flies
     loops next to the waypoint, and the bearing may take one loop or three to go around.
@@ -366,11 +378,11 @@ def end_around(motion: Record, memory: Record, dt: float) -> None:
         memory.loiter_angle += wrap(course - memory.bearing)
     memory.loiter_time += dt
     memory.bearing = course
-    memory.is_finished = abs(memory.loiter_angle) >= AROUND_END
+    memory.is_finished = abs(memory.loiter_angle) >= END_LOITER_ANGLE_RAD
 
 
 @compiled
-def longest_circling(radius: float) -> float:
+def rtl_loiter_timeout(radius: float) -> float:
     """Return the timeout of an RTL in its loiter, s.
 
     radius: m.
@@ -409,7 +421,7 @@ def _air_status(
 
 @inner
 def _set_output(output: Record, commands: Record, air: Record, scale_above: Record, scale_below: Record) -> None:
-    """Set the outputs in JSBSim's units."""
+    """Set the outputs from commands, wind and ground altitude, in JSBSim's units."""
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
     # Mean wind is set as part of the gust: three properties a tick instead of six.

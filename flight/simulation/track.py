@@ -38,12 +38,12 @@ RUDDER = 2
 # Column of `Track.controls` and `Track.commands`: throttle, 0..1.
 THROTTLE = 3
 
-# Upper bound of a row's time, s, the longest that a log can hold; times start at 0.
+# Upper bound of a row's time, s: the longest flight that a log can store; times start at 0.
 LATEST = 1e7
 
-# Binary digits after the point that a flown row keeps in each column: finer than any instrument, and a third less log
-# than with the full float32. Positions are the finest: courses and slopes are taken between rows 0.4 m apart, and 0.06
-# mm turns those by 0.01 degrees. Time and leg are not rounded.
+# Binary digits after the point that are kept in each column of a row. They are finer than any instrument, and make a
+# log a third smaller than full float32 values. Positions are the finest: courses and slopes are computed from rows
+# 0.4 m apart, and an error of 0.06 mm turns them by 0.01 degrees. Time and leg are not rounded.
 DIGITS = {
     "position": 14,  # 0.06 mm
     "velocity": 10,  # 1 mm/s
@@ -148,7 +148,7 @@ class Track:
 # Types of the fields of `Track`, in order.
 _FIELD_TYPES = [np.float64, np.float64, *([np.float32] * 11), np.int32, *([np.float32] * 4)]
 
-# A row as it is flown: the fields of `Track`, all of them float64.
+# A row during the flight: the fields of `Track`, all of them float64.
 TRACK_ROW = record_dtype(
     "time",
     ("position", np.float64, (3,)),
@@ -186,7 +186,7 @@ def join_tracks(parts: list[Track]) -> Track:
     return Track(*(np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS))
 
 
-# No rows, to join none.
+# Empty array of rows, the result of joining no parts.
 _NO_ROWS = np.zeros(0, TRACK_ROW)
 # Reciprocal resolution of each column but the time.
 _STEPS_PER_UNIT = np.exp2(
@@ -400,14 +400,14 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
     return list(zip(("elevator", "aileron", "rudder", "throttle"), (*limits, 1.0), strict=True))
 
 
-def held_at_limit(track: Track, control: int, min_command: float, max_command: float) -> NDArray[np.bool_]:
+def saturated_rows(track: Track, control: int, min_command: float, max_command: float) -> NDArray[np.bool_]:
     """Flag the rows at which the command of a control (a column of `Track.commands`) is saturated, (t,).
 
     min_command, max_command: limits of the control; no row is saturated if they are NaN.
 
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["commands"][:, THROTTLE] = 0.5, 1.0, 0.9
-    >>> held_at_limit(as_track(rows), THROTTLE, 0.0, 1.0)
+    >>> saturated_rows(as_track(rows), THROTTLE, 0.0, 1.0)
     array([False,  True, False])
     """
     command = track.commands[:, control].astype(np.float64)

@@ -1,7 +1,7 @@
 """Compute Dryden turbulence by height above ground (MIL-F-8785C, low-altitude model).
 
 JSBSim's own model uses the height above sea level, and leaves a pure east wind unrotated. Above 300 m (1,000 ft) the
-low-altitude scales are kept, which are isotropic there. Rotational gusts are left out, because an 11 kg aircraft is
+low-altitude scales are used, which are isotropic there. Rotational gusts are omitted, because an 11 kg aircraft is
 small relative to the scales.
 """
 

@@ -33,9 +33,9 @@ _SCENARIO = {
 
 
 def example_log() -> FlightLog:
-    """Make a log of two legs over level ground in calm air, flown exactly along them at 25 m/s.
+    """Return a log of two legs over level ground in calm air, flown exactly along them at 25 m/s.
 
-    The log has 10 rows a second; the range of one missile covers part of the path.  The envelope is simplified, not
+    The log has 10 rows a second; the range of one missile covers part of the path. The envelope is simplified, not
     computed from a model.
 
     >>> log = example_log()
@@ -123,19 +123,19 @@ def _envelope() -> Envelope:
 
 def _track() -> Track:
     """Return a track along the waypoints at constant speed, heading along the leg, with wings level."""
-    steps = np.diff(_WAYPOINTS, axis=0)
-    lengths = np.sqrt((steps**2).sum(axis=1))
-    reached = np.concatenate([[0.0], np.cumsum(lengths)])
-    time = np.arange(int(reached[-1] / _AIRSPEED * _RATE_HZ) + 1) / _RATE_HZ
-    along = _AIRSPEED * time
-    leg = np.minimum(np.searchsorted(reached[1:], along, side="right"), len(steps) - 1)
-    velocity = (_AIRSPEED * steps / lengths[:, None])[leg]
+    leg_vectors = np.diff(_WAYPOINTS, axis=0)
+    lengths = np.sqrt((leg_vectors**2).sum(axis=1))
+    waypoint_distances = np.concatenate([[0.0], np.cumsum(lengths)])
+    time = np.arange(int(waypoint_distances[-1] / _AIRSPEED * _RATE_HZ) + 1) / _RATE_HZ
+    distance = _AIRSPEED * time
+    leg = np.minimum(np.searchsorted(waypoint_distances[1:], distance, side="right"), len(leg_vectors) - 1)
+    velocity = (_AIRSPEED * leg_vectors / lengths[:, None])[leg]
     values: dict[str, Floats] = {
         name: np.zeros((len(time), width)) if width > 1 else np.zeros(len(time)) for name, width in COLUMNS.items()
     }
     values |= {
         "time": time,
-        "position": np.column_stack([np.interp(along, reached, axis) for axis in _WAYPOINTS.T]),
+        "position": np.column_stack([np.interp(distance, waypoint_distances, axis) for axis in _WAYPOINTS.T]),
         "velocity": velocity,
         "attitude": np.column_stack([np.zeros(len(time)), np.zeros(len(time)), np.arctan2(*velocity[:, :2].T)]),
         "airspeed": np.full(len(time), _AIRSPEED),

@@ -42,7 +42,7 @@ MAP_FRAME = "map"
 AIRCRAFT_FRAME = "aircraft"
 # Foxglove log level by name.
 LOG_LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
-# Largest number of vertices along a side of the terrain mesh.
+# Maximum number of vertices along a side of the terrain mesh.
 MAX_VERTICES = 80
 
 
@@ -86,7 +86,7 @@ def timestamp(time_ns: int) -> Timestamp:
 def body_rotation(attitude: ArrayLike) -> Floats:
     """Return the quaternion (..., 4) x, y, z, w of the rotation from forward-left-up to east-north-up.
 
-    attitude: (..., 3) roll, pitch, yaw in rad, yaw clockwise from north.  After the change of axes from north-east-down
+    attitude: (..., 3) roll, pitch, yaw in rad, yaw clockwise from north. After the change of axes from north-east-down
     the angles are roll, -pitch and pi/2 - yaw about forward, left and up.
     """
     roll, pitch, yaw = np.moveaxis(np.asarray(attitude, dtype=np.float64), -1, 0)
@@ -285,12 +285,12 @@ def returns_scene(time_ns: int, drawn_returns: DrawnReturns, terrain: Terrain | 
     """
     entity = _entity(time_ns, "returns")
     for kind, segment in drawn_returns.segments_by_outcome:
-        points = np.array([ret.start for ret in segment]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
+        points = np.array([flown_return.start for flown_return in segment]) - np.array([0.0, 0.0, _PATH_OFFSET_M])
         _add_line(entity, f"return-{kind}", points, 6.0)
-    for number, worst in enumerate(drawn_returns.worst, 1):
-        _add_line(entity, "return-way", worst.path)
+    for number, worst_return in enumerate(drawn_returns.worst, 1):
+        _add_line(entity, "return-way", worst_return.path)
         entity.texts.append(
-            _make_label(worst.marked_position + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}")
+            _make_label(worst_return.marked_position + np.array([0.0, 0.0, _LABEL_HEIGHT_M]), f"return {number}")
         )
     footprint = drawn_returns.glides.footprint
     if footprint is not None and terrain is not None:

@@ -46,14 +46,14 @@ from world.threats import Threats
 
 # Time between messages, s.
 TRACK_INTERVAL_S = 2
-# Greatest number of points of one message.
+# Maximum number of points of one message.
 MAX_POINTS = 96
-# Number of points to which a message is thinned when it has reached the greatest number.
+# Number of points to which a message is thinned when it exceeds the maximum number.
 THINNED_POINT_COUNT = 64
 
 
-class TrackSoFar:
-    """Points of the track up to the present, the oldest first."""
+class GrowingTrack:
+    """Points of the track flown so far, oldest first."""
 
     def __init__(self) -> None:
         self._points = np.zeros((MAX_POINTS + 1, 3))
@@ -62,7 +62,7 @@ class TrackSoFar:
     def add(self, position: Floats) -> Floats:
         """Add a position (3,) `TRACK_INTERVAL_S` s after the last; return the track (n, 3), valid until the next call.
 
-        >>> track = TrackSoFar()
+        >>> track = GrowingTrack()
         >>> for k in range(500):
         ...     points = track.add(np.array([float(k), 0.0, 100.0]))
         >>> len(points) <= MAX_POINTS, points[0].tolist(), points[-1].tolist()
@@ -165,10 +165,10 @@ class FlightEvents:
 
 Colour = tuple[int, int, int, int]
 
-_POINT = np.dtype(
+_POINT_DTYPE = np.dtype(
     [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("alpha", "u1")]
 )
-_TYPES = {"f": PackedElementField.FLOAT32, "u": PackedElementField.UINT8}
+_ELEMENT_TYPES = {"f": PackedElementField.FLOAT32, "u": PackedElementField.UINT8}
 
 
 def _colour_bytes(role: str) -> Colour:
@@ -183,7 +183,7 @@ _KILL_COLOUR = _colour_bytes("missile")
 _DETECTION_COLOUR = _colour_bytes("radar")
 # Distance between points of a line, m.
 _POINT_SPACING_M = 30.0
-# Greatest number of points of a line.
+# Maximum number of points of a line.
 _MAX_SAMPLES = 4000
 # Points of a sphere.
 _SPHERE_POINTS = 150
@@ -192,11 +192,11 @@ _SIDE_INTERVALS = 7
 
 
 def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
-    """Make a PointCloud of points (n, 3) m in a frame, rounded to 1/16 m.
+    """Encode points (n, 3), m, in a frame as a PointCloud, rounded to 1/16 m.
 
     colours: (n, 4) red, green, blue, alpha, or one for all.
     """
-    packed = np.zeros(len(points), dtype=_POINT)
+    packed = np.zeros(len(points), dtype=_POINT_DTYPE)
     with np.errstate(over="ignore", invalid="ignore"):
         for column, name in enumerate("xyz"):
             packed[name] = np.round(points[:, column] * 16.0) / 16.0
@@ -207,11 +207,13 @@ def point_cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.ui
         timestamp=timestamp(time_ns),
         frame_id=frame,
         pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
-        point_stride=_POINT.itemsize,
+        point_stride=_POINT_DTYPE.itemsize,
         fields=[
-            PackedElementField(name=name, offset=_POINT.fields[name][1], type=_TYPES[_POINT.fields[name][0].kind])
-            for name in _POINT.names or ()
-            if _POINT.fields is not None
+            PackedElementField(
+                name=name, offset=_POINT_DTYPE.fields[name][1], type=_ELEMENT_TYPES[_POINT_DTYPE.fields[name][0].kind]
+            )
+            for name in _POINT_DTYPE.names or ()
+            if _POINT_DTYPE.fields is not None
         ],
         data=packed.tobytes(),
     )
@@ -290,15 +292,15 @@ _SLOT_NS = 200_000_000
 _XYZ = "xyz"
 _XYZW = "xyzw"
 _GEO = ("latitude", "longitude", "altitude")
-# Least time between messages with the points of the track, s.
+# Minimum time between messages with the points of the track, s.
 _MIN_CLOUD_INTERVAL_S = 10.0
-# Least ratio of successive times of these messages, which limits their number.
+# Minimum ratio of the times of successive such messages, which limits their number.
 _CLOUD_RATIO = 1.05
 # Constant parts of the messages after their timestamps, in protobuf's encoding.
 _TRANSFORM_NAMES = FrameTransform(
     parent_frame_id=scene.MAP_FRAME, child_frame_id=scene.AIRCRAFT_FRAME
 ).SerializeToString(deterministic=True)
-_TRANSFORM = np.dtype(
+_TRANSFORM_DTYPE = np.dtype(
     [
         ("names", np.uint8, (len(_TRANSFORM_NAMES),)),
         ("translation", submessage_dtype(_XYZ)),
@@ -306,19 +308,19 @@ _TRANSFORM = np.dtype(
     ]
 )
 _FIX_NAMES = LocationFix(frame_id=scene.AIRCRAFT_FRAME).SerializeToString(deterministic=True)
-_FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)])
+_FIX_DTYPE = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)])
 
 
 def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
     """Encode position and attitude of the aircraft: a FrameTransform for each of n rows.
 
-    position, attitude: (n, 3).  Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and
+    position, attitude: (n, 3). Values are rounded to 2^-10 m and 2^-20 of the quaternion, which is invisible and
     halves their size in the log; the state message is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):
         translation = np.round(position * 1024.0) / 1024.0
     rotation = np.round(scene.body_rotation(attitude) * 2.0**20) / 2.0**20
-    messages: Encoded = np.zeros(len(log_times), dtype=_TRANSFORM)
+    messages: Encoded = np.zeros(len(log_times), dtype=_TRANSFORM_DTYPE)
     messages["names"] = np.frombuffer(_TRANSFORM_NAMES, np.uint8)
     fill_submessages(messages["translation"], FrameTransform.TRANSLATION_FIELD_NUMBER, _XYZ, translation)
     fill_submessages(messages["rotation"], FrameTransform.ROTATION_FIELD_NUMBER, _XYZW, rotation)
@@ -332,22 +334,22 @@ def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Flo
     """
     east, north, up = position.T
     lat, lon = to_geo(origin, east, north)
-    messages: Encoded = np.zeros(len(log_times), dtype=_FIX)
+    messages: Encoded = np.zeros(len(log_times), dtype=_FIX_DTYPE)
     messages["names"] = np.frombuffer(_FIX_NAMES, np.uint8)
     fill_doubles(messages, _GEO, np.stack([lat, lon, up], axis=1))
     return stamped_records(log_times, channel, LocationFix.TIMESTAMP_FIELD_NUMBER, as_bytes(messages))
 
 
 class Poses:
-    """Selection of the rows for viewers, second by second, and their messages."""
+    """Converter of rows to the messages for viewers: transforms, fixes and the track."""
 
     def __init__(self, origin: GeoOrigin, channels: dict[str, int]) -> None:
         """Prepare for an origin.  channels: the number of each topic."""
         self._origin, self._channels = origin, channels
         self._slot = self._second = -1
         self._path: list[Floats] = []  # positions, one a second
-        self._tail = np.zeros((0, 3))  # the newest position
-        self._so_far = TrackSoFar()
+        self._newest_position = np.zeros((0, 3))  # (0 or 1, 3)
+        self._growing_track = GrowingTrack()
         self._next_cloud = 0.0  # s
 
     def pose_records(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
@@ -359,7 +361,7 @@ class Poses:
         slots = log_times[good_rows] // _SLOT_NS
         slot_rows = good_rows[_change_indices(slots, self._slot)]
         if good_rows.size:
-            self._tail = position[good_rows[-1:]]
+            self._newest_position = position[good_rows[-1:]]
         if not slot_rows.size:
             return
         self._slot = int(slots[-1])
@@ -376,7 +378,7 @@ class Poses:
         for k in np.flatnonzero((log_times[second_rows] - EPOCH_NS) // SECOND_NS % TRACK_INTERVAL_S == 0).tolist():
             log_time = int(log_times[second_rows[k]])
             with np.errstate(over="ignore", invalid="ignore"):
-                line = np.round(self._so_far.add(start_positions[k]) * 16.0) / 16.0
+                line = np.round(self._growing_track.add(start_positions[k]) * 16.0) / 16.0
             yield single_record(self._channels[TRACK_TOPIC], log_time, scene.track_scene(log_time, line))
             time = (log_time - EPOCH_NS) / SECOND_NS
             if time >= self._next_cloud:
@@ -385,7 +387,7 @@ class Poses:
 
     def whole_track_records(self, log_time: int) -> Iterator[MessageRecords]:
         """Yield the track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
-        parts = [*self._path, self._tail]
+        parts = [*self._path, self._newest_position]
         path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
         yield single_record(self._channels[TRACK_TOPIC], log_time, path)
         yield self._track_cloud_record(log_time, parts)

@@ -1,13 +1,13 @@
 """Read an MCAP container front to back without trusting it.
 
 mcap 1.6's `StreamReader` would save 150 lines, but it reports a damaged attachment only at the end of the file, its
-seeking reader not at all, and lz4 chunks decompress to any size.  Therefore this module reads the framing; the classes
-of mcap then parse records, from bytes that are already bounded and CRC-checked.  Reading stops at the first damage: the
+seeking reader not at all, and lz4 chunks decompress to any size. Therefore this module reads the framing; the classes
+of mcap then parse records, from bytes that are already bounded and CRC-checked. Reading stops at the first damage: the
 returned data are complete, in order and without a hole.
 
 Any container that the format allows is read: with chunks or without, compressed by zstd, lz4 or not, with or without
-an index, statistics, a summary and CRCs, with unknown kinds of records, and with surplus bytes in a record.  A
-CRC of 0 means that its writer omitted it (mcap.dev, "MCAP Format Specification").  Messages outside chunks, which have
+an index, statistics, a summary and CRCs, with unknown kinds of records, and with surplus bytes in a record. A
+CRC of 0 means that its writer omitted it (mcap.dev, "MCAP Format Specification"). Messages outside chunks, which have
 no CRC of their own, are accepted only if the end of the data section confirms that it is complete.
 """
 
@@ -27,13 +27,13 @@ from mcap.records import Attachment, Chunk, DataEnd, Footer
 
 # Magic at start and end of an MCAP file.
 MAGIC = b"\x89MCAP0\r\n"
-# Largest size of a record or an uncompressed chunk that is read, bytes.
+# Maximum size of a record or an uncompressed chunk that is read, bytes.
 RECORD_LIMIT = 64 * 2**20
-# Least size of the pieces in which records outside chunks are returned, bytes.
+# Minimum size of the pieces in which records outside chunks are returned, bytes.
 _PIECE_BYTES = 2**18
 # Records that are returned if they are outside chunks.
 _OUTSIDE_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-# Greatest ratio of the size of all chunks to the bytes read; valid logs stay under 20.
+# Maximum ratio of the size of all chunks to the bytes read; valid logs stay under 20.
 _MAX_GROWTH_RATIO = 256
 # Frame of a record: opcode and length.
 FRAME = struct.Struct("<BQ")
@@ -60,7 +60,7 @@ class Container:
 def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
     """Yield the records in each whole chunk and outside chunks, as bytes, and fill ``container`` meanwhile.
 
-    file: file positioned after the magic at its start.  Damage raises no error; `Container.problem` describes it.
+    file: file positioned after the magic at its start. Damage raises no error; `Container.problem` describes it.
     """
     try:
         yield from _read_sections(file, container)
@@ -142,7 +142,7 @@ def _read_record(file: BinaryIO, position: int) -> tuple[bytes, bytes]:
 
 
 def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield opcode, offset and content of each record in a chunk.  Raises ValueError if one does not fit."""
+    """Yield opcode, offset and content of each record in a chunk. Raises ValueError if one does not fit."""
     position = 0
     while position < len(data):
         if position + FRAME.size > len(data):

@@ -1,8 +1,8 @@
 """Write an MCAP container front to back, from prepared chunks.
 
 The `Writer` of mcap takes one message at a time, at 5 us each, two to three times the time of this writer; its `Chunk`
-and `ChunkIndex` copy their fields through a record builder for as long as the compression takes.  Here the records of a
-chunk and the index of its messages are passed as bytes.  Records that are written once use the classes of mcap.  Every
+and `ChunkIndex` copy their fields through a record builder for as long as the compression takes. Here the records of a
+chunk and the index of its messages are passed as bytes. Records that are written once use the classes of mcap. Every
 CRC of the format is written.
 """
 
@@ -41,13 +41,13 @@ ChannelIndexes = NDArray[np.void]  # of CHANNEL_INDEX
 
 _MESSAGE = struct.Struct("<HIQ")
 # Head of a chunk: times, size and CRC before compression.
-_CHUNK = struct.Struct("<QQQI")
+_CHUNK_HEADER = struct.Struct("<QQQI")
 # Head of a chunk index: times, offset and length of the chunk, and length of its table of message indexes.
-_CHUNK_INDEX = struct.Struct("<QQQQI")
+_CHUNK_INDEX_HEADER = struct.Struct("<QQQQI")
 # Entry of that table: channel and offset.
-_OFFSET = struct.Struct("<HQ")
+_INDEX_OFFSET = struct.Struct("<HQ")
 # End of a chunk index: sizes of the chunk.
-_SIZES = struct.Struct("<QQ")
+_CHUNK_SIZES = struct.Struct("<QQ")
 # Name of the compression, with its length.
 _COMPRESSION = b"\x04\x00\x00\x00zstd"
 # Size of channel and length before the pairs of a message index, bytes.
@@ -93,9 +93,9 @@ class _ChunkIndex(NamedTuple):
 
     def record(self) -> bytes:
         """Return its chunk index record."""
-        offsets = b"".join(_OFFSET.pack(channel, position) for channel, position in self.offsets)
-        times = _CHUNK_INDEX.pack(self.content_start, self.content_end, self.position, self.length, len(offsets))
-        sizes = _SIZES.pack(self.compressed, self.size)
+        offsets = b"".join(_INDEX_OFFSET.pack(channel, position) for channel, position in self.offsets)
+        times = _CHUNK_INDEX_HEADER.pack(self.content_start, self.content_end, self.position, self.length, len(offsets))
+        sizes = _CHUNK_SIZES.pack(self.compressed, self.size)
         content = times + offsets + self.index_length.to_bytes(8, "little") + _COMPRESSION + sizes
         return FRAME.pack(Opcode.CHUNK_INDEX, len(content)) + content
 
@@ -114,15 +114,17 @@ class ContainerWriter:
         self._offset = 0
         self._schemas: dict[str, Schema] = {}
         self._channels: list[Channel] = []
-        self._unwritten: list[McapRecord] = []
+        self._unwritten_records: list[McapRecord] = []
         self._attachments: list[AttachmentIndex] = []
         self._chunks: list[_ChunkIndex] = []
         self._counts: Counter[int] = Counter()
-        self._write_bytes(MAGIC + _bytes(Header(profile=profile, library=profile)))
+        self._write_bytes(MAGIC + _record_bytes(Header(profile=profile, library=profile)))
 
     def write_attachment(self, name: str, media_type: str, data: bytes, log_time: int) -> None:
         """Write an attachment."""
-        record = _bytes(Attachment(create_time=0, log_time=log_time, name=name, media_type=media_type, data=data))
+        record = _record_bytes(
+            Attachment(create_time=0, log_time=log_time, name=name, media_type=media_type, data=data)
+        )
         index = AttachmentIndex(self._offset, len(record), log_time, 0, len(data), name, media_type)
         self._attachments.append(index)
         self._write_bytes(record)
@@ -134,16 +136,16 @@ class ContainerWriter:
         """
         if schema not in self._schemas:
             self._schemas[schema] = Schema(id=len(self._schemas) + 1, data=data, encoding="protobuf", name=schema)
-            self._unwritten.append(self._schemas[schema])
+            self._unwritten_records.append(self._schemas[schema])
         channel = Channel(len(self._channels) + 1, topic, "protobuf", {}, self._schemas[schema].id)
         self._channels.append(channel)
-        self._unwritten.append(channel)
+        self._unwritten_records.append(channel)
         return channel.id
 
-    def take_new_records(self) -> bytes:
-        """Take the records of the schemas and channels that are not in any chunk yet, for the next chunk."""
-        new_records = b"".join(_bytes(record) for record in self._unwritten)
-        self._unwritten.clear()
+    def pop_new_records(self) -> bytes:
+        """Return and forget the records of schemas and channels that are not in any chunk yet, for the next chunk."""
+        new_records = b"".join(_record_bytes(record) for record in self._unwritten_records)
+        self._unwritten_records.clear()
         return new_records
 
     def copy_chunk(self, data: bytes) -> None:
@@ -160,7 +162,7 @@ class ContainerWriter:
                 self._schemas.setdefault(f"{schema.id}", schema)
             elif opcode == Opcode.CHANNEL:
                 channel = Channel.read(record_stream(content))
-                if all(channel.id != existing.id for existing in self._channels):
+                if all(channel.id != known_channel.id for known_channel in self._channels):
                     self._channels.append(channel)
             elif opcode == Opcode.MESSAGE:
                 number, _, log_time = _MESSAGE.unpack_from(content)
@@ -178,7 +180,7 @@ class ContainerWriter:
         """Write a chunk."""
         data = self._compressor.compress(content.records)
         size = len(content.records)
-        header = _CHUNK.pack(content.start, content.end, size, zlib.crc32(content.records)) + _COMPRESSION
+        header = _CHUNK_HEADER.pack(content.start, content.end, size, zlib.crc32(content.records)) + _COMPRESSION
         header += len(data).to_bytes(8, "little")
         length = FRAME.size + len(header) + len(data)
         index_start = self._offset + length
@@ -200,23 +202,23 @@ class ContainerWriter:
 
     def write_end(self) -> None:
         """Write the end of the data section and the summary; the file stays open."""
-        self._write_bytes(_bytes(DataEnd(self._crc)))
+        self._write_bytes(_record_bytes(DataEnd(self._crc)))
         start = self._offset
         groups = [
-            (Opcode.SCHEMA, [_bytes(schema) for schema in self._schemas.values()]),
-            (Opcode.CHANNEL, [_bytes(channel) for channel in self._channels]),
-            (Opcode.STATISTICS, [_bytes(self._statistics())]),
+            (Opcode.SCHEMA, [_record_bytes(schema) for schema in self._schemas.values()]),
+            (Opcode.CHANNEL, [_record_bytes(channel) for channel in self._channels]),
+            (Opcode.STATISTICS, [_record_bytes(self._statistics())]),
             (Opcode.CHUNK_INDEX, [chunk.record() for chunk in self._chunks]),
-            (Opcode.ATTACHMENT_INDEX, [_bytes(index) for index in self._attachments]),
+            (Opcode.ATTACHMENT_INDEX, [_record_bytes(index) for index in self._attachments]),
         ]
         summary = b""
         offsets = b""
         for opcode, group_records in groups:
             group = b"".join(group_records)
             if group:
-                offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(group)))
+                offsets += _record_bytes(SummaryOffset(opcode, start + len(summary), len(group)))
             summary += group
-        footer = _bytes(Footer(start, start + len(summary), 0))
+        footer = _record_bytes(Footer(start, start + len(summary), 0))
         # The CRC covers the summary and the footer up to the CRC itself.
         crc = zlib.crc32(summary + offsets + footer[:-4])
         self._write_bytes(summary + offsets + footer[:-4] + crc.to_bytes(4, "little") + MAGIC)
@@ -235,7 +237,7 @@ class ContainerWriter:
         )
 
     def flush(self) -> None:
-        """Pass the written bytes to the operating system.  Raises OSError."""
+        """Pass the written bytes to the operating system. Raises OSError."""
         try:
             self._file.flush()
         except OSError as error:
@@ -255,7 +257,7 @@ def _with_file_name(error: OSError, file: BinaryIO) -> OSError:
     return OSError(error.errno, error.strerror, getattr(file, "name", None))
 
 
-def _bytes(record: McapRecord) -> bytes:
+def _record_bytes(record: McapRecord) -> bytes:
     builder: Any = RecordBuilder()  # mcap leaves some of its methods without annotations
     record.write(builder)
     return bytes(builder.end())
@@ -337,7 +339,7 @@ class Layout:
 
 
 @inner
-def _write_number(buffer: Bytes, position: int, value: int, size: int) -> int:
+def _write_integer(buffer: Bytes, position: int, value: int, size: int) -> int:
     """Write a little-endian number of ``size`` bytes, and return the position of its end."""
     for k in range(size):
         buffer[position + k] = (value >> (8 * k)) & 0xFF
@@ -358,11 +360,11 @@ def _write_varint(buffer: Bytes, position: int, value: int) -> int:
 def _write_message_header(buffer: Bytes, position: int, size: int, channel: int, log_time: int) -> int:
     """Write the frame and header of a message record; ``size`` is the size of the message."""
     buffer[position] = MESSAGE_OPCODE
-    position = _write_number(buffer, position + 1, MESSAGE_HEADER + size, 8)
-    position = _write_number(buffer, position, channel, 2)
-    position = _write_number(buffer, position, 0, 4)
-    position = _write_number(buffer, position, log_time, 8)
-    return _write_number(buffer, position, log_time, 8)
+    position = _write_integer(buffer, position + 1, MESSAGE_HEADER + size, 8)
+    position = _write_integer(buffer, position, channel, 2)
+    position = _write_integer(buffer, position, 0, 4)
+    position = _write_integer(buffer, position, log_time, 8)
+    return _write_integer(buffer, position, log_time, 8)
 
 
 @compiled
@@ -411,16 +413,16 @@ def single_record(channel: int, log_time: int, data: bytes) -> MessageRecords:
 
 @compiled
 def _merge_by_time(
-    row_times: Ints, row_length: int, row_channel: int, other_messages: Entries, front_size: int, limit: int
+    row_times: Ints, row_length: int, row_channel: int, other_messages: Entries, prefix_size: int, limit: int
 ) -> tuple[Entries, Ints]:
     """Merge rows and other messages by time; return all messages (n,) and the first of each chunk.
 
-    At equal times a row comes last.  The array of first messages ends with n.
+    At equal times a row comes last. The array of first messages ends with n.
     """
     count = len(row_times) + len(other_messages)
     merged = np.empty(count, dtype=ENTRY)
     firsts = np.empty(count + 1, dtype=np.int64)
-    chunks, size, i, j = 0, front_size, 0, 0
+    chunks, size, i, j = 0, prefix_size, 0, 0
     for k in range(count):
         message = merged[k]
         if i < len(row_times) and (j >= len(other_messages) or row_times[i] < other_messages[j].log_time):
@@ -428,9 +430,13 @@ def _merge_by_time(
             message.log_time = row_times[i]
             i += 1
         else:
-            other = other_messages[j]
-            message.source, message.length, message.channel = other.source, other.length, other.channel
-            message.log_time = other.log_time
+            other_message = other_messages[j]
+            message.source, message.length, message.channel = (
+                other_message.source,
+                other_message.length,
+                other_message.channel,
+            )
+            message.log_time = other_message.log_time
             j += 1
         second = message.log_time // SECOND_NS
         if k == 0 or (
@@ -438,7 +444,7 @@ def _merge_by_time(
         ):
             firsts[chunks] = k
             chunks += 1
-            size = front_size if k == 0 else 0
+            size = prefix_size if k == 0 else 0
         message.offset = size
         size += message.length
     firsts[chunks] = count
@@ -446,28 +452,28 @@ def _merge_by_time(
 
 
 @compiled
-def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, front: Bytes) -> Bytes:
-    """Copy the messages one after the other, after ``front``."""
-    total = len(front)
+def _copy_messages(entries: Entries, rows: Bytes, blob: Bytes, prefix: Bytes) -> Bytes:
+    """Return the bytes of ``prefix`` and of all messages, one after the other."""
+    total_size = len(prefix)
     for k in range(len(entries)):
-        total += entries[k].length
-    blob_out = np.empty(total, dtype=np.uint8)
-    copy_into(blob_out[: len(front)], front)
-    position, row = len(front), 0
+        total_size += entries[k].length
+    chunk_bytes = np.empty(total_size, dtype=np.uint8)
+    copy_into(chunk_bytes[: len(prefix)], prefix)
+    position, row = len(prefix), 0
     for k in range(len(entries)):
         length, source = entries[k].length, entries[k].source
         if source == FROM_ROWS:
-            copy_into(blob_out[position : position + length], rows[row])
+            copy_into(chunk_bytes[position : position + length], rows[row])
             row += 1
         else:
-            copy_into(blob_out[position : position + length], blob[source : source + length])
+            copy_into(chunk_bytes[position : position + length], blob[source : source + length])
         position += length
-    return blob_out
+    return chunk_bytes
 
 
 @compiled
 def _index_messages(
-    entries: Entries, firsts: Ints, front_size: int, max_channel: int
+    entries: Entries, firsts: Ints, prefix_size: int, max_channel: int
 ) -> tuple[Bytes, Chunks, ChannelIndexes]:
     """Return the message index records of each chunk by channel, and the tables of `Layout`.
 
@@ -480,7 +486,7 @@ def _index_messages(
     position, start = 0, 0
     for c in range(count):
         chunk, first, stop = chunks[c], firsts[c], firsts[c + 1]
-        size = front_size if c == 0 else 0
+        size = prefix_size if c == 0 else 0
         for k in range(first, stop):
             channels[c, entries[k].channel].messages += 1
             size += entries[k].length
@@ -495,35 +501,35 @@ def _index_messages(
             index.offset = position - chunk.index_start
             length = index.messages * _INDEX_ENTRY
             index_records[position] = _INDEX_OPCODE
-            position = _write_number(index_records, position + 1, 6 + length, 8)
-            position = _write_number(index_records, position, channel, 2)
-            position = _write_number(index_records, position, length, 4)
+            position = _write_integer(index_records, position + 1, 6 + length, 8)
+            position = _write_integer(index_records, position, channel, 2)
+            position = _write_integer(index_records, position, length, 4)
             for k in range(first, stop):
                 if entries[k].channel == channel:
-                    position = _write_number(index_records, position, entries[k].log_time, 8)
-                    position = _write_number(index_records, position, entries[k].offset, 8)
+                    position = _write_integer(index_records, position, entries[k].log_time, 8)
+                    position = _write_integer(index_records, position, entries[k].offset, 8)
         chunk.index_stop = position
     return index_records[:position], chunks, channels
 
 
 def lay_out_chunks(
-    rows: Bytes, row_times: Ints, row_channel: int, other_messages: list[MessageRecords], front: bytes, limit: int
+    rows: Bytes, row_times: Ints, row_channel: int, other_messages: list[MessageRecords], prefix: bytes, limit: int
 ) -> Layout:
     """Order message records by time, and index them in chunks of at most one second and ``limit`` bytes.
 
     rows: (n, size) records of the channel ``row_channel``, at ``row_times`` (ns); at equal times a row comes last.
-    front: bytes before the first message.  A message of more than ``limit`` bytes gets its own chunk.
+    prefix: bytes before the first message. A message of more than ``limit`` bytes gets its own chunk.
     """
     max_channel = max([row_channel, *(messages.channel for messages in other_messages)])
     blob = np.concatenate([np.zeros(0, np.uint8), *(messages.blob for messages in other_messages)])
     merged, firsts = _merge_by_time(
-        row_times, rows.shape[1], row_channel, _message_entries(other_messages), len(front), limit
+        row_times, rows.shape[1], row_channel, _message_entries(other_messages), len(prefix), limit
     )
     if not len(merged):
-        none = np.zeros(0, np.uint8)
-        return Layout(none, none, np.zeros(0, CHUNK), np.zeros((0, max_channel + 1), CHANNEL_INDEX))
-    records = _copy_messages(merged, rows, blob, np.frombuffer(front, np.uint8))
-    index, chunks, channels = _index_messages(merged, firsts, len(front), max_channel)
+        no_bytes = np.zeros(0, np.uint8)
+        return Layout(no_bytes, no_bytes, np.zeros(0, CHUNK), np.zeros((0, max_channel + 1), CHANNEL_INDEX))
+    records = _copy_messages(merged, rows, blob, np.frombuffer(prefix, np.uint8))
+    index, chunks, channels = _index_messages(merged, firsts, len(prefix), max_channel)
     return Layout(records, index, chunks, channels)
 
 
@@ -549,7 +555,7 @@ def _message_entries(other_messages: list[MessageRecords]) -> Entries:
 def last_log_time(times: Floats, newest: int, epoch: int, max_time: float) -> int:
     """Return the log time (ns) of the last of ``times`` (s).
 
-    newest: log time before the first.  Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if
+    newest: log time before the first. Returns `OUT_OF_RANGE` if a time is not in 0..max_time, and `NOT_INCREASING` if
     a time is not later than the time before it.
     """
     for k in range(len(times)):

@@ -1,4 +1,4 @@
-"""Read, check and rebuild a flight from only its log.
+"""Read a log, check it, and rebuild its flight from the log only.
 
 A recorded verdict is returned unchanged, for comparison; no code relies on it.
 """
@@ -21,7 +21,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import LATEST, Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.foxglove_scene import LOG_LEVELS
-from logs.recording.foxglove_updates import EVENT_SOURCE as NOTED_IN_FLIGHT
+from logs.recording.foxglove_updates import EVENT_SOURCE as FLIGHT_EVENT_SOURCE
 from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream, records
 from logs.recording.mcap_writer import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.setup_attachments import (
@@ -76,7 +76,7 @@ class LogMessage:
 
 
 def log_messages(path: Path) -> Iterator[LogMessage]:
-    """Yield the messages of a log in the order of the file, up to its first damage.  Raises OSError.
+    """Yield the messages of a log in the order of the file, up to its first damage. Raises OSError.
 
     >>> import tempfile
     >>> from collections import Counter
@@ -166,13 +166,13 @@ class FlightLog:
 
     source: name of the file, for messages.
     setup, track, events: the flown setup, the rows, and the events in order of time.
-    ended: how the flight ended; None if the recording stopped before.
+    ended: reason for the end of the flight; None if the recording stopped before.
     recorded_verdict: the verdict as written, or None; never to be trusted.
     versions: versions of the packages of the flight.
     complete: True if nothing is missing or damaged.
-    problem: the fault in a line; empty for a complete log.
+    problem: the fault, in one line; empty for a complete log.
     end_time: time of the last row, s.
-    lost: the lost part of the flight, in a line; ``problem`` adds to it for a recovered log.
+    lost: the lost part of the flight, in one line; for a recovered log, ``problem`` says so as well.
     reference: results of reference flights; None if none were flown.
     """
 
@@ -221,7 +221,7 @@ class _MessageCollector:
         self._parser = state_class()
 
     def add(self, data: bytes) -> None:
-        """Add the records of one chunk.  Raises one of `PARSE_ERRORS` or DecodeError."""
+        """Add the records of one chunk. Raises one of `PARSE_ERRORS` or DecodeError."""
         self.chunks += 1
         position = 0
         while position < len(data):
@@ -263,7 +263,7 @@ class _MessageCollector:
             self.parts.append(parse_row(data[start + MESSAGE_HEADER : end], self._parser))
         elif self._channels.get(channel) == (EVENT_TOPIC, LOG_NAME):
             message = Log.FromString(data[start + MESSAGE_HEADER : end])
-            if message.name == NOTED_IN_FLIGHT:
+            if message.name == FLIGHT_EVENT_SOURCE:
                 return end
             # Subtract whole ns first: a float cannot hold ns since 1970.
             time = (log_time - EPOCH_NS) / 1e9
@@ -350,22 +350,22 @@ def _check_magic(magic: bytes, path: Path) -> None:
         raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}); expected a flight log", file=path)
 
 
-def _usable_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
+def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords, str]:
     """Return the rows before the first invalid row, and that row's fault; "" if all rows are valid."""
     state = rows["state"]
     time = state["time_s"]
     is_increasing = np.isfinite(time) & (time >= 0.0) & (time < LATEST)
     is_increasing[1:] &= time[1:] > time[:-1]
     is_numbered = state["row"] == np.arange(len(rows), dtype=np.uint32)
-    has_leg = (state["leg_index"] >= 0) & (state["leg_index"] < waypoints)
+    has_leg = (state["leg_index"] >= 0) & (state["leg_index"] < waypoint_count)
     for is_valid, fault in (
         (is_numbered, "rows are missing"),
         (is_increasing, "time does not increase"),
         (has_leg, "the leg does not exist"),
     ):
         if not is_valid.all():
-            first = int(np.argmin(is_valid & is_numbered & is_increasing & has_leg))
-            return rows[:first], f"{fault} at state message {first}"
+            first_invalid = int(np.argmin(is_valid & is_numbered & is_increasing & has_leg))
+            return rows[:first_invalid], f"{fault} at state message {first_invalid}"
     return rows, ""
 
 

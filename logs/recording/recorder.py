@@ -57,7 +57,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict, verdict_json
 from world.arrays import Ints
 
-# Largest size of a chunk, bytes.
+# Maximum size of a chunk, bytes.
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
@@ -103,7 +103,7 @@ class Recorder:
     """
 
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
-        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
+        """Open ``path`` for writing (replacing it) and write the setup. Raises OSError.
 
         every: record every n-th row, and the last row of the flight.  batch: number of whole seconds of flight written
         at once, each in its own chunks; a larger batch costs less time, but a killed process loses up to one batch.
@@ -111,18 +111,18 @@ class Recorder:
         """
         self._batch_ns = batch * SECOND_NS
         self._every = every
-        self._skipped: Rows | None = None  # newest row, if it was not recorded
-        self._received = 0  # rows, recorded or not
+        self._skipped_row: Rows | None = None  # newest row, if it was not recorded
+        self._received_count = 0  # number of received rows, recorded or not
         attachments = pack_setup(setup)
         self._terrain = setup.scenario.terrain
-        self._pending: list[Rows] = []  # rows to record
+        self._pending_rows: list[Rows] = []  # rows to record
         self._events: list[MessageRecords] = []
-        self._written = 0  # rows
-        self._last_ns = EPOCH_NS - 1  # of the rows recorded
-        self._newest_ns = EPOCH_NS - 1  # of the rows received
+        self._written_count = 0  # number of written rows
+        self._last_ns = EPOCH_NS - 1  # log time of the last recorded row
+        self._newest_ns = EPOCH_NS - 1  # log time of the last received row
         self._channels: dict[str, int] = {}
         self._file = path.open("wb", buffering=_BUFFER_BYTES)
-        self._open = True
+        self._is_open = True
         try:
             # A thinned log is meant to cost little: compress faster, a quarter more bytes for half the time.
             self._writer = ContainerWriter(self._file, PROFILE, 3 if every == 1 else -1)
@@ -143,17 +143,17 @@ class Recorder:
         """Close the file, without a result if `finish` was not called."""
         if kind is not None:
             self.abandon()
-        elif self._open:
+        elif self._is_open:
             self._close_file()
 
     def abandon(self) -> None:
         """Close the file after an error, without a result, and ignore errors of closing: report the first error."""
-        if self._open:
+        if self._is_open:
             with contextlib.suppress(OSError):
                 self._close_file()
 
     def write(self, block: Track) -> None:
-        """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
+        """Append rows. Raises ValueError unless their times increase, from 0 on, across all blocks."""
         self.write_rows(track_rows(block))
 
     def write_rows(self, rows: Rows) -> None:
@@ -171,33 +171,33 @@ class Recorder:
             raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
         # Keep every n-th row, from the first row of the flight.
-        recorded_rows = rows[-self._received % self._every :: self._every]
-        self._received += len(rows)
-        self._skipped = rows[-1:] if (self._received - 1) % self._every else None
+        recorded_rows = rows[-self._received_count % self._every :: self._every]
+        self._received_count += len(rows)
+        self._skipped_row = rows[-1:] if (self._received_count - 1) % self._every else None
         if len(recorded_rows):
             self._append_rows(recorded_rows)
 
     def _append_rows(self, rows: Rows) -> None:
-        self._pending.append(rows)
+        self._pending_rows.append(rows)
         previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
             self._write_pending(self._last_ns // SECOND_NS * SECOND_NS)
 
     @property
     def size(self) -> int:
-        """Return the present size of the file, bytes."""
+        """Current size of the file, bytes."""
         return self._file.tell()
 
     def flush(self) -> None:
         """Pass all received rows to the operating system now.
 
-        In a live flight, a killed process then loses less than a second.  Chunks end at each flush, so the bytes of the
+        In a live flight, a killed process then loses less than a second. Chunks end at each flush, so the bytes of the
         file (not its rows) depend on the times of the calls.
         """
         self._write_pending(self._last_ns + 1)
 
     def event(self, time: float, text: str, level: str = "info") -> None:
-        """Record an event at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
+        """Record an event at ``time`` (s); level: debug, info, warning, error or fatal. Raises ValueError."""
         if level not in scene.LOG_LEVELS:
             raise ValueError(f"level {level!r}: expected {', '.join(scene.LOG_LEVELS)}")
         if not 0.0 <= time < LATEST:
@@ -214,9 +214,9 @@ class Recorder:
         returns: DrawnReturns | None = None,
     ) -> None:
         """Write the reason for the flight's end, verdict, reference flights and returns, then close the file."""
-        if self._skipped is not None:
-            self._append_rows(self._skipped)
-            self._skipped = None
+        if self._skipped_row is not None:
+            self._append_rows(self._skipped_row)
+            self._skipped_row = None
         self._write_pending(None)
         end = max(self._last_ns, EPOCH_NS)
         self._write_messages([*self._poses.whole_track_records(end)])
@@ -229,7 +229,7 @@ class Recorder:
         result = {
             "schema": RESULT_SCHEMA,
             "ended": end_reason,
-            "rows": self._written,
+            "rows": self._written_count,
             "end_time_s": (end - EPOCH_NS) / 1e9,
         }
         self._write_attachment(RESULT_FILE, (json.dumps(result, indent=1) + "\n").encode(), end)
@@ -256,25 +256,25 @@ class Recorder:
         }
         scenario_with_fence = with_fence_zones(setup).scenario
         if scenario_with_fence.zones:
-            self._scene_channel(ZONES_TOPIC)
+            self._add_scene_channel(ZONES_TOPIC)
             scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, scenario_with_fence, setup.route.waypoints)
         self._write_messages([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 
-    def _scene_channel(self, topic: str) -> int:
-        """Return the channel number of a topic that not every log has."""
+    def _add_scene_channel(self, topic: str) -> int:
+        """Add the channel of a topic that not every log has, and return its number."""
         descriptor = SceneUpdate.DESCRIPTOR
         self._channels[topic] = self._writer.add_channel(topic, descriptor.full_name, file_descriptor_set(descriptor))
         return self._channels[topic]
 
     def _add_scene(self, topic: str, update: bytes) -> None:
         """Add a scene that is known only at the end, but is shown from the start of the flight."""
-        self._write_messages([single_record(self._scene_channel(topic), EPOCH_NS, update)])
+        self._write_messages([single_record(self._add_scene_channel(topic), EPOCH_NS, update)])
         self._writer.flush()
 
     def _close_file(self) -> None:
         """Write pending rows and events, the summary and the end of the file."""
-        self._open = False
+        self._is_open = False
         try:
             self._write_pending(None)
             self._writer.write_end()
@@ -286,10 +286,10 @@ class Recorder:
 
     def _write_pending(self, end_ns: int | None) -> None:
         """Write the pending rows and events before ``end_ns``, or all if it is None, in chunks of at most a second."""
-        rows = join_rows(self._pending)
+        rows = join_rows(self._pending_rows)
         log_times = times_ns(rows["time"])
         end_row = len(rows) if end_ns is None else int(np.searchsorted(log_times, end_ns))
-        self._pending = [rows[end_row:]] if end_row < len(rows) else []
+        self._pending_rows = [rows[end_row:]] if end_row < len(rows) else []
         events = [event for event in self._events if end_ns is None or event.log_times[0] < end_ns]
         self._events = [event for event in self._events if end_ns is not None and event.log_times[0] >= end_ns]
         rows, log_times = rows[:end_row], log_times[:end_row]
@@ -303,10 +303,10 @@ class Recorder:
     ) -> None:
         """Write rows and other messages in order of time; at equal times the row comes last."""
         channel = self._channels[STATE_TOPIC]
-        encoded = encode_rows(rows, self._written, channel)
-        self._written += len(rows)
+        encoded = encode_rows(rows, self._written_count, channel)
+        self._written_count += len(rows)
         layout = lay_out_chunks(
-            as_bytes(encoded), log_times, channel, other_messages, self._writer.take_new_records(), CHUNK_SIZE
+            as_bytes(encoded), log_times, channel, other_messages, self._writer.pop_new_records(), CHUNK_SIZE
         )
         for content in _chunk_contents(layout):
             self._writer.write_chunk(content)

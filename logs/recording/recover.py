@@ -28,8 +28,8 @@ class RecoveredLog:
 def recover_log(path: Path) -> RecoveredLog | None:
     """Rebuild a log up to its first damage; return None for a complete log.
 
-    Chunks and attachments before the damage are kept unchanged.  The result of the flight and the verdict are omitted,
-    because they may refer to lost rows.  Raises LogError for a file without a flight, as `read_log` does.
+    Chunks and attachments before the damage are kept unchanged. The result of the flight and the verdict are omitted,
+    because they may refer to lost rows. Raises LogError for a file without a flight, as `read_log` does.
 
     >>> import tempfile
     >>> from logs.recording.example_log import write_example_log

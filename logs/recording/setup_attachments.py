@@ -1,6 +1,6 @@
 """Convert a `FlightSetup` to attachments of a log (bytes by name), and back.
 
-`setup.json` lists every other attachment with its SHA-256, so that a missing or altered attachment is noticed.  Numbers
+`setup.json` lists every other attachment with its SHA-256, so that a missing or altered attachment is noticed. Numbers
 are written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
 """
 
@@ -129,7 +129,7 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
 def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     """Rebuild the packed terrain, bit for bit.
 
-    attachments: attachments from `pack_terrain`, among others.  source: name of the log for messages.  Raises LogError
+    attachments: attachments from `pack_terrain`, among others.  source: name of the log for messages. Raises LogError
     for heights that are missing, damaged or of wrong size, and for an invalid map.
     """
     try:
@@ -322,7 +322,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
 def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     """Rebuild the setup from its attachments; no file is opened.
 
-    attachments: bytes by name.  source: name of the log for messages.  Raises LogError, in one line, for an attachment
+    attachments: bytes by name.  source: name of the log for messages. Raises LogError, in one line, for an attachment
     that is missing, altered or inconsistent.
     """
     if SETUP_FILE not in attachments:

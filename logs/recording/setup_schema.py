@@ -1,7 +1,7 @@
 """The tables of `setup.json`: mission, route, envelope and parameters of a `FlightSetup`.
 
 A table has the fields of its dataclass under keys with units: pydantic writes it from the attributes of the dataclass,
-and the dataclass is made from its values.  Numbers are written as Python's repr, which reads back to the same float.
+and the dataclass is made from its values. Numbers are written as Python's repr, which reads back to the same float.
 
 cattrs 26 needs as many lines to rename fields, but reads 1.7 as the integer 1, "12" as a number and NaN as any number.
 """

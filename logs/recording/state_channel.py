@@ -1,7 +1,7 @@
 """The `/state` channel: rows of the track as protobuf messages, their schema, and their bytes as numpy arrays.
 
 Every field is a fixed32 or fixed64 and every field is written, zero or not, so that a message has one layout and n
-messages are one structured array.  Any protobuf parser reads them.  The schema is built here, so that no protoc is
+messages are one structured array. Any protobuf parser reads them. The schema is built here, so that no protoc is
 needed.
 """
 
@@ -122,7 +122,7 @@ class StateField(NamedTuple):
         return values if self.component is None else values[:, self.component]
 
 
-def _fields() -> tuple[StateField, ...]:
+def _make_fields() -> tuple[StateField, ...]:
     """Return all fields of the message after `row`, in order."""
     fields = []
     for source, names in COLUMN_NAMES.items():
@@ -131,11 +131,11 @@ def _fields() -> tuple[StateField, ...]:
     return tuple(fields)
 
 
-FIELDS = _fields()
+FIELDS = _make_fields()
 _MESSAGE_FIELDS = [("row", "<u4"), *((field.name, field.kind) for field in FIELDS)]
 
 
-def _file() -> descriptor_pb2.FileDescriptorProto:
+def _make_file() -> descriptor_pb2.FileDescriptorProto:
     file = descriptor_pb2.FileDescriptorProto(name="planfly/State.proto", package="planfly", syntax="proto3")
     message = file.message_type.add(name="State")
     for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
@@ -143,7 +143,7 @@ def _file() -> descriptor_pb2.FileDescriptorProto:
     return file
 
 
-def _layout() -> tuple[np.dtype[np.void], dict[str, int]]:
+def _make_layout() -> tuple[np.dtype[np.void], dict[str, int]]:
     """Return the message as a packed structured type with a tag before each value, and the tags."""
     parts: list[tuple[str, str]] = []
     tags: dict[str, int] = {}
@@ -155,8 +155,8 @@ def _layout() -> tuple[np.dtype[np.void], dict[str, int]]:
     return np.dtype(parts), tags
 
 
-STATE_FILE = _file()
-_LAYOUT = _layout()
+STATE_FILE = _make_file()
+_LAYOUT = _make_layout()
 STATE_BODY = _LAYOUT[0]
 _TAGS = _LAYOUT[1]
 # One MCAP message record of this channel, including its header.
@@ -174,7 +174,7 @@ RECORD = np.dtype(
 
 
 def state_class() -> "type[Message]":
-    """Make the protobuf class of a state message, in its own pool."""
+    """Return the protobuf class of a state message, in its own pool."""
     pool = descriptor_pool.DescriptorPool()
     pool.Add(STATE_FILE)
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(STATE_NAME))
@@ -207,7 +207,7 @@ def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
 
 
-def _template() -> StateRecords:
+def _make_template() -> StateRecords:
     row: StateRecords = np.zeros(1, dtype=RECORD)
     row["opcode"] = MESSAGE_OPCODE
     row["length"] = MESSAGE_HEADER + STATE_BODY.itemsize
@@ -216,7 +216,7 @@ def _template() -> StateRecords:
     return row
 
 
-_TEMPLATE = _template()
+_TEMPLATE = _make_template()
 
 
 def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> StateRecords:
@@ -284,16 +284,16 @@ class RowMatcher:
         """Prepare for a file.  channel: MCAP channel of its state messages."""
         sample = _TEMPLATE.copy()
         sample["channel"] = channel
-        fixed: StateRecords = np.zeros(1, dtype=RECORD)
-        fixed["opcode"], fixed["length"], fixed["channel"] = 0xFF, 0xFFFF_FFFF_FFFF_FFFF, 0xFFFF
+        fixed_mask: StateRecords = np.zeros(1, dtype=RECORD)
+        fixed_mask["opcode"], fixed_mask["length"], fixed_mask["channel"] = 0xFF, 0xFFFF_FFFF_FFFF_FFFF, 0xFFFF
         for name, tag in _TAGS.items():
-            fixed["state"][name] = 0xFF if tag < 256 else 0xFFFF
-        self._columns = np.flatnonzero(fixed.view(np.uint8))
+            fixed_mask["state"][name] = 0xFF if tag < 256 else 0xFFFF
+        self._columns = np.flatnonzero(fixed_mask.view(np.uint8))
         self._expected = sample.view(np.uint8)[self._columns]
 
     def match(self, data: bytes, offset: int) -> StateRecords:
         """Return the successive records with this layout from ``offset`` on, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
-        count_matching = _count_matching(raw, self._columns, self._expected)
-        return raw[:count_matching].reshape(-1).view(RECORD)
+        matching_count = _count_matching(raw, self._columns, self._expected)
+        return raw[:matching_count].reshape(-1).view(RECORD)

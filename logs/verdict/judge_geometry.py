@@ -143,7 +143,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
             for finding in judge(side_requirements, None, geometric=True)
             if finding.ok is False
         }
-        for side_requirements in (route_requirements(setup), route_requirements(setup.turned_to_other_side()))
+        for side_requirements in (route_requirements(setup), route_requirements(setup.with_long_reversals()))
     ]
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
     corners_text = ", ".join(place_text(requirements.waypoint(int(i))) for i in corners)

@@ -135,9 +135,9 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
     trims: trims in order of airspeed.  modes: modes by airspeed, m/s.
 
     >>> from aircraft.catalog import load_aircraft
-    >>> from flight.dynamics.characteristics import modes_at, trim_table
+    >>> from flight.dynamics.characteristics import level_flight_modes, trim_table
     >>> aircraft = load_aircraft("aerosonde")
-    >>> figure = draw_trims(aircraft, trim_table(aircraft, 3), {25.0: modes_at(aircraft, 25.0)})
+    >>> figure = draw_trims(aircraft, trim_table(aircraft, 3), {25.0: level_flight_modes(aircraft, 25.0)})
     >>> figure.axes[0].get_xlabel(), figure.axes[1].get_ylabel()
     ('airspeed (m/s)', 'throttle (%)')
     """
@@ -263,7 +263,7 @@ def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
     name, unit, factor = _QUANTITIES[step.quantities[row]]
     values = factor * step.change[:, row]
     axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
-    hold_time = min(step.held, float(step.time[-1]) - 1.0)
+    hold_time = min(step.hold_time, float(step.time[-1]) - 1.0)
     axes.axvspan(1.0, 1.0 + hold_time, color=theme.colour("commanded"), alpha=0.12, linewidth=0)
     axes.plot(step.time, values, color=theme.colour("flown"), linewidth=1.1)
     axes.set_xlim(0.0, float(step.time[-1]))
@@ -283,7 +283,7 @@ def _step_title(step: StepResponse) -> str:
             "rudder": ("to yaw left", ""),
         }
         size_text = f"{abs(math.degrees(step.size)):.1f}° {direction_names[step.control][step.size < 0.0]}"
-    return f"{name} {size_text}" + (f", {step.held:.0f} s" if math.isfinite(step.held) else ", held")
+    return f"{name} {size_text}" + (f", {step.hold_time:.0f} s" if math.isfinite(step.hold_time) else ", held")
 
 
 def _add_legend_above(axes: Any, title: str, columns: int) -> None:

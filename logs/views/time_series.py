@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track, control_limits, held_at_limit
+from flight.simulation.track import Track, control_limits, saturated_rows
 from logs.views.charts import Chart, Panel, filled_series, held_band, leg_marks, series, shorten
 from world.arrays import Floats
 from world.geometry import segment_exposure
@@ -91,7 +91,7 @@ def control_chart(setup: FlightSetup, track: Track) -> Chart:
         panel = Panel(
             name, unit, layers, (("limits", scale * min_value), ("", scale * max_value)) if has_limits else ()
         )
-        is_held = held_at_limit(track, k, min_value, max_value)
+        is_held = saturated_rows(track, k, min_value, max_value)
         if is_held.any():
             panel = replace(panel, layers=(held_band(is_held, track.time, panel.shown_span()), *layers))
         panels.append(panel)

@@ -10,7 +10,7 @@ from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircr
 from aircraft.envelope import Envelope
 from aircraft.model_writer import Layout
 from flight.autopilots.catalog import AUTOPILOTS
-from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, modes_at, step_responses, trim_table
+from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, level_flight_modes, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.model_check import shipped_model
 from planfly.flight_options import takes_options
@@ -178,8 +178,8 @@ def describe_aircraft(
         envelope = load_envelope(aircraft_entry, motor_braking=motor_braking)
         check_level_flight(aircraft_entry, envelope)
         trims = trim_table(aircraft_entry)
-        modes = {row.trim.airspeed: modes_at(aircraft_entry, row.trim.airspeed) for row in trims}
-        cruise, steps = modes_at(aircraft_entry, aircraft_entry.airspeed), step_responses(aircraft_entry)
+        modes = {row.trim.airspeed: level_flight_modes(aircraft_entry, row.trim.airspeed) for row in trims}
+        cruise, steps = level_flight_modes(aircraft_entry, aircraft_entry.airspeed), step_responses(aircraft_entry)
     files: tuple[Path, ...] = ()
     if folder is not None:
         pictures = _draw_pictures(aircraft_entry, envelope, trims, modes, steps)

@@ -13,7 +13,7 @@ from aircraft.catalog import Aircraft, model_hash
 from aircraft.path_limits import Limits
 from aircraft.uncertainty import DRAWS_FILE, read_draws
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
@@ -45,11 +45,11 @@ from world.wind import Wind
 
 # Distance beyond the ends of a strip over which its survey holds, m: the flare and the last of the final.
 _SURVEYED_DISTANCE_M = 200.0
-# Distance over which the survey's error passes into that of the elevation file, m.
+# Distance over which the error changes from the survey's error to the elevation file's error, m.
 _SURVEY_BLEND_DISTANCE_M = 1000.0
 # Distance over which the size of a terrain pixel is measured, m.
 _PROBE_DISTANCE_M = 100.0
-# Stream of random numbers for the error of a strip's survey, apart from those of the flight's other draws.
+# Stream of random numbers for the error of a strip's survey, independent of the flight's other draws.
 _STRIP_ERROR_STREAM = 71
 
 
@@ -59,7 +59,7 @@ class CampaignBase:
 
     scenario: the planned scenario; every flight flies `mission` in this scenario, with its own wind.
     airframe: the airframe in this scenario.
-    placed: the mission on the terrain that the planner knows, even if a flight has another terrain.
+    placed: the mission placed on the terrain that the planner knows, even if a flight has another terrain.
     plan: the plan of the mission; None for a mission from a file.
     seed: seed of the draws.
     name: stem of file names.
@@ -75,7 +75,7 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """Return the setup without any variation.  Raises PlanflyError for a mission without a valid route."""
+        """Return the setup without any variation. Raises PlanflyError for a mission without a valid route."""
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
@@ -157,17 +157,17 @@ def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersio
     scenario = plan.scenario
     airframe = load_airframe(scenario)
     mission = fences.add_to_mission(mission_of_plan(plan, airframe))
-    placed = place_stops(mission, scenario.origin, scenario.terrain)
+    placed_mission = place_stops(mission, scenario.origin, scenario.terrain)
     dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
-    return CampaignBase(scenario, airframe, mission, placed, plan, dispersions, seed, scenario.name)
+    return CampaignBase(scenario, airframe, mission, placed_mission, plan, dispersions, seed, scenario.name)
 
 
 def _make_base_from_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
     mission = replace(setup.mission, source=source)
     scenario, airframe = setup.scenario, airframe_of(setup)
-    placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
+    placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
     dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
-    return CampaignBase(scenario, airframe, mission, placed, setup.plan, dispersions, setup.seed, setup.name)
+    return CampaignBase(scenario, airframe, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
 
 
 def check_level_flight_at_medians(base: CampaignBase) -> None:
@@ -184,7 +184,7 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
     _check_draws(base)
     model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
     amsl = float(base.scenario.start[2])
-    if straight(model, base.airframe.airspeed, amsl) is None:
+    if steady_flight(model, base.airframe.airspeed, amsl) is None:
         factors = ", ".join(
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )
@@ -252,7 +252,7 @@ class VariedFlight:
 def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
     """Return the flight of a draw.
 
-    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`.  The autopilot does not know the
+    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`. The autopilot does not know the
     mass, drag, control power, drawn aircraft and start position.
 
     wind: mean wind that the draw varies; None for the wind of the scenario.
@@ -272,8 +272,8 @@ def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -
     variation = Variation(
         mass=values["mass"], drag=values["drag"], control=values["control_power"], properties=properties
     )
-    offset = (values["start_east"], values["start_north"], values["start_up"])
-    return VariedFlight(setup, airframe, OffNominal(variation, offset))
+    start_offset = (values["start_east"], values["start_north"], values["start_up"])
+    return VariedFlight(setup, airframe, OffNominal(variation, start_offset))
 
 
 def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: GivenWind | None) -> Scenario:
@@ -305,7 +305,7 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
     """
     if strip is None or strip_error is None:
         return replace(terrain, heights=terrain.heights + np.float32(error)) if error else terrain
-    # Metres on the map for each column and row, from the columns and rows for each metre about the strip.
+    # Metres on the map per column and row, from the columns and rows per metre near the strip.
     centre = np.array(terrain.to_pixel(strip.east, strip.north)).ravel()
     probes = ((strip.east + _PROBE_DISTANCE_M, strip.north), (strip.east, strip.north + _PROBE_DISTANCE_M))
     steps = [np.array(terrain.to_pixel(*probe)).ravel() - centre for probe in probes]
@@ -314,8 +314,8 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
     offsets = np.stack([columns - centre[0], rows - centre[1]])
     distances = np.hypot(*np.tensordot(metres_per_pixel, offsets, axes=1))
     surveyed_distance = 0.5 * strip.length + _SURVEYED_DISTANCE_M
-    weights = np.clip((distances - surveyed_distance) / _SURVEY_BLEND_DISTANCE_M, 0.0, 1.0)
-    errors = strip_error + weights * (error - strip_error)
+    blend_factors = np.clip((distances - surveyed_distance) / _SURVEY_BLEND_DISTANCE_M, 0.0, 1.0)
+    errors = strip_error + blend_factors * (error - strip_error)
     return replace(terrain, heights=(terrain.heights + errors).astype(np.float32))
 
 

@@ -83,7 +83,7 @@ class CampaignResult:
 
     @property
     def probability(self) -> float:
-        """Share of flyable flights."""
+        """Fraction of flyable flights."""
         return self.summary.estimate.tally.share
 
     @property
@@ -103,7 +103,7 @@ class CampaignResult:
 
     @property
     def by_rule(self) -> dict[str, int]:
-        """Number of flights that failed each rule, without rules that no flight failed."""
+        """Number of flights that failed each rule; rules that no flight failed are omitted."""
         return {failures.rule: failures.flights for failures in self.summary.by_rule}
 
     @property
@@ -138,7 +138,7 @@ class CampaignResult:
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
-    """Return the goal for keyword arguments.  Raises ArgumentError for numbers outside their ranges.
+    """Return the goal for keyword arguments. Raises ArgumentError for numbers outside their ranges.
 
     >>> make_goal(None, 0.99, None, None)
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)

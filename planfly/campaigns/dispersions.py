@@ -198,7 +198,7 @@ def default_dispersions() -> Dispersions:
 
 
 def read_dispersions(path: Path) -> Dispersions:
-    """Read a dispersions file.  Raises SpreadError for a file that cannot be read or used."""
+    """Read a dispersions file. Raises SpreadError for a file that cannot be read or used."""
     return parse_dispersions(
         utf8_text(read_small_file(path, MAX_DISPERSIONS_BYTES, "dispersions", SpreadError), path, SpreadError),
         str(path),
@@ -347,7 +347,7 @@ class Draw:
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
     r"""Draw a flight's numbers.
 
-    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``.  No draw depends on another draw, so any
+    The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``. No draw depends on another draw, so any
     order, any number of workers and any part of a campaign give the same flights.
 
     seed: seed of the campaign.

@@ -28,9 +28,9 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
     counts: Counter[str] = Counter()
     places: dict[str, Counter[Place]] = {}
     for flight in flights:
-        failed = list(flight)
-        counts.update({rule for rule, _ in failed})
-        for rule, place in failed:
+        failed_findings = list(flight)
+        counts.update({rule for rule, _ in failed_findings})
+        for rule, place in failed_findings:
             places.setdefault(rule, Counter())[place] += 1
     return tuple(
         RuleFailures(rule, counts[rule], tuple(places[rule].most_common())) for rule in RULE_WORDS if counts[rule]

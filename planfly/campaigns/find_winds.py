@@ -86,13 +86,13 @@ class CalmFailures:
 
     speed: speed of this wind, m/s.
     flights: number of flights in this wind.
-    failed: number of failed flights among them.
+    failed_count: number of failed flights among them.
     by_rule: failures by rule and place; empty if no flight failed or could be flown.
     """
 
     speed: float
     flights: int
-    failed: int
+    failed_count: int
     by_rule: tuple[RuleFailures, ...]
 
 
@@ -147,8 +147,8 @@ def find_winds(
 ) -> WindsFound:
     """Fly rounds of flights until each boundary is known accurately enough, or all flights are used.
 
-    Flights in the table are not flown again.  The winds of a round depend only on the earlier rounds, so the result is
-    the same for any number of workers and interruptions.  Flights completed before an error or Ctrl-C stay in the
+    Flights in the table are not flown again. The winds of a round depend only on the earlier rounds, so the result is
+    the same for any number of workers and interruptions. Flights completed before an error or Ctrl-C stay in the
     table.
 
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
@@ -214,7 +214,7 @@ class _Search:
         failure_keys: set[Hashable] = {_failure_key(rule, place) for rule, place in flight.failed} or {flight.outcome}
         failed_keys = frozenset() if is_flyable else frozenset(failure_keys)
         margins: dict[Hashable, float] | None = {
-            _failure_key(rule, place): fraction for rule, place, fraction in flight.narrow
+            _failure_key(rule, place): fraction for rule, place, fraction in flight.marginal_passes
         }
         if flight.outcome == "lost" or any(rule == "completion" for rule, _ in flight.failed):
             # The rules that the flight would have passed if it had continued are unknown.
@@ -241,8 +241,8 @@ class _Search:
         """Return the result of the search."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
-        calm = self._calm_failures(boundaries)
-        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm)
+        calm_failures = self._calm_failures(boundaries)
+        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm_failures)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
         """Return the failures in the weakest wind flown, for directions whose boundary is calm air; otherwise None."""
@@ -267,13 +267,13 @@ class _StoredFlights:
     """Flights in the table, with their requests and outcomes keyed by number."""
 
     def __init__(self, store: WindsStore) -> None:
-        stored_flights = store.stored_flights()
+        requests_and_outcomes = store.stored_flights()
         self._store = store
-        self._requests = {number: request for number, (request, _) in stored_flights.items()}
-        self.flown = {number: flight for number, (_, flight) in stored_flights.items()}
+        self._requests = {number: request for number, (request, _) in requests_and_outcomes.items()}
+        self.flown = {number: flight for number, (_, flight) in requests_and_outcomes.items()}
 
     def missing(self, requests: list[RequestedFlight]) -> list[RequestedFlight]:
-        """Return the requests that are not in the table.  Raises StoreError if a number has another request there."""
+        """Return the requests that are not in the table. Raises StoreError if a number has another request there."""
         for request in requests:
             if self._requests.get(request.number, request) != request:
                 path = self._store.path
@@ -283,7 +283,7 @@ class _StoredFlights:
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
         """Write a flight to the table."""
         self._store.add(request, row)
-        self.flown[request.number] = FlownFlight(row.outcome, row.failed, row.narrow)
+        self.flown[request.number] = FlownFlight(row.outcome, row.failed, row.marginal_passes)
 
 
 def _fly_round(
@@ -294,18 +294,18 @@ def _fly_round(
     progress: "_ProgressReport",
 ) -> None:
     remaining_requests = iter(missing_requests)
-    requests: dict[FlightRequest, RequestedFlight] = {}
+    requested_by_request: dict[FlightRequest, RequestedFlight] = {}
 
     def next_flight_request() -> FlightRequest | None:
         requested_flight = next(remaining_requests, None)
         if requested_flight is None:
             return None
         request = search.request(requested_flight)
-        requests[request] = requested_flight
+        requested_by_request[request] = requested_flight
         return request
 
     for request, row in pool.fly(next_flight_request):
-        stored_flights.add(requests[request], row)
+        stored_flights.add(requested_by_request[request], row)
         progress.report(len(stored_flights.flown))
 
 

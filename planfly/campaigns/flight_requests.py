@@ -112,12 +112,12 @@ class CampaignCopy:
         self._unpacked: tuple[CampaignBase, FlyOne] | None = None
 
     def fly(self, request: FlightRequest, worker: str) -> FlightRow:
-        """Fly a flight on this worker.  Raises WorkerError if this worker would fly it differently."""
+        """Fly a flight on this worker. Raises WorkerError if this worker would fly it differently."""
         base, fly = self.unpack(worker)
         return replace(fly(base, request.index, request.wind), worker=worker)
 
     def unpack(self, worker: str) -> tuple[CampaignBase, FlyOne]:
-        """Return the campaign and the function that flies it.  Raises WorkerError if this worker's software differs."""
+        """Return the campaign and the function that flies it. Raises WorkerError if this worker's software differs."""
         if self._unpacked is None:
             check_fingerprint(self._own_fingerprint, fingerprint(self._aircraft), worker)
             base, fly = pickle.loads(self._packed)

@@ -104,7 +104,7 @@ def waypoint_crossings(route: Route, track: Track) -> Singles:
     """Return the distance right of and above each of s stops at closest approach, m, (s, 2); NaN if not reached.
 
     A stop is a waypoint, or the corner at which a loiter or a return starts; later corners are omitted, because their
-    number differs between flights.  Right is relative to the mean of the incoming and outgoing courses.
+    number differs between flights. Right is relative to the mean of the incoming and outgoing courses.
     """
     points = route.waypoints
     crossings = np.full((len(points), 2), np.nan, dtype=np.float32)
@@ -181,14 +181,14 @@ _REAL = Column("REAL NOT NULL")
 # Column of an array stored as bytes.
 _BLOB = Column("BLOB NOT NULL")
 # Column of the failed findings, as JSON.
-_FAILED = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_findings)
+_FAILED_FINDINGS = Column("TEXT NOT NULL", _failed_findings_text, parse_failed_findings)
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRow:
     """Row of a flight in the campaign's table; each field ``Annotated`` with a `Column` is a column.
 
-    The draw has one column for each dispersion.  The margins have two columns for each rule, and one for the closeness.
+    The draw has one column for each dispersion. The margins have two columns for each rule, and one for the closeness.
     The tables of `planfly.campaigns.tables` are derived from this class.
 
     ended: "completed", or the reason why the flight ended early.
@@ -201,13 +201,13 @@ class FlightRow:
     flown.
     seconds: computing time, s.
     worker: name of the worker that flew the flight.
-    narrow: marginal passes with their margins; the table of a campaign does not store them.
+    marginal_passes: marginal passes with their margins; the table of a campaign does not store them.
     """
 
     draw: Draw
     outcome: Annotated[Outcome, _TEXT]
     ended: Annotated[str, _TEXT]
-    failed: Annotated[tuple[tuple[str, Place], ...], _FAILED] = ()
+    failed: Annotated[tuple[tuple[str, Place], ...], _FAILED_FINDINGS] = ()
     margins: tuple[tuple[str, MinimumMargin], ...] = ()
     energy_left: Annotated[float | None, Column("REAL")] = None
     duration: Annotated[float, _REAL] = 0.0
@@ -216,7 +216,7 @@ class FlightRow:
     crossings: Annotated[bytes, Column("BLOB NOT NULL", entry=(2,))] = b""
     seconds: Annotated[float, Column("REAL NOT NULL", same=False)] = 0.0
     worker: Annotated[str, Column("TEXT NOT NULL", same=False)] = ""
-    narrow: tuple[MarginalPass, ...] = ()
+    marginal_passes: tuple[MarginalPass, ...] = ()
 
     @property
     def closeness(self) -> float:
@@ -266,7 +266,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         duration=float(track.time[-1]) if has_rows else 0.0,
         clearance=clearance_profile(route, track).tobytes() if has_rows else b"",
         crossings=waypoint_crossings(route, track).tobytes() if has_rows else b"",
-        narrow=find_marginal_passes(flight.verdict.findings, varied_flight.setup.scenario, track),
+        marginal_passes=find_marginal_passes(flight.verdict.findings, varied_flight.setup.scenario, track),
         seconds=time.perf_counter() - start_time,
     )
 

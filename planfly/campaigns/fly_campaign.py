@@ -33,7 +33,7 @@ class _FlightTally:
         """Add a flight, and decide as soon as the flights before the first missing index allow a decision."""
         self.later_outcomes[index] = outcome
         while not self.is_decided and (next_outcome := self.later_outcomes.pop(self.tally.flown, None)) is not None:
-            self.tally = _with_outcome(self.tally, next_outcome)
+            self.tally = _add_outcome(self.tally, next_outcome)
             self.is_decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def next_request(self) -> FlightRequest | None:
@@ -47,9 +47,9 @@ class _FlightTally:
         return FlightRequest(self.next_index - 1)
 
 
-def _with_outcome(tally: Tally, outcome: str) -> Tally:
-    flyable, failed, lost = tally
-    return Tally(flyable + (outcome == "flyable"), failed + (outcome == "not flyable"), lost + (outcome == "lost"))
+def _add_outcome(tally: Tally, outcome: str) -> Tally:
+    flyable, not_flyable, lost = tally
+    return Tally(flyable + (outcome == "flyable"), not_flyable + (outcome == "not flyable"), lost + (outcome == "lost"))
 
 
 def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
@@ -89,7 +89,7 @@ def fly_campaign(
     """Fly the flights missing from the table until the goal has its number of flights or its answer.
 
     Flights are counted in the order of their indices, so that answer and table do not depend on the speed of the
-    workers; flights after the deciding flight are deleted.  Flights completed before an error or Ctrl-C stay in the
+    workers; flights after the deciding flight are deleted. Flights completed before an error or Ctrl-C stay in the
     table.
     """
     estimator = Estimator(goal)
@@ -101,7 +101,7 @@ def fly_campaign(
         progress = _ProgressReport(goal, estimator, flight_tally.tally, advance)
         with worker_pool(workers, base, fly) as pool:
             _fly_remaining(pool, flight_tally, store, progress)
-    store.delete_flights_from(flight_tally.tally.flown)
+    store.delete_later_flights(flight_tally.tally.flown)
     return estimator.estimate(store.tally())
 
 

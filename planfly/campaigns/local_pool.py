@@ -49,9 +49,9 @@ class _Worker:
     def __init__(self, copy: CampaignCopy) -> None:
         self._copy = copy
         self._pool: ProcessPoolExecutor | None = None
-        # Process of this worker, if there is one.
+        # Process of this worker in a list, empty without a process.
         self.processes: list[BaseProcess] = []
-        self._started: Future[None] = Future()
+        self._start_future: Future[None] = Future()
 
     def send(self, request: FlightRequest) -> Future[FlightRow]:
         """Send a flight to the process."""
@@ -70,14 +70,14 @@ class _Worker:
             # The pool has one process, so that its flight is known if the process dies.
             self._pool = ProcessPoolExecutor(1, mp_context=get_context("spawn"), initializer=end_with_parent)
             # The campaign is not an argument of the process, because the start would wait for the imports it needs.
-            self._started = self._pool.submit(_initialise_worker, self._copy)
+            self._start_future = self._pool.submit(_initialise_worker, self._copy)
             self.processes = [child for child in active_children() if child not in other_children]
         return self._pool.submit(_fly_request, request)
 
     @property
     def has_started(self) -> bool:
         """True if the last process has started its first flight."""
-        return self._started.done() and self._started.exception() is None
+        return self._start_future.done() and self._start_future.exception() is None
 
     def close(self) -> None:
         """Free the semaphores of a worker whose process has ended."""
@@ -115,26 +115,29 @@ class LocalPool:
         next_request: returns the next request, or None if there is none at present; called again after each flight.
         Raises the `world.errors.PlanflyError` of a flight, and OSError if no process can be started.
         """
-        idle = list(self._workers)
+        idle_workers = list(self._workers)
         flying: dict[Future[FlightRow], tuple[_Worker, FlightRequest]] = {}
-        retries: deque[FlightRequest] = deque()
-        deaths: Counter[FlightRequest] = Counter()
+        requests_to_retry: deque[FlightRequest] = deque()
+        death_counts: Counter[FlightRequest] = Counter()
         try:
             while True:
-                while idle and (request := retries.popleft() if retries else next_request()) is not None:
-                    worker = idle.pop()
+                while (
+                    idle_workers
+                    and (request := requests_to_retry.popleft() if requests_to_retry else next_request()) is not None
+                ):
+                    worker = idle_workers.pop()
                     flying[worker.send(request)] = worker, request
                 if not flying:
                     return
                 for future in wait(flying, return_when=FIRST_COMPLETED).done:
                     worker, request = flying.pop(future)
-                    idle.append(worker)
+                    idle_workers.append(worker)
                     row = self._result_row(future, worker, request)
                     if row is None:
-                        deaths[request] += worker.has_started
+                        death_counts[request] += worker.has_started
                         _end_workers([worker])
-                        if deaths[request] < MAX_WORKER_DEATHS:
-                            retries.append(request)
+                        if death_counts[request] < MAX_WORKER_DEATHS:
+                            requests_to_retry.append(request)
                             continue
                         row = make_lost_row(self._base, request.index, LOST_REASON)
                     yield FinishedFlight(request, row)
@@ -142,7 +145,7 @@ class LocalPool:
             _end_workers(worker for worker, _ in flying.values())
 
     def _result_row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
-        """Return the row of a flight, or None if its process has died.  Raises the errors of `fly`."""
+        """Return the row of a flight, or None if its process has died. Raises the errors of `fly`."""
         try:
             row = future.result()
         except BrokenProcessPool:

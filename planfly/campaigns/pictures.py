@@ -371,7 +371,7 @@ class ChartDirection:
     from_deg: direction from which the wind blows, degrees.
     boundary: estimate of the strongest wind with the target probability, m/s.
     low, high: interval of the boundary, m/s.
-    reaches: True if the boundary is beyond the maximum wind of the search.
+    is_beyond_search: True if the boundary is beyond the maximum wind of the search.
     flights: wind speed, number of flights and number of flyable flights, for the marks.
     """
 
@@ -379,7 +379,7 @@ class ChartDirection:
     boundary: float
     low: float
     high: float
-    reaches: bool
+    is_beyond_search: bool
     flights: tuple[tuple[float, int, int], ...]
 
 
@@ -415,7 +415,7 @@ def draw_go_no_go(
         # The largest wind of the search is not a limit of the mission.
         axes.plot(fine_angles, np.where(boundary < max_speed - 1e-6, boundary, np.nan), color=INK_COLOUR, linewidth=1.8)
         for direction in directions:
-            if direction.reaches:
+            if direction.is_beyond_search:
                 marker = (3, 0, -direction.from_deg)
                 axes.plot(
                     np.radians(direction.from_deg),
@@ -452,7 +452,7 @@ def draw_go_no_go(
             fontsize=9,
             color=QUIET_COLOUR,
         )
-        open_edge = max_speed if any(direction.reaches for direction in directions) else None
+        open_edge = max_speed if any(direction.is_beyond_search for direction in directions) else None
         _draw_legend(figure, target, confidence, wind, open_edge)
     return figure
 

@@ -118,7 +118,7 @@ def _render_page(template: str, **values: object) -> str:
 
 
 def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """Return the page of a go/no-go chart.  Changes the figure to the narrow layout."""
+    """Return the page of a go/no-go chart. Changes the figure to the narrow layout."""
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
     page = _render_page(
         "winds.html",
@@ -133,7 +133,7 @@ def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tupl
 
 
 def _draw_both_widths(figure: Figure, caption: str) -> Markup:
-    """Return a picture for a page in two widths, for desktops and phones.  Changes the figure to the narrow layout."""
+    """Return a picture for a page in two widths, for desktops and phones. Changes the figure to the narrow layout."""
     wide_svg = page_svg(figure, caption)
     narrow_svg = page_svg(narrow_figure(figure), f"{caption} (narrow)")
     return Markup(f'<div class="wide">{wide_svg}</div><div class="narrow">{narrow_svg}</div>')
@@ -340,8 +340,8 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 WINDS_SCHEMA = "planfly.winds/1"
 
 
-def make_spokes(winds: WindsFound) -> list[ChartDirection]:
-    """Return the spokes of the go/no-go chart, one for each direction."""
+def chart_directions(winds: WindsFound) -> list[ChartDirection]:
+    """Return the directions of the go/no-go chart, with the flights in each."""
     directions = []
     for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
@@ -359,10 +359,10 @@ def make_spokes(winds: WindsFound) -> list[ChartDirection]:
 
 def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: str) -> None:
     """Write ``winds.json``, ``winds.png`` and ``winds.html``."""
-    goal, directions = winds.goal, make_spokes(winds)
+    goal, spokes = winds.goal, chart_directions(winds)
     wind = base.scenario.wind
     scenario_wind = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
-    figure = draw_go_no_go(directions, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
+    figure = draw_go_no_go(spokes, goal.most, goal.target, goal.confidence, base.name, scenario_wind)
     rows = [
         (
             f"{spoke.from_deg:g}°",
@@ -370,7 +370,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: st
             _interval_text(spoke.low, spoke.high, goal.most),
             str(sum(count for _, count, _ in spoke.flights)),
         )
-        for spoke in directions
+        for spoke in spokes
     ]
     data = {
         "schema": WINDS_SCHEMA,
@@ -386,13 +386,13 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: st
                 "from_deg": spoke.from_deg,
                 "boundary_mps": round(spoke.boundary, 3),
                 "interval_mps": [round(spoke.low, 3), round(spoke.high, 3)],
-                "beyond": spoke.reaches,
+                "beyond": spoke.is_beyond_search,
                 "flown": [
                     {"speed_mps": round(speed, 3), "flights": count, "flyable": flyable}
                     for speed, count, flyable in spoke.flights
                 ],
             }
-            for spoke in directions
+            for spoke in spokes
         ],
         "calm": None if winds.calm is None else _calm_document(winds.calm),
         "spread": base.dispersions.to_json(),
@@ -409,7 +409,7 @@ def _calm_document(calm: CalmFailures) -> dict[str, Any]:
     return {
         "speed_mps": round(calm.speed, 3),
         "flights": calm.flights,
-        "not_flyable": calm.failed,
+        "not_flyable": calm.failed_count,
         "failed_by_rule": failures_document(calm.by_rule),
     }
 
@@ -438,7 +438,7 @@ def _unsettled_directions(winds: WindsFound) -> list[int]:
 def answer_state(winds: WindsFound) -> str:
     """Return the state of the answer: "missed" in calm air, "undecided" with too few flights, otherwise ""."""
     calm = winds.calm
-    if calm is not None and wilson(calm.flights - calm.failed, calm.flights)[1] < winds.goal.target:
+    if calm is not None and wilson(calm.flights - calm.failed_count, calm.flights)[1] < winds.goal.target:
         return "missed"
     return "undecided" if calm is not None or _unsettled_directions(winds) else ""
 
@@ -491,12 +491,12 @@ def _calm_lines(winds: WindsFound) -> list[str]:
     if calm is None:
         return []
     wind = "calm air" if calm.speed < CALM_MPS else f"{calm.speed:.1f} m/s, the weakest wind flown"
-    return [f"in {wind}, {calm.failed} of {calm.flights} flights fail", *failure_lines(calm.by_rule)]
+    return [f"in {wind}, {calm.failed_count} of {calm.flights} flights fail", *failure_lines(calm.by_rule)]
 
 
 def _winds_answer(winds: WindsFound) -> str:
     """Return the answer of a search in a line, with the lowest and the highest boundary."""
-    directions, target = make_spokes(winds), winds.goal.target
+    directions, target = chart_directions(winds), winds.goal.target
     lowest_direction, highest_direction = (
         select(directions, key=lambda spoke: spoke.boundary) for select in (min, max)
     )

@@ -57,7 +57,7 @@ class Examination(NamedTuple):
         >>> Examination([0, 1, 3], [2]).text()
         'flight 2 is damaged and was taken out: 3 flights are intact and stay; --resume flies the missing ones'
         """
-        kept_text = f"{len(self.undamaged)} flights are intact and stay; --resume flies the missing ones"
+        intact_text = f"{len(self.undamaged)} flights are intact and stay; --resume flies the missing ones"
         later_text = ""
         if self.last_known is not None:
             later_text = (
@@ -66,7 +66,7 @@ class Examination(NamedTuple):
                 else ", and no flight is found"
             )
         if not self.damaged:
-            return f"is damaged{later_text}: {kept_text}"
+            return f"is damaged{later_text}: {intact_text}"
         numbers_text = ", ".join(map(str, self.damaged[:_MAX_LISTED]))
         more_text = f" and {len(self.damaged) - _MAX_LISTED} more" if len(self.damaged) > _MAX_LISTED else ""
         has_several = len(self.damaged) > 1
@@ -74,7 +74,7 @@ class Examination(NamedTuple):
             f"flight{'s' if has_several else ''} {numbers_text}{more_text} {'are' if has_several else 'is'} damaged"
         )
         removed_text = f"{'were' if has_several else 'was'} taken out"
-        return f"{damaged_text} and {removed_text}{later_text}: {kept_text}"
+        return f"{damaged_text} and {removed_text}{later_text}: {intact_text}"
 
 
 def examine_table(

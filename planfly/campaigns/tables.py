@@ -1,7 +1,7 @@
 """Tables of flights: SQLite files that are written flight by flight, and read as rows or as columns.
 
-The table of a campaign has one row per flight, keyed by the index of its draw.  The table of a search for winds has one
-row per flight, in the order of requests.  One process at a time can lock a table; opening a table drops all rows with a
+The table of a campaign has one row per flight, keyed by the index of its draw. The table of a search for winds has one
+row per flight, in the order of requests. One process at a time can lock a table; opening a table drops all rows with a
 wrong checksum.
 """
 
@@ -115,7 +115,7 @@ class TableKind:
     """Kind of a table file.
 
     name: name of the schema.
-    columns: name and kind of each column of the table of flights; the first is the key, the number of the flight.  A
+    columns: name and kind of each column of the table of flights; the first is the key, the number of the flight. A
     checksum of all columns follows them.
     fixed: settings that must stay the same when the table is resumed.
     """
@@ -153,7 +153,7 @@ class LockedTable:
             raise StoreError(f"{path}: no such campaign to resume", file=path)
         self._connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
         try:
-            with converted_errors(path):
+            with convert_errors(path):
                 self._prepare_file(settings)
             self._file = path.stat()
         except BaseException:
@@ -273,23 +273,23 @@ class LockedTable:
     def insert(self, values: Mapping[str, Any]) -> None:
         """Write a flight durably, one value per column.
 
-        Raises OSError for a full disk or a removed table; earlier flights stay in the file.  Raises StoreError for a
+        Raises OSError for a full disk or a removed table; earlier flights stay in the file. Raises StoreError for a
         number that the table already has.
         """
         self._check_not_removed()
-        with converted_errors(self.path):
+        with convert_errors(self.path):
             row = [stored_value(values[name], kind) for name, kind in self._kind.columns.items()]
             placeholders = ", ".join("?" * (len(row) + 1))
             self._connection.execute(f"INSERT INTO flights VALUES ({placeholders})", [*row, checksum(row)])
 
-    def delete_flights_from(self, flight: int) -> None:
-        """Delete all flights from a number on, because an earlier flight decided the campaign.
+    def delete_later_flights(self, first_number: int) -> None:
+        """Delete the flights with this number or a larger one, because an earlier flight decided the campaign.
 
         Raises OSError for a table that was removed.
         """
         self._check_not_removed()
-        with converted_errors(self.path):
-            self._connection.execute("DELETE FROM flights WHERE flight >= ?", (flight,))
+        with convert_errors(self.path):
+            self._connection.execute("DELETE FROM flights WHERE flight >= ?", (first_number,))
 
     def _check_not_removed(self) -> None:
         """Raise OSError if the file was deleted; on POSIX, writing to it would succeed, but the data would be lost."""
@@ -314,7 +314,7 @@ def read_stored_settings(path: Path) -> dict[str, Any]:
     """
     if not path.is_file():
         return {}
-    with converted_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
+    with convert_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
         settings = _read_settings(connection)
     if settings:
         _check_settings_intact(settings, path)
@@ -351,7 +351,7 @@ def check_not_locked(path: Path) -> None:
         connection.close()
 
 
-class converted_errors:
+class convert_errors:
     """Context that converts SQLite errors about a file: to OSError for a full disk, otherwise to StoreError."""
 
     def __init__(self, path: Path) -> None:
@@ -396,7 +396,7 @@ class Store(LockedTable):
     """Table of a campaign, locked by one process at a time; the number of a flight is the index of its draw."""
 
     def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
-        """Create the table, or open it to resume.  Raises StoreError if it contains more flights than requested."""
+        """Create the table, or open it to resume. Raises StoreError if it contains more flights than requested."""
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
@@ -405,7 +405,7 @@ class Store(LockedTable):
             raise StoreError(f"{self.path}: {reason}", file=self.path)
 
     def add(self, row: FlightRow) -> None:
-        """Write a flight durably.  Raises OSError for a full disk; earlier flights stay in the file."""
+        """Write a flight durably. Raises OSError for a full disk; earlier flights stay in the file."""
         self.insert({"flight": row.draw.index, **row_values(replace(row, made_of=self.made_of))})
 
     def outcomes(self) -> dict[int, str]:
@@ -507,7 +507,7 @@ class FlownFlight:
 
     outcome: Outcome
     failed: tuple[tuple[str, Place], ...]
-    narrow: tuple[MarginalPass, ...] = ()
+    marginal_passes: tuple[MarginalPass, ...] = ()
 
 
 class WindsStore(LockedTable):
@@ -518,14 +518,14 @@ class WindsStore(LockedTable):
         super().__init__(path, WINDS_KIND, made_of, settings, resume=resume)
 
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
-        """Write a flight durably.  Raises OSError for a full disk; earlier flights stay in the file."""
+        """Write a flight durably. Raises OSError for a full disk; earlier flights stay in the file."""
         request_values = {
             "flight": request.number,
             "direction": request.direction,
             "asked_speed": request.speed,
             "draw": request.draw,
             "narrow": json.dumps(
-                [{"rule": rule, "margin": margin, **asdict(place)} for rule, place, margin in row.narrow]
+                [{"rule": rule, "margin": margin, **asdict(place)} for rule, place, margin in row.marginal_passes]
             ),
         }
         self.insert({**request_values, **row_values(replace(row, made_of=self.made_of))})
@@ -538,9 +538,9 @@ class WindsStore(LockedTable):
         return {
             number: (
                 RequestedFlight(number, *request),
-                FlownFlight(outcome, parse_failed_findings(failed), parse_marginal_passes(narrow)),
+                FlownFlight(outcome, parse_failed_findings(failed_text), parse_marginal_passes(passes_text)),
             )
-            for number, *request, outcome, failed, narrow in rows
+            for number, *request, outcome, failed_text, passes_text in rows
         }
 
 
@@ -569,8 +569,8 @@ _TYPES: dict[str, type] = {"INTEGER": np.int64, "REAL": np.float64, "TEXT": obje
 def read_table(path: Path) -> dict[str, NDArray[Any]]:
     """Return the columns (n,) of a campaign's table, keyed by name, in the order of flights; without array columns.
 
-    Numbers are float64, NaN if missing, or int64.  Texts are Python strings, None if missing; equal strings share
-    memory.  The result takes about 60 MB for 100,000 flights.
+    Numbers are float64, NaN if missing, or int64. Texts are Python strings, None if missing; equal strings share
+    memory. The result takes about 60 MB for 100,000 flights.
     Raises StoreError for a file that planfly did not write, or that another process has locked.
     """
     names = tuple(name for name in CAMPAIGN_KIND.columns if name not in ARRAY_COLUMNS)
@@ -590,7 +590,7 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def count_flights(path: Path) -> int:
-    """Return the number of flights in a table of either kind.  Raises StoreError for other files and locked tables."""
+    """Return the number of flights in a table of either kind. Raises StoreError for other files and locked tables."""
     with _open_to_read(path) as connection:
         return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
 
@@ -621,7 +621,7 @@ def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[i
 def _open_to_read(path: Path) -> Iterator[sqlite3.Connection]:
     # Nothing is written, but a writable connection removes its -wal and -shm files when it closes.
     with (
-        converted_errors(path),
+        convert_errors(path),
         closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=rw", uri=True, timeout=1.0)) as connection,
     ):
         yield connection

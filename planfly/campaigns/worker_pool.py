@@ -67,7 +67,7 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
 
 
 def check_scheduler_address(address: str) -> str:
-    """Return a scheduler's address.  Raises SchedulerError for plain TCP beyond loopback; TLS is allowed for any host.
+    """Return a scheduler's address. Raises SchedulerError for plain TCP beyond loopback; TLS is allowed for any host.
 
     The reason is that the workers of a scheduler run any code sent to them.
 
@@ -101,7 +101,7 @@ def _is_loopback(host: str) -> bool:
 
 
 class FlightRate:
-    """Rate of flights since this object was made.  stored_count: number of flights in the table at the start."""
+    """Rate of flights since this object was created.  stored_count: number of flights in the table at the start."""
 
     def __init__(self, stored_count: int) -> None:
         self._stored_count = stored_count

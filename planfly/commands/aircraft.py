@@ -237,15 +237,15 @@ def _print_predictions(result: "planfly.IdentifiedAircraft", check: str | None) 
     for prediction in predicted.predictions:
         rms_text = ", ".join(f"{name} {rms:.2g}" for name, rms in zip(QUANTITIES, prediction.rms[0.5], strict=True))
         print(f"  ahead    {prediction.model}: {rms_text}")
-    shares_text = ", ".join(f"{100.0 * share:.0f}" for share in predicted.predictions[-1].whiteness)
+    whiteness_text = ", ".join(f"{100.0 * fraction:.0f}" for fraction in predicted.predictions[-1].whiteness)
     print(
-        f"  ahead    innovations of roll, pitch, yaw: white at {shares_text} % of lags to 0.5 s"
+        f"  ahead    innovations of roll, pitch, yaw: white at {whiteness_text} % of lags to 0.5 s"
         " (95 % in a complete model)"
     )
 
 
 def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
-    """Print the properties that the logs do not show, and the flights that would show them."""
+    """Print the properties that the logs do not determine, and the flights that would determine them."""
     if not result.estimate.dynamics:
         print("  performance only: fewer than 10 rows of inertial sensors or outputs a second do not show the moments")
     for log in result.slow:

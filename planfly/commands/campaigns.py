@@ -198,7 +198,7 @@ def _fly_again(args: argparse.Namespace, folder: Path) -> int:
 def _report_stored_flights(folder: Path, table: str) -> Iterator[Callable[[], int]]:
     """After an interruption, report the number of stored flights; yield a function that returns the exit code.
 
-    The exit code is 0 without an interruption.  An interruption before the table exists is raised again.
+    The exit code is 0 without an interruption. An interruption before the table exists is raised again.
     """
     code = 0
     try:

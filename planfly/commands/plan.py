@@ -179,17 +179,17 @@ def _json_answer(plan: "Plan", target: "Path", code: int) -> object:
 @contextmanager
 def _stop_on_interrupt() -> Iterator[Callable[[], bool]]:
     """Yield a function that returns True after Ctrl-C, to stop a search; a second Ctrl-C ends the command."""
-    was_pressed = False
+    is_interrupted = False
 
     def handle_signal(_signal: int, _frame: FrameType | None) -> None:
-        nonlocal was_pressed
-        if was_pressed:
+        nonlocal is_interrupted
+        if is_interrupted:
             interrupt(signal.SIGINT)
-        was_pressed = True
+        is_interrupted = True
 
     previous_handler = signal.signal(signal.SIGINT, handle_signal)
     try:
-        yield lambda: was_pressed
+        yield lambda: is_interrupted
     finally:
         signal.signal(signal.SIGINT, previous_handler)
 

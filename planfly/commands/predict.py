@@ -67,16 +67,16 @@ def predict(args: argparse.Namespace) -> int:
 def _prediction_answer(result: "Predicted") -> object:
     from planfly.terminal.answers import PredictAnswer, PredictedQuantity
 
-    def known(value: float) -> float | None:
+    def none_if_nan(value: float) -> float | None:
         return None if math.isnan(value) else value
 
     quantities = [
         PredictedQuantity(
             name=band.name,
             unit=band.unit,
-            inside=known(band.inside),
-            half_width=known(band.half_width),
-            unchanged_half_width=known(band.unchanged),
+            inside=none_if_nan(band.inside),
+            half_width=none_if_nan(band.half_width),
+            unchanged_half_width=none_if_nan(band.unchanged),
         )
         for band in result.bands
     ]

@@ -1,7 +1,7 @@
 """List the commands, from which the parser, the help, the schemas and the dispatch are made.
 
 A command is a module of this package with two functions: ``NAME_options`` adds its parser to the command line's parser,
-and ``NAME`` takes the parsed arguments, calls the API, prints, and returns the exit code.  The API compiles the kernels
+and ``NAME`` takes the parsed arguments, calls the API, prints, and returns the exit code. The API compiles the kernels
 that it needs.
 All modules are light: the code that a command needs is imported when the command runs.
 """
@@ -34,10 +34,10 @@ class Command(NamedTuple):
     module: str = ""
     function: str = ""
 
-    def load(self, ending: str = "") -> Any:
-        """Return the function of the command; with the ending "_options", the function that adds its parser."""
+    def load(self, suffix: str = "") -> Any:
+        """Return the function of the command; with the suffix "_options", the function that adds its parser."""
         module = import_module(f"planfly.commands.{self.module or self.name}")
-        return getattr(module, (self.function or self.name) + ending)
+        return getattr(module, (self.function or self.name) + suffix)
 
 
 # Section titles of the help.
@@ -101,7 +101,7 @@ def build_parser() -> LineParser:
 def find_command(name: str) -> CommandFunction:
     """Return the function that executes a command; it takes parsed arguments and returns the exit code.
 
-    The function writes results to standard output and progress to standard error.  Raises KeyError for an unknown name.
+    The function writes results to standard output and progress to standard error. Raises KeyError for an unknown name.
 
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
@@ -126,7 +126,7 @@ def commands_with_json() -> list[str]:
 
 
 def answer_schema(name: str) -> dict[str, Any]:
-    """Return the JSON schema (draft 2020-12) of a command's answer.  Raises KeyError for a command without an answer.
+    """Return the JSON schema (draft 2020-12) of a command's answer. Raises KeyError for a command without an answer.
 
     >>> sorted(answer_schema("scenarios")["properties"])
     ['exit_code', 'scenarios', 'schema']

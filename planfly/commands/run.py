@@ -64,12 +64,14 @@ def run(args: argparse.Namespace) -> int:
     return code
 
 
-def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
+def _json_answer(result: "RunResult", has_rounds: bool, code: int) -> object:
     from planfly.terminal.answers import RoundAnswer, RunAnswer
 
     rounds = [
-        RoundAnswer(round=finished.number, changes=list(finished.changes), summary=finished.verdict.headline)
-        for finished in result.rounds
+        RoundAnswer(
+            round=finished_round.number, changes=list(finished_round.changes), summary=finished_round.verdict.headline
+        )
+        for finished_round in result.rounds
     ]
     return RunAnswer(
         exit_code=code,
@@ -77,25 +79,25 @@ def _json_answer(result: "RunResult", refined: bool, code: int) -> object:
         seed=result.seed,
         folder=str(result.folder),
         files=[file.name for file in result.files],
-        rounds=rounds if refined else [],
+        rounds=rounds if has_rounds else [],
         verdict=result.verdict.document(),
     )
 
 
-def _print_round(finished: "Round") -> None:
-    print_verdict(finished.verdict, finished.notes)
-    print_returns_line(finished.returns_line)
-    print_engine(finished.engine)
+def _print_round(finished_round: "Round") -> None:
+    print_verdict(finished_round.verdict, finished_round.notes)
+    print_returns_line(finished_round.returns_line)
+    print_engine(finished_round.engine)
     files = "plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown"
-    if finished.flown:
-        flight = "flight.mcap" if finished.has_log else "no flight"
+    if finished_round.flown:
+        flight = "flight.mcap" if finished_round.has_log else "no flight"
         files = f"report.html, map.png, profile.png, {flight}, verdict.json, plan.json, missions"
-    print(f"results   {finished.folder}/ ({files})")
+    print(f"results   {finished_round.folder}/ ({files})")
 
 
 def _print_rounds(result: "RunResult") -> None:
     print("rounds")
-    for finished in result.rounds:
-        changes = "; ".join(finished.changes) or "as given"
-        print(f"  {finished.number}  {finished.folder}/  {changes}: {finished.verdict.headline}")
+    for finished_round in result.rounds:
+        changes = "; ".join(finished_round.changes) or "as given"
+        print(f"  {finished_round.number}  {finished_round.folder}/  {changes}: {finished_round.verdict.headline}")
     print(f"  {result.ended}")

@@ -30,7 +30,7 @@ def serve_options(command_line: LineParser) -> None:
         "simulate a MAVLink vehicle: a ground station uploads a mission, arms and starts the vehicle, and monitors it",
         "planfly serve mission.waypoints --terrain jacksboro",
         extra="live",
-        more=_VEHICLE_HELP,
+        details=_VEHICLE_HELP,
     )
     with_completer(
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="mission to load at start-up"),

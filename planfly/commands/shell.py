@@ -60,14 +60,14 @@ def show_help(args: argparse.Namespace) -> int:
     # Imported here: the registry lists this module.
     from planfly.commands.registry import build_parser, commands_with_json, schema_text
 
-    line = build_parser()
+    line_parser = build_parser()
     if args.topic is None:
         if args.schema:
             return _report_bad_usage("--schema: name a command, as in planfly help fly --schema")
-        line.print_help()
+        line_parser.print_help()
         return FLYABLE
-    if args.topic not in line.commands:
-        return _report_bad_usage(f"{args.topic!r}: no such command{did_you_mean(args.topic, line.commands)}")
+    if args.topic not in line_parser.commands:
+        return _report_bad_usage(f"{args.topic!r}: no such command{did_you_mean(args.topic, line_parser.commands)}")
     if args.schema:
         if args.topic not in commands_with_json():
             return _report_bad_usage(
@@ -75,7 +75,7 @@ def show_help(args: argparse.Namespace) -> int:
             )
         print(schema_text(args.topic), end="")
         return FLYABLE
-    line.commands[args.topic].print_help()
+    line_parser.commands[args.topic].print_help()
     return FLYABLE
 
 

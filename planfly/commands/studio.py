@@ -38,7 +38,7 @@ def studio_options(command_line: LineParser) -> None:
         "planfly studio jacksboro",
         "planfly studio mission.waypoints --terrain jacksboro --no-browser",
         extra="studio",
-        more=_CONTROLS_HELP,
+        details=_CONTROLS_HELP,
     )
     with_completer(
         parser.add_argument(

@@ -15,7 +15,7 @@ from aircraft.identification.motor import Motor
 from aircraft.identification.motor_table import MotorTable
 from aircraft.identification.propeller_disc import PropellerDisc
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from world.arrays import Floats
 from world.errors import FlightError
 
@@ -75,7 +75,7 @@ class _Probe:
         read = fdm.properties.getter
         self.chord = read("metrics/cbarw-ft")() * 0.3048
         self._span, self._area = aircraft.wing_span, aircraft.wing_area
-        trim = straight(fdm, aircraft.airspeed, _AMSL)
+        trim = steady_flight(fdm, aircraft.airspeed, _AMSL)
         if trim is None:
             raise FlightError(f"{aircraft.name}: no level flight at cruise to begin with", file=aircraft.name)
         self._airspeed = aircraft.airspeed

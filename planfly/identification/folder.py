@@ -19,8 +19,8 @@ from aircraft.uncertainty import Draws, draws_text
 from flight.autopilots.arduplane.parameters import DEFINITIONS, ArduPilotParameters
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import straight
-from flight.guidance.model_gains import gains_of_model, gains_text
+from flight.dynamics.trim import steady_flight
+from flight.guidance.model_gains import gains_from_model, gains_text
 from flight.mission_files.wpl import waypoints_text
 from logs.importers.motion import MotionLog
 from planfly.identification.drive_check import DriveConflict, drive_conflict
@@ -149,7 +149,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
         files = {
             f"{name}.xml": xml,
             f"{name}.toml": toml.read_text(encoding="utf-8"),
-            "gains.toml": gains_text(gains_of_model(aircraft)),
+            "gains.toml": gains_text(gains_from_model(aircraft)),
         }
         if home is not None:
             mission = identification_mission(aircraft, envelope, *home)
@@ -164,7 +164,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
 
 def _check_level_flight(identified: Identified, aircraft: Aircraft) -> None:
     """Raise LogError, with the reason, if the identified model holds no level flight at cruise."""
-    if straight(Fdm(aircraft), identified.cruise, AMSL) is not None:
+    if steady_flight(Fdm(aircraft), identified.cruise, AMSL) is not None:
         return
     numbers, source = identified.numbers, identified.logs[-1].source
     elevator, throttle = level_controls(numbers, identified.estimate.values, identified.cruise, DENSITY)

@@ -162,7 +162,7 @@ class ServedFlights:
         with contextlib.suppress(PlanflyError):
             setup = make_setup(scenario, self._airframe, Mission(None, items), self._served.seed)
             judge_geometry(setup)
-            rows, _ = Flight(setup, self.aircraft).block(30)
+            rows, _ = Flight(setup, self.aircraft).fly_block(30)
             judge_flight(setup, as_track(rows), "warm")
 
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
@@ -175,13 +175,13 @@ class ServedFlights:
             setup = make_setup(served_scenario.scenario, self._airframe, request.mission, served_scenario.seed)
             # The first tick shows if the flight can start, and compiles the flight loop.
             flight = Flight(setup, self.aircraft)
-            flight.block(1)
+            flight.fly_block(1)
         except PlanflyError as error:
             text = StatusText(f"mission cannot be flown: {error}", CRITICAL)
             return None, MissionJudged(request.number, False, False, (text,))
         verdict = judge_geometry(setup)
         home = request.mission.home
-        start = SnapshotMaker(setup, flight.map).before_start(setup)
+        start = SnapshotMaker(setup, flight.map).start_snapshot(setup)
         if home is None:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)

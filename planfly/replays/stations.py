@@ -37,7 +37,7 @@ def play_to_stations(
     snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
     track = log.track
     rows = track_rows(track)
-    start = snapshots.before_start(log.setup)
+    start = snapshots.start_snapshot(log.setup)
     home = log.setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
     status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
     items = log.setup.route.items
@@ -54,7 +54,7 @@ def play_to_stations(
             log_time = (link.clock() - start_time) * speed
             k = min(len(rows) - 1, int(np.searchsorted(track.time, log_time, side="right")))
             snapshot = snapshots.snapshot(rows[k])
-            if snapshot.finite:
+            if snapshot.is_finite:
                 status.snapshot = snapshot
                 status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
             player.step(0.01)
@@ -101,7 +101,7 @@ class _Player:
         now = self._link.clock()
         self._status.boot, self._status.wall = now - self._start_time, time.time()
         self._link.receive()
-        for notice in self._link.take_notices():
+        for notice in self._link.pop_notices():
             self._on_message(notice)
         if now >= self._next_heartbeat:
             self._next_heartbeat = now + 1.0

@@ -21,7 +21,7 @@ from world.kernel_cache import VARIABLE, can_write
 # ----------------------------------------------------------------------
 # Units of kernels are compiled by separate processes, which store them in the cache.
 
-# Number of processes; more would wait for each other, because the longest unit takes nearly half of the total time.
+# Number of processes; with more, some would only wait, because the longest unit takes nearly half of the total time.
 PROCESS_COUNT = 2
 # Arguments of Python; -P leaves out the current folder, whose modules may have the names of planfly's modules.
 PYTHON_ARGUMENTS = ("-P", "-m", "planfly.kernel_units")
@@ -35,20 +35,21 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
     units: names of units, the longest first.  on_ready: called with the number of kernels that are ready.
     The processes end with this call, even if it raises an error, and with this process.
     """
-    units_left, lines = deque(units), queue.SimpleQueue[str]()
-    count = min(PROCESS_COUNT, len(units), os.cpu_count() or 1)
-    processes = [_start_process(folder) for _ in range(count)]
+    remaining_units, lines = deque(units), queue.SimpleQueue[str]()
+    process_count = min(PROCESS_COUNT, len(units), os.cpu_count() or 1)
+    processes = [_start_process(folder) for _ in range(process_count)]
     threads = [
-        threading.Thread(target=_feed_process, args=(process, units_left, lines), daemon=True) for process in processes
+        threading.Thread(target=_feed_process, args=(process, remaining_units, lines), daemon=True)
+        for process in processes
     ]
     try:
         for thread in threads:
             thread.start()
         ready_kernels: set[str] = set()
-        ended_count = 0
-        while ended_count < count:
+        ended_process_count = 0
+        while ended_process_count < process_count:
             line = lines.get()
-            ended_count += line == _END_OF_OUTPUT
+            ended_process_count += line == _END_OF_OUTPUT
             state, _, name = line.partition(" ")
             if state == "ready" and name not in ready_kernels:
                 ready_kernels.add(name)
@@ -75,13 +76,15 @@ def _start_process(folder: Path) -> "subprocess.Popen[str]":
     )
 
 
-def _feed_process(process: "subprocess.Popen[str]", units_left: "deque[str]", lines: "queue.SimpleQueue[str]") -> None:
-    """Send a process one unit after another, and queue its output lines; an empty line marks its end."""
+def _feed_process(
+    process: "subprocess.Popen[str]", remaining_units: "deque[str]", lines: "queue.SimpleQueue[str]"
+) -> None:
+    """Send a process one unit after another, and queue its output lines; an empty line marks the end of the process."""
     requests, answers = process.stdin, process.stdout
     # The process may have died, or the other process may have taken the last unit.
     with contextlib.suppress(OSError, IndexError):
         while requests is not None and answers is not None:
-            requests.write(f"{units_left.popleft()}\n")
+            requests.write(f"{remaining_units.popleft()}\n")
             line = "ready"
             while line.startswith("ready"):
                 line = answers.readline()
@@ -98,8 +101,8 @@ def _feed_process(process: "subprocess.Popen[str]", units_left: "deque[str]", li
 # ----------------------------------------------------------------------
 # Warm-up: when the first kernel has to be compiled, all kernels that the work needs are compiled in parallel.
 
-_Taken = ParamSpec("_Taken")
-_Given = TypeVar("_Given")
+_Parameters = ParamSpec("_Parameters")
+_Result = TypeVar("_Result")
 
 # Title of the stage; a command may show it more than once, because each group is compiled at its first use.
 STAGE_TITLE = "compiling numeric kernels"
@@ -115,7 +118,7 @@ _compiled_units: set[str] = set()
 def warm_up(*units: str) -> Iterator[None]:
     """Compile all kernels of units as soon as the code inside needs a kernel that is not cached.
 
-    units: units of `planfly.kernel_units` that the code will call, longest first.  They are compiled in two processes
+    units: units of `planfly.kernel_units` that the code will call, longest first. They are compiled in two processes
     before the code continues; if the cache cannot be written, each kernel is compiled when it is called.
     """
     has_reported = False
@@ -131,12 +134,12 @@ def warm_up(*units: str) -> Iterator[None]:
         yield
 
 
-def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_Taken, _Given]]:
+def with_warm_up(*units: str) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
     """Return a decorator that runs a function of the public API under `warm_up`."""
 
-    def decorate(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
+    def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
         @functools.wraps(function)
-        def with_kernels(*args: _Taken.args, **kwargs: _Taken.kwargs) -> _Given:
+        def with_kernels(*args: _Parameters.args, **kwargs: _Parameters.kwargs) -> _Result:
             with warm_up(*units):
                 return function(*args, **kwargs)
 

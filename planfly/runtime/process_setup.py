@@ -7,7 +7,7 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import TypeVar
 
-_Given = TypeVar("_Given")
+_Result = TypeVar("_Result")
 # Total number of values in all frames within `with_large_stack`; Numba recurses some 500 frames deep.
 _STACK_VALUES = 2**17
 # Environment variable of a process set up by `prepare_process`, inherited by its child processes.
@@ -15,7 +15,7 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Collect garbage seldom, and limit linear algebra to one thread.  Call this before NumPy is imported.
+    """Collect garbage rarely, and limit linear algebra to one thread. Call this before NumPy is imported.
 
     Garbage collection during imports took a quarter of the start-up time, and spinning threads a tenth; no matrix in
     planfly is large enough for a second thread.
@@ -26,9 +26,9 @@ def prepare_process() -> None:
 
 
 def prepare_child() -> None:
-    """Collect garbage seldom in a process that planfly started, such as the worker of a campaign.
+    """Collect garbage rarely in a process that planfly started, such as the worker of a campaign.
 
-    Garbage collection in the processes of a short campaign took a sixth of its time.  If the address space is limited,
+    Garbage collection in the processes of a short campaign took a sixth of its time. If the address space is limited,
     import only modules that fit (`world.address_space`).
     """
     if _OWN_PROCESS_VARIABLE in os.environ:
@@ -38,7 +38,7 @@ def prepare_child() -> None:
 
 def watch_address_space() -> None:
     """If the address space of this process is limited, import only modules that fit."""
-    limit = limit_of_address_space()
+    limit = address_space_limit()
     if limit is None:
         return
     # Imported here: few processes are limited, and `import planfly` in a script loads nothing else.
@@ -48,10 +48,10 @@ def watch_address_space() -> None:
         sys.meta_path.insert(0, RoomFinder(limit))
 
 
-def limit_of_address_space() -> int | None:
+def address_space_limit() -> int | None:
     """Return the number of bytes that this process may map, or None without a limit, as on Windows.
 
-    >>> limit_of_address_space() is None or limit_of_address_space() > 0
+    >>> address_space_limit() is None or address_space_limit() > 0
     True
     """
     try:
@@ -62,12 +62,12 @@ def limit_of_address_space() -> int | None:
     return None if limit == resource.RLIM_INFINITY else limit
 
 
-def with_large_stack(function: Callable[[], _Given]) -> _Given:
+def with_large_stack(function: Callable[[], _Result]) -> _Result:
     """Call a function with all frames in one large piece of memory, and return its result.
 
-    CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty.  Numba's recursion crosses
+    CPython keeps frames in pieces of 16 KB and frees the last piece as soon as it is empty. Numba's recursion crosses
     the boundary between two pieces so often that a sixth of its time was spent on memory pages that the operating
-    system reclaimed and provided again.  A frame with many values gets a piece of their size, and inner frames share
+    system took back and provided again. A frame with many values gets a piece of their size, and inner frames share
     this piece.
 
     >>> with_large_stack(lambda: 7)
@@ -77,5 +77,5 @@ def with_large_stack(function: Callable[[], _Given]) -> _Given:
     return FunctionType(large_frame_code, globals())(function)
 
 
-def _call(function: Callable[[], _Given]) -> _Given:
+def _call(function: Callable[[], _Result]) -> _Result:
     return function()

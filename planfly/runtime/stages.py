@@ -1,6 +1,6 @@
 """Report the progress of long work: the API reports stages, and its caller shows them.
 
-Without a receiver nothing is shown.  Only the compilation of kernels, up to a minute after an install, is then logged
+Without a receiver nothing is shown. Only the compilation of kernels, up to a minute after an install, is then logged
 as a warning of the logger ``planfly``, which Python writes to standard error unless logging is configured otherwise.
 """
 
@@ -18,8 +18,8 @@ Advance = Callable[[float, float, str], None]
 class Receiver(NamedTuple):
     """Receiver of progress.
 
-    stage: begins a stage with its title and its kind, and returns the function that takes its progress.
-    report_line: takes a line that belongs to no stage.
+    stage: function that starts a stage with its title and its kind, and returns the function that takes its progress.
+    report_line: function that takes a line that belongs to no stage.
     """
 
     stage: Callable[[str, str], AbstractContextManager[Advance]]
@@ -41,7 +41,7 @@ def send_progress_to(receiver: Receiver) -> Iterator[None]:
 
 
 def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
-    """Begin a stage of work; its context gives a function that takes done, total and a remark.
+    """Start a stage of work; its context yields a function that takes done, total and a remark.
 
     kind: common name of stages with the same pace, if the title is more specific ("planning" for any scenario).
 
@@ -97,7 +97,7 @@ def progress(callback: Callable[[str, float, float, str], None]) -> AbstractCont
     """
 
     @contextmanager
-    def begin_stage(title: str, _kind: str) -> Iterator[Advance]:
+    def start_stage(title: str, _kind: str) -> Iterator[Advance]:
         yield lambda done, total, remark: callback(title, done, total, remark)
 
-    return send_progress_to(Receiver(begin_stage, lambda line: callback(line, 0.0, 0.0, "")))
+    return send_progress_to(Receiver(start_stage, lambda line: callback(line, 0.0, 0.0, "")))

@@ -22,7 +22,7 @@ from world.scenario import Scenario, from_spec
 
 _SCHEMA = "planfly.studio/1"
 # Maximum size of an autosave with two missions, a plan and the settings, bytes.
-_MAX_BYTES = 4 * MAX_BYTES
+_MAX_AUTOSAVE_BYTES = 4 * MAX_BYTES
 # Tables of a scenario that the studio changes.
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
 
@@ -56,7 +56,9 @@ def read_autosave(file: Path, context: EditContext, first: Mission) -> tuple[Mis
     """
     if not file.exists():
         return None
-    data = json.loads(utf8_text(read_small_file(file, _MAX_BYTES, "session", PlanflyError), file, PlanflyError))
+    data = json.loads(
+        utf8_text(read_small_file(file, _MAX_AUTOSAVE_BYTES, "session", PlanflyError), file, PlanflyError)
+    )
     if data["schema"] != _SCHEMA or data["first"] != mission_data(first):
         return None
     mission = first if data["mission"] == data["first"] else mission_from_data(data["mission"], first)

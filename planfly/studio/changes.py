@@ -1,6 +1,6 @@
 """Compare a flight with the previous flight, even if items were inserted or deleted.
 
-An inserted or deleted item renumbers the later items.  Therefore equal items of both missions, and items between equal
+An inserted or deleted item renumbers the later items. Therefore equal items of both missions, and items between equal
 items, are matched first, and legs are identified by the items at their ends.
 """
 
@@ -200,7 +200,7 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe the changes of the values of failures, then of the smallest margin of each rule."""
+    """Describe how the values of failures have changed, and then how the smallest margin of each rule has."""
     failures = [
         (rule, old_results[rule, key], result)
         for (rule, key), result in new_results.items()

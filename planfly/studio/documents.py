@@ -38,11 +38,24 @@ from world.scenario import Scenario, embedded_names
 # Maximum size of a file dropped on the page, bytes.
 MAX_DROPPED = 16 * 2**20
 # File types that may be dropped.  They are those that `planfly check` reads and that do not name other files.
-DROPPED = (".waypoints", ".txt", ".plan", ".json", ".mcap", ".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
+DROPPED_SUFFIXES = (
+    ".waypoints",
+    ".txt",
+    ".plan",
+    ".json",
+    ".mcap",
+    ".bin",
+    ".tlog",
+    ".ulg",
+    ".gpx",
+    ".igc",
+    ".kml",
+    ".kmz",
+)
 # File types that a mission can be opened from and saved as.
 KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
 # All file types that can be saved.
-SAVED = KINDS | {"parm": ".parm"}
+SAVED_SUFFIXES = KINDS | {"parm": ".parm"}
 # Latitudes and longitudes within this difference are equal, degrees; files round to 1e-7 degrees.
 _POSITION_TOLERANCE_DEG = 2e-7
 # Altitudes within this difference are equal, m.
@@ -74,7 +87,7 @@ class Document:
 
 
 def open_document(target: str, options: MissionOptions) -> Document:
-    """Open a scenario, a plan, a mission or a log, by name or path.  Raises PlanflyError."""
+    """Open a scenario, a plan, a mission or a log, by name or path. Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
         return _scenario_document(load_scenario_with_options(target, options), options.get("seed"))
     path = Path(target)
@@ -95,8 +108,10 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
         "".join(character if character.isprintable() and character not in "/\\" else "_" for character in name)[-60:]
         or "dropped"
     )
-    if suffix not in DROPPED:
-        raise MissionError.at(shown_name, "suffix", suffix, f"allowed {', '.join(DROPPED)}", shown=repr(suffix))
+    if suffix not in DROPPED_SUFFIXES:
+        raise MissionError.at(
+            shown_name, "suffix", suffix, f"allowed {', '.join(DROPPED_SUFFIXES)}", shown=repr(suffix)
+        )
     if suffix == ".json":
         _check_plan_names_no_files(shown_name, data)
     with temporary_folder("planfly-studio-") as folder:
@@ -212,12 +227,12 @@ class SavedFile:
     losses: tuple[str, ...] = ()
 
 
-def save_document(document: Document, context: EditContext, judged: JudgedMission, kind: str) -> SavedFile:
-    """Return the edited mission as a file of one of `SAVED`.  Raises PlanflyError if the format cannot store it.
+def save_document(document: Document, context: EditContext, judged_mission: JudgedMission, kind: str) -> SavedFile:
+    """Return the edited mission as a file of a kind in `SAVED_SUFFIXES`. Raises PlanflyError if it cannot be stored.
 
     An unchanged mission in its original format is saved as the original bytes.
     """
-    mission, name = judged.mission, f"{document.stem}{SAVED[kind]}"
+    mission, name = judged_mission.mission, f"{document.stem}{SAVED_SUFFIXES[kind]}"
     if kind == "parm":
         return _saved_parameters(name, context)
     opened_scenario = document.setup.scenario
@@ -225,13 +240,13 @@ def save_document(document: Document, context: EditContext, judged: JudgedMissio
     if kind == document.kind and mission is document.setup.mission and has_same_world:
         return SavedFile(name, document.data, _lost_settings(opened_scenario, context))
     if kind == "plan.json":
-        return _saved_plan(name, context, judged)
+        return _saved_plan(name, context, judged_mission)
     if kind == "kml":
-        text = kml_text(context.scenario.name, [plan_line(judged.setup)], map_zones(judged.setup))
+        text = kml_text(context.scenario.name, [plan_line(judged_mission.setup)], map_zones(judged_mission.setup))
         return SavedFile(
             name, _to_bytes(text), ("only a map: it does not contain the commands, speeds and frames of the items",)
         )
-    mission = replace(mission, autopilot=judged.setup.autopilot.name)
+    mission = replace(mission, autopilot=judged_mission.setup.autopilot.name)
     text = mission_text(mission, "waypoints" if kind == "waypoints" else "plan")
     losses = (*_format_losses(context, mission, text, name, kind), *_lost_settings(opened_scenario, context))
     return SavedFile(name, text.encode(), losses)
@@ -284,7 +299,7 @@ def _lost_parameters(context: EditContext) -> tuple[str, ...]:
 
 
 def _saved_parameters(name: str, context: EditContext) -> SavedFile:
-    """Return a file of the parameters set in the studio.  Raises PlanflyError if no parameter was set."""
+    """Return a file of the parameters set in the studio. Raises PlanflyError if no parameter was set."""
     if not context.parameters.values:
         raise PlanflyError("no parameter was set here: Settings sets them", field="form")
     return SavedFile(
@@ -292,13 +307,15 @@ def _saved_parameters(name: str, context: EditContext) -> SavedFile:
     )
 
 
-def _saved_plan(name: str, context: EditContext, judged: JudgedMission) -> SavedFile:
+def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) -> SavedFile:
     """Return the mission as a plan of its scenario, with the current certificate of its path."""
-    plan = judged.setup.plan
+    plan = judged_mission.setup.plan
     if plan is not None:
         return SavedFile(name, plan_json(plan).encode())
-    new_plan = make_certified_plan(context, judged)
-    has_changed_items = not context.planned or planned_mission(new_plan, context.airframe).items != judged.mission.items
+    new_plan = make_certified_plan(context, judged_mission)
+    has_changed_items = (
+        not context.planned or planned_mission(new_plan, context.airframe).items != judged_mission.mission.items
+    )
     losses = (
         ["the items: a plan contains only positions, from which its mission is made again"] if has_changed_items else []
     )
@@ -323,12 +340,12 @@ def _check_plain_waypoints(mission: Mission) -> None:
             raise MissionError(f"{mission.source}: {reason}", file=mission.source, field=f"item {item.seq}")
 
 
-def make_certified_plan(context: EditContext, judged: JudgedMission) -> Plan:
+def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> Plan:
     """Make a plan of the waypoints of the route, scored and certified like plans of the planner.
 
     Raises MissionError for a mission without a scenario, and for items that a plan cannot store.
     """
-    mission, route, scenario = judged.mission, judged.setup.route, context.scenario
+    mission, route, scenario = judged_mission.mission, judged_mission.setup.route, context.scenario
     name = mission.source
     if scenario.external:
         raise MissionError(
@@ -362,7 +379,7 @@ def _scored_plan(context: EditContext, waypoints: Floats) -> Plan:
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
     """Return the edited plan with its unchanged departure and approach, or None if it has neither.
 
-    Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged.  Raises
+    Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged. Raises
     MissionError if these legs were changed.
     """
     opened_plan = context.opened_setup.plan

@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from planfly.studio.documents import DROPPED
+from planfly.studio.documents import DROPPED_SUFFIXES
 from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.view_model import Json
 from world.errors import MissionError
 
 # Maximum number of files that are listed.
 _MAX_FILES = 200
-_READABLE_SUFFIXES = (*DROPPED, *PARAMETER_FILES)
+_READABLE_SUFFIXES = (*DROPPED_SUFFIXES, *PARAMETER_FILES)
 
 
 def folder_message(folder: Path | None) -> Json:
@@ -44,7 +44,7 @@ def home_relative_text(path: Path) -> str:
 
 
 def find_file_in_folder(folder: Path | None, name: str) -> Path:
-    """Return a file by its path in the folder.  Raises MissionError for a file outside the folder or of another type.
+    """Return a file by its path in the folder. Raises MissionError for a file outside the folder or of another type.
 
     >>> find_file_in_folder(Path("/tmp"), "../etc/passwd")
     Traceback (most recent call last):

@@ -1,6 +1,6 @@
 """Draw the terrain of a map with shaded heights and contours as WebP, for a light or a dark page.
 
-A contour is drawn from the difference between a pixel's height and the nearest level, divided by the slope.  This gives
+A contour is drawn from the difference between a pixel's height and the nearest level, divided by the slope. This gives
 lines of even width without a library that traces contours.
 """
 

@@ -1,8 +1,8 @@
 """Accept only requests from pages that the studio served, on this machine, at the printed address.
 
-A page of any site may send requests to 127.0.0.1, and a site may point its own host name to this address.  Browsers
+A page of any site may send requests to 127.0.0.1, and a site may point its own host name to this address. Browsers
 send the site as Origin, the host name as Host, and the source of a request as Sec-Fetch-Site; no page can change these
-headers.  The guard precedes the whole application, including websockets.
+headers. The guard precedes the whole application, including websockets.
 """
 
 from collections.abc import Awaitable, Callable, Iterable, MutableMapping

@@ -1,7 +1,7 @@
 """Judge the geometry of the legs and corners near a moved item, with the same result as for the whole route.
 
 The judged part of the route covers all legs and corners that a move can change, and the threats and zones entered
-there.  Requirements on the whole flight, such as energy, stall and bounds, are judged only with the whole route.
+there. Requirements on the whole flight, such as energy, stall and bounds, are judged only with the whole route.
 """
 
 from collections.abc import Iterator
@@ -163,7 +163,7 @@ def _is_in_window(finding: Finding, first: int, last: int) -> bool:
 def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
     """Return the spans of waypoints that a move of an item may change, as (first, last), or None for the whole route.
 
-    Overlapping spans are merged.  Landing sequences and returns depend on the whole route.
+    Overlapping spans are merged. Landing sequences and returns depend on the whole route.
     """
     rows = np.flatnonzero(route.items == seq)
     if not len(rows) or route.return_from >= 0 or route.straight_to >= 0:

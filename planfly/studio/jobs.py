@@ -10,7 +10,7 @@ from aircraft.catalog import aircraft_names
 from planfly.arguments import CHOICES
 from planfly.studio import messages
 from planfly.studio.changes import FlightResults, describe_changes
-from planfly.studio.pilot import Answer, Work, WorkerProcess
+from planfly.studio.pilot import Answer, Task, WorkerProcess
 from planfly.studio.session import Session
 from planfly.studio.view_model import Json, round_to_json
 from planfly.studio.worker_tasks import PlanRequest
@@ -27,12 +27,12 @@ LONG_WORKER = "long"
 
 
 @dataclass
-class _ActiveWork:
-    """Work in progress.
+class _ActiveTask:
+    """Task in progress.
 
-    rev: revision of the mission for which the work is done.
+    rev: revision of the mission for which the task is done.
     report_time: time of the last progress report, s.
-    fraction: largest reported fraction of the work, 0 to 1.
+    fraction: largest reported progress of the task, 0 to 1.
     """
 
     number: int
@@ -43,23 +43,23 @@ class _ActiveWork:
 
     @property
     def message(self) -> Json:
-        """Progress message to the pages; its number distinguishes the work from earlier work of the same name."""
+        """Progress message to the pages; its number distinguishes the task from earlier tasks of the same name."""
         return {"kind": "working", "job": self.name, "number": self.number, "rev": self.rev, "share": self.fraction}
 
 
 @dataclass
 class Jobs:
-    """Both worker processes, their work in progress, and the results of the newest flight.
+    """Both worker processes, their tasks in progress, and the results of the newest flight.
 
     on_answer: called with the name of a process and its answer, from the thread of the process's pipe.
     pack: see `WorkerProcess`.
     """
 
     on_answer: Callable[[str, Answer], None]
-    pack: Callable[[Work | None], bytes] = pickle.dumps
+    pack: Callable[[Task | None], bytes] = pickle.dumps
     _workers: dict[str, WorkerProcess] = field(default_factory=dict)
-    _active: dict[str, _ActiveWork] = field(default_factory=dict)
-    # Names, keyed by number, of work that was replaced by other work and has not ended yet.
+    _active: dict[str, _ActiveTask] = field(default_factory=dict)
+    # Names, keyed by number, of tasks that were replaced by other tasks and have not ended yet.
     _replaced: dict[int, str] = field(default_factory=dict)
     _number: int = 0
     _flight_message: Json | None = None
@@ -67,11 +67,11 @@ class Jobs:
     _other_messages: list[Json] = field(default_factory=list)
     _uses_first_path: bool = False
 
-    def start_first_work(self, session: Session) -> None:
+    def start_first_task(self, session: Session) -> None:
         """Fly the opened mission, or plan a path if a scenario without a path was opened."""
         if session.document.to_plan and not session.is_changed:
             self._uses_first_path = True
-            self._send_work(
+            self._submit_task(
                 LONG_WORKER,
                 "plan",
                 "planfly.studio.worker_tasks.plan",
@@ -101,15 +101,15 @@ class Jobs:
         return [*([self._flight_message] if self._flight_message is not None else []), *self._other_messages]
 
     def progress_messages(self) -> list[Json]:
-        """Return the messages to a new page about work in progress."""
-        return [work.message for work in self._active.values()]
+        """Return the messages to a new page about tasks in progress."""
+        return [task.message for task in self._active.values()]
 
     def is_planning_first_path(self, session: Session) -> bool:
         """Return True while a path is searched for an opened scenario, whose mission is still a placeholder."""
         return self._uses_first_path and not session.is_changed
 
     def drop_results(self) -> None:
-        """Cancel all work and drop all results, because another mission was opened."""
+        """Cancel all tasks and drop all results, because another mission was opened."""
         self.stop()
         self._flight_message = self._last_results = None
         self._other_messages = []
@@ -121,22 +121,22 @@ class Jobs:
         """Fly the current mission; a flight in progress is cancelled."""
         if session.document.to_plan and not session.is_changed:
             return
-        self._send_work(
+        self._submit_task(
             FLIGHT_WORKER, "fly", "planfly.studio.worker_tasks.fly", (session.context, session.mission), session.rev
         )
 
     def plan(self, message: messages.Plan, session: Session) -> None:
-        """Plan one or several paths.  Raises PlanflyError for items between which no path can be planned."""
+        """Plan one or several paths. Raises PlanflyError for items between which no path can be planned."""
         request = self._plan_request(message, session)
         self._uses_first_path = False
-        self._send_work(LONG_WORKER, "plan", "planfly.studio.worker_tasks.plan", request, session.rev)
+        self._submit_task(LONG_WORKER, "plan", "planfly.studio.worker_tasks.plan", request, session.rev)
 
-    def ask(self, kind: str, session: Session) -> None:
+    def start_task(self, kind: str, session: Session) -> None:
         """Fly, or start a long task."""
         if kind == "fly":
             self.fly(session)
             return
-        self._send_work(
+        self._submit_task(
             LONG_WORKER,
             kind,
             f"planfly.studio.long_worker_tasks.{kind}",
@@ -170,13 +170,13 @@ class Jobs:
         session.plans = ([], (message.first, message.last))
         return replace(request, ends=(ends[0], ends[1]))
 
-    def _send_work(self, worker: str, name: str, function: str, payload: Any, rev: int) -> None:
+    def _submit_task(self, worker: str, name: str, function: str, payload: Any, rev: int) -> None:
         self._number += 1
-        previous = self._active.get(worker)
-        if previous is not None and previous.name != name:
-            self._replaced[previous.number] = previous.name
-        self._active[worker] = _ActiveWork(self._number, name, rev)
-        self._worker(worker).ask(Work(self._number, function, payload))
+        previous_task = self._active.get(worker)
+        if previous_task is not None and previous_task.name != name:
+            self._replaced[previous_task.number] = previous_task.name
+        self._active[worker] = _ActiveTask(self._number, name, rev)
+        self._worker(worker).submit(Task(self._number, function, payload))
 
     def _worker(self, name: str) -> WorkerProcess:
         if name not in self._workers:
@@ -189,67 +189,67 @@ class Jobs:
     # Answers.
 
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages to the pages for an answer; for replaced work only the message that it has ended."""
-        work = self._active.get(worker)
-        if work is None or work.number != answer.number:
+        """Return the messages to the pages for an answer; for a replaced task only the message that it has ended."""
+        task = self._active.get(worker)
+        if task is None or task.number != answer.number:
             replaced_name = None if answer.kind == "progress" else self._replaced.pop(answer.number, None)
             return [] if replaced_name is None else [self._stopped_message(replaced_name)]
         if answer.kind == "progress":
             now = time.monotonic()
-            if now - work.report_time < _REPORT_INTERVAL_S:
+            if now - task.report_time < _REPORT_INTERVAL_S:
                 return []
-            work.report_time = now
+            task.report_time = now
             done, total, remark = answer.value
             # A search that begins another stage counts from zero again.
-            work.fraction = max(work.fraction, round(min(1.0, done / total), 3) if total > 0.0 else 0.0)
-            return [work.message | {"text": remark}]
+            task.fraction = max(task.fraction, round(min(1.0, done / total), 3) if total > 0.0 else 0.0)
+            return [task.message | {"text": remark}]
         del self._active[worker]
         if answer.kind == "cancelled":
-            return [self._stopped_message(work.name)]
+            return [self._stopped_message(task.name)]
         if answer.kind == "fault":
-            return [self._stopped_message(work.name), {"kind": "fault", "text": str(answer.value)}]
-        if work.name == "plan" and work.rev != session.rev:
+            return [self._stopped_message(task.name), {"kind": "fault", "text": str(answer.value)}]
+        if task.name == "plan" and task.rev != session.rev:
             reason = "the mission was changed during the search for its path, so it stays as it is: plan again"
             return [self._stopped_message("plan"), {"kind": "fault", "text": reason}]
-        return [self._result_message(work, answer.value, session)]
+        return [self._result_message(task, answer.value, session)]
 
     def _stopped_message(self, name: str) -> Json:
-        """Return the message that work has ended without a result."""
+        """Return the message that a task has ended without a result."""
         if name == "plan":
             self._uses_first_path = False
         return {"kind": "stopped", "job": name}
 
-    def _result_message(self, work: _ActiveWork, value: Any, session: Session) -> Json:
-        if work.name == "fly":
+    def _result_message(self, task: _ActiveTask, value: Any, session: Session) -> Json:
+        if task.name == "fly":
             previous_results, self._last_results = self._last_results, value.pop("figures")
             judged_mission = value.pop("judged")
-            if judged_mission and work.rev == session.rev:
-                self._send_work(
+            if judged_mission and task.rev == session.rev:
+                self._submit_task(
                     FLIGHT_WORKER,
                     "trials",
                     "planfly.studio.worker_tasks.try_suggestions",
                     (session.context, judged_mission),
-                    work.rev,
+                    task.rev,
                 )
             self._flight_message = {
                 "kind": "flown",
-                "rev": work.rev,
+                "rev": task.rev,
                 **value,
                 "changes": describe_changes(previous_results, self._last_results),
             }
             return self._flight_message
-        if work.name == "trials":
-            session.flown_trials = work.rev, value["missions"]
+        if task.name == "trials":
+            session.flown_trials = task.rev, value["missions"]
             self._flight_message = (self._flight_message or {}) | {"findings": value["findings"]}
-            return {"kind": "tried", "rev": work.rev, "findings": value["findings"]}
-        if work.name == "plan":
+            return {"kind": "tried", "rev": task.rev, "findings": value["findings"]}
+        if task.name == "plan":
             session.plans = ([message.plan for message in value], session.plans[1])
-            return {"kind": "ways", "rev": work.rev, "ways": paths_json(value), "at_once": self._uses_first_path}
-        message = {"kind": work.name, "rev": work.rev, **value}
-        self._other_messages = [*(message for message in self._other_messages if message["kind"] != work.name), message]
+            return {"kind": "ways", "rev": task.rev, "ways": paths_json(value), "at_once": self._uses_first_path}
+        message = {"kind": task.name, "rev": task.rev, **value}
+        self._other_messages = [*(message for message in self._other_messages if message["kind"] != task.name), message]
         return message
 
-    def take_initial_plan(self, session: Session) -> bool:
+    def pop_initial_plan(self, session: Session) -> bool:
         """Return True once, as soon as the path that was planned at the start has arrived."""
         has_path = self._uses_first_path and bool(session.plans[0])
         if has_path:

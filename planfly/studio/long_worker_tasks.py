@@ -30,8 +30,8 @@ def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str,
     context, mission = payload
     setup = context.setup(mission)
     if mission.home is None or context.scenario.terrain is None:
-        missing = "home" if mission.home is None else "terrain"
-        raise MissionError(f"{mission.source}: returns are not judged without a {missing}", field=missing)
+        missing_input = "home" if mission.home is None else "terrain"
+        raise MissionError(f"{mission.source}: returns are not judged without a {missing_input}", field=missing_input)
     world = return_world(setup)
     flight = fly_and_judge(
         setup, context.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
@@ -39,16 +39,17 @@ def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str,
     interval = max(1.0, (float(flight.track.time[-1]) if len(flight.track) else 0.0) / _MAX_RETURNS)
     starts = return_starts(setup, flight.track, interval)
     remark = f"flying {len(starts)} returns"
-    returns = judge_returns(
+    judged_returns = judge_returns(
         world, starts, interval, advance=lambda done, total: advance(0.5 + 0.5 * done / max(1.0, total), 1.0, remark)
     )
     lines = [
-        range_text(return_range, returns, context.scenario) for return_range in returns.ranges[:_MAX_LISTED_RANGES]
+        range_text(return_range, judged_returns, context.scenario)
+        for return_range in judged_returns.ranges[:_MAX_LISTED_RANGES]
     ]
     return {
-        "state": "ok" if returns.safe else "open" if returns.undecided else "fail",
-        "headline": headline(returns),
-        "lines": [*lines, *filter(None, [point_of_no_return_text(returns)])],
+        "state": "ok" if judged_returns.safe else "open" if judged_returns.undecided else "fail",
+        "headline": headline(judged_returns),
+        "lines": [*lines, *filter(None, [point_of_no_return_text(judged_returns)])],
     }
 
 

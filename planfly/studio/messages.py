@@ -1,7 +1,7 @@
 """Define the messages from the page to the server, which are strict and bounded.
 
-Each message is one JSON object whose ``kind`` names its type.  Only `Open` and `Settings` name files, in the served
-folder.  An invalid value is answered with a fault; text that is not a message closes the connection.
+Each message is one JSON object whose ``kind`` names its type. Only `Open` and `Settings` name files, in the served
+folder. An invalid value is answered with a fault; text that is not a message closes the connection.
 """
 
 from typing import Annotated, Any, Literal, get_args
@@ -119,7 +119,7 @@ class Apply(_Message):
 
 
 class Settings(_Message):
-    """Change of settings; fields that are not given stay unchanged.  Values are checked like the values of a scenario.
+    """Change of settings; fields that are not given stay unchanged. Values are checked like the values of a scenario.
 
     limits: entries of [limits]; null removes an entry.  ceiling: m AMSL.
     parameter: one autopilot parameter, as NAME=VALUE.  without: names of the parameters to reset.
@@ -195,7 +195,7 @@ _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 
 
 def read_message(text: str | bytes) -> Message:
-    """Parse a message.  Raises pydantic's ValidationError, a ValueError, for anything else.
+    """Parse a message. Raises pydantic's ValidationError, a ValueError, for anything else.
 
     >>> read_message('{"kind": "undo"}').kind
     'undo'

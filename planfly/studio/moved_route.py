@@ -53,7 +53,7 @@ def update_moved_route(
     ):
         return None
     rows = {seq: row for row, seq in enumerate(route.items.tolist())}
-    waypoint_seqs = {points_array.seq for points_array in mission.items if points_array.command == Command.NAV_WAYPOINT}
+    waypoint_seqs = {item.seq for item in mission.items if item.command == Command.NAV_WAYPOINT}
     rules = airframe.autopilot.route_rules
     points, acceptance, changed_rows = np.array(route.waypoints), np.array(route.acceptance), set[int]()
     for old_item, new_item in pairs:

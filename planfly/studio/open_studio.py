@@ -101,7 +101,7 @@ def _stem(target: str) -> str:
 
 
 def _open_listener(port: int | None) -> socket.socket:
-    """Return the socket to which pages connect.  Raises PlanflyError for a port that is taken."""
+    """Return the socket to which pages connect. Raises PlanflyError if the port is taken."""
     for candidate in (DEFAULT_PORT, 0) if port is None else (port,):
         try:
             return socket.create_server((HOST, candidate))

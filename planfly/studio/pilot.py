@@ -1,7 +1,7 @@
 """Run tasks in a worker process of the studio; a newer task cancels the task in progress.
 
-A task is a function and an argument that can be pickled.  It reports progress regularly, and is cancelled at a report.
-The process is spawned, never forked, because the server has threads.  A process that dies is started again.
+A task is a function and an argument that can be pickled. It reports progress regularly, and is cancelled at a report.
+The process is spawned, never forked, because the server has threads. A process that dies is started again.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ Advance = Callable[[float, float, str], None]
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
+class Task:
     """Task for a worker process.
 
     number: increasing number, which the answers repeat.
@@ -63,7 +63,7 @@ class Cancelled(Exception):
 
 
 class WorkerProcess:
-    """Interface of the server to a worker process.  Its methods may be called from any thread, and never block.
+    """Interface of the server to a worker process. Its methods may be called from any thread, and never block.
 
     A thread sends the newest task, so that a process that does not read its pipe blocks no caller.
     """
@@ -72,23 +72,23 @@ class WorkerProcess:
         self,
         name: str,
         on_answer: Callable[[Answer], None],
-        patience: float = CANCEL_TIMEOUT_S,
-        pack: Callable[[Work | None], bytes] = pickle.dumps,
+        cancel_timeout: float = CANCEL_TIMEOUT_S,
+        pack: Callable[[Task | None], bytes] = pickle.dumps,
     ) -> None:
-        """Prepare a worker; nothing is started before `ask`.
+        """Prepare a worker; nothing is started before `submit`.
 
         on_answer: called from its own thread.
-        patience: maximum time for a cancelled task to end, s.
+        cancel_timeout: maximum time for a cancelled task to end, s.
         pack: pickles a task; called from the sending thread, it must pickle objects that another thread may change in
         that other thread.
         """
-        self._name, self._on_answer, self._patience, self._pack = name, on_answer, patience, pack
-        self._changed = threading.Condition(threading.RLock())
+        self._name, self._on_answer, self._cancel_timeout, self._pack = name, on_answer, cancel_timeout, pack
+        self._condition = threading.Condition(threading.RLock())
         self._process: multiprocessing.process.BaseProcess | None = None
         self._pipe: Connection | None = None
-        # Newest task, True if it was sent, and the numbers of tasks that were sent but not answered.
-        self._newest_task: Work | None = None
-        self._sent, self._closed = True, False
+        # Newest task, True if it was sent, and the numbers of the tasks that were sent but not answered.
+        self._newest_task: Task | None = None
+        self._is_newest_sent, self._is_closed = True, False
         self._unanswered: list[int] = []
         self._sender: threading.Thread | None = None
         self._timer: threading.Timer | None = None
@@ -100,40 +100,42 @@ class WorkerProcess:
 
     def start(self) -> None:
         """Start the process before the first task; a failure is reported only with the first task."""
-        with self._changed, contextlib.suppress(OSError):
+        with self._condition, contextlib.suppress(OSError):
             self._ensure_process()
 
-    def ask(self, work: Work) -> None:
-        """Do a task, and cancel any task in progress."""
-        self._set_newest_task(work)
+    def submit(self, task: Task) -> None:
+        """Submit a task, and cancel any task in progress."""
+        self._set_newest_task(task)
 
     def cancel(self) -> None:
         """Cancel the task in progress."""
         self._set_newest_task(None)
 
-    def _set_newest_task(self, work: Work | None) -> None:
-        with self._changed:
-            dropped = self._newest_task if not self._sent else None
-            self._newest_task, self._sent = work, False
+    def _set_newest_task(self, task: Task | None) -> None:
+        with self._condition:
+            dropped_task = self._newest_task if not self._is_newest_sent else None
+            self._newest_task, self._is_newest_sent = task, False
             if self._unanswered and self._timer is None:
-                self._timer = threading.Timer(self._patience, self._kill_if_stuck, (self._pipe, self._unanswered[0]))
+                self._timer = threading.Timer(
+                    self._cancel_timeout, self._kill_if_stuck, (self._pipe, self._unanswered[0])
+                )
                 self._timer.daemon = True
                 self._timer.start()
             if self._sender is None:
                 self._sender = threading.Thread(target=self._send_tasks, name=f"{self._name}: sends", daemon=True)
                 self._sender.start()
-            self._changed.notify_all()
-        if dropped is not None:
-            self._on_answer(Answer(dropped.number, "cancelled"))
+            self._condition.notify_all()
+        if dropped_task is not None:
+            self._on_answer(Answer(dropped_task.number, "cancelled"))
 
     def close(self) -> None:
         """End the process."""
-        with self._changed:
-            self._closed = True
+        with self._condition:
+            self._is_closed = True
             self._cancel_timer()
             process, pipe = self._process, self._pipe
             self._process = self._pipe = None
-            self._changed.notify_all()
+            self._condition.notify_all()
         if process is not None:
             process.terminate()
             process.join(5.0)
@@ -143,22 +145,22 @@ class WorkerProcess:
     def _send_tasks(self) -> None:
         """Send the newest task until the worker is closed."""
         while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._closed or not self._sent)
-                if self._closed:
+            with self._condition:
+                self._condition.wait_for(lambda: self._is_closed or not self._is_newest_sent)
+                if self._is_closed:
                     return
-                work, self._sent = self._newest_task, True
-                self._unanswered += [] if work is None else [work.number]
+                task, self._is_newest_sent = self._newest_task, True
+                self._unanswered += [] if task is None else [task.number]
             try:
-                with self._changed:
-                    pipe = self._pipe if work is None or self._closed else self._ensure_process()
-                data = b"" if pipe is None else self._pack(work)
+                with self._condition:
+                    pipe = self._pipe if task is None or self._is_closed else self._ensure_process()
+                data = b"" if pipe is None else self._pack(task)
             except OSError as error:
                 # Too many open files, or too many processes.
-                self._fail_unsent(work, f"the worker process cannot be started: {error.strerror}; try again")
+                self._fail_unsent(task, f"the worker process cannot be started: {error.strerror}; try again")
                 continue
             except (CancelledError, *INTERNAL) as error:
-                self._fail_unsent(work, internal_text(error))
+                self._fail_unsent(task, internal_text(error))
                 continue
             if pipe is None:
                 continue
@@ -166,32 +168,32 @@ class WorkerProcess:
                 pipe.send_bytes(data)
             except (OSError, TypeError, ValueError):
                 # The process has ended, so a new process does the task.
-                with self._changed:
+                with self._condition:
                     if self._pipe is pipe:
                         self._pipe = self._process = None
-                    if work is not None and self._newest_task is work:
-                        self._sent = False
-                        self._unanswered = [number for number in self._unanswered if number != work.number]
+                    if task is not None and self._newest_task is task:
+                        self._is_newest_sent = False
+                        self._unanswered = [number for number in self._unanswered if number != task.number]
 
-    def _fail_unsent(self, work: Work | None, reason: str) -> None:
-        """Answer `work`, which could not be sent, with `reason`."""
-        with self._changed:
-            if work is None or self._closed:
+    def _fail_unsent(self, task: Task | None, reason: str) -> None:
+        """Answer `task`, which could not be sent, with `reason`."""
+        with self._condition:
+            if task is None or self._is_closed:
                 return
-            self._unanswered = [number for number in self._unanswered if number != work.number]
-            self._newest_task = None if self._newest_task is work else self._newest_task
-        self._on_answer(Answer(work.number, "fault", reason))
+            self._unanswered = [number for number in self._unanswered if number != task.number]
+            self._newest_task = None if self._newest_task is task else self._newest_task
+        self._on_answer(Answer(task.number, "fault", reason))
 
     def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
         """Kill a process that is still doing a cancelled task; a new process then does the newest task."""
-        with self._changed:
+        with self._condition:
             self._timer = None
-            if self._closed or self._pipe is not pipe or number not in self._unanswered:
+            if self._is_closed or self._pipe is not pipe or number not in self._unanswered:
                 return
             process, self._process, self._pipe = self._process, None, None
             dropped_numbers = self._drop_unanswered()
-            self._sent = self._newest_task is None
-            self._changed.notify_all()
+            self._is_newest_sent = self._newest_task is None
+            self._condition.notify_all()
         if process is not None:
             process.kill()
         for dropped_number in dropped_numbers:
@@ -241,12 +243,12 @@ class WorkerProcess:
                 self._record_answer(pipe, answer)
             self._on_answer(answer)
         reason = "the worker process has ended; try again"
-        with self._changed:
-            if self._closed or self._pipe is not pipe:
+        with self._condition:
+            if self._is_closed or self._pipe is not pipe:
                 return
             self._pipe = self._process = None
             answers = [Answer(number, "cancelled") for number in self._drop_unanswered()]
-            if self._newest_task is not None and self._sent:
+            if self._newest_task is not None and self._is_newest_sent:
                 answers.append(Answer(self._newest_task.number, "fault", reason))
                 self._newest_task = None
         for answer in answers:
@@ -254,13 +256,13 @@ class WorkerProcess:
 
     def _record_answer(self, pipe: Connection, answer: Answer) -> None:
         """Record that a task has ended."""
-        with self._changed:
+        with self._condition:
             if self._newest_task is not None and answer.number == self._newest_task.number:
                 self._newest_task = None
             if self._pipe is pipe and answer.number in self._unanswered:
-                first = self._unanswered[0]
+                oldest_number = self._unanswered[0]
                 self._unanswered.remove(answer.number)
-                if answer.number == first:
+                if answer.number == oldest_number:
                     self._cancel_timer()
 
 
@@ -274,7 +276,7 @@ def run_worker(pipe: Connection) -> None:
 
     # An interrupt at the terminal is handled by the server.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    pending_task: Work | None = None
+    pending_task: Task | None = None
     while True:
         try:
             task = _receive_newest(pipe, pending_task if pending_task is not None else pipe.recv())
@@ -283,7 +285,7 @@ def run_worker(pipe: Connection) -> None:
             return
 
 
-def _receive_newest(pipe: Connection, task: Work | None) -> Work | None:
+def _receive_newest(pipe: Connection, task: Task | None) -> Task | None:
     """Return the newest task in the pipe; answer the other tasks as cancelled."""
     while pipe.poll():
         newer_task = pipe.recv()
@@ -293,9 +295,9 @@ def _receive_newest(pipe: Connection, task: Work | None) -> Work | None:
     return task
 
 
-def _run_task(pipe: Connection, task: Work) -> Work | None:
+def _run_task(pipe: Connection, task: Task) -> Task | None:
     """Run a task and send its answer; return the task that has replaced it, or None."""
-    newer_tasks: list[Work | None] = []
+    newer_tasks: list[Task | None] = []
 
     def advance(done: float, total: float, remark: str) -> None:
         if pipe.poll():

@@ -1,6 +1,6 @@
 """Serve the studio, with pages on websockets, one session, a judging thread and two worker processes.
 
-Drags are judged one at a time, the newest first.  Edits are applied in order, and every page is sent the result.
+Drags are judged one at a time, the newest first. Edits are applied in order, and every page is sent the result.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ from planfly.studio.folder import find_file_in_folder, folder_message, home_rela
 from planfly.studio.ground_picture import draw_ground, sample_ground_grid
 from planfly.studio.jobs import Jobs
 from planfly.studio.messages import read_message
-from planfly.studio.pilot import INTERNAL, Answer, Work, internal_text
+from planfly.studio.pilot import INTERNAL, Answer, Task, internal_text
 from planfly.studio.session import Session, StaleEdit
 from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.view_model import Json
@@ -52,7 +52,7 @@ _MAX_WAITING_FRAMES = 64
 # Pause in which an answer is sent before the next position of a drag is judged, s.
 _SEND_PAUSE_S = 0.001
 # Interval at which the server checks whether a page has gone, s.
-_PLACE_CHECK_INTERVAL_S = 0.05
+_SLOT_CHECK_INTERVAL_S = 0.05
 # Code that closes a websocket without a token.
 NO_TOKEN = 4403
 # Code that closes a websocket if there are too many pages.
@@ -101,7 +101,7 @@ class Server:
         self._draw_thread = ThreadPoolExecutor(1, "studio-draw")
         self._change_lock = asyncio.Lock()
         self._ground_frames: dict[tuple[int, bool], tuple[bytes, ...]] = {}
-        self.jobs = Jobs(self._forward_answer, self._pack_work)
+        self.jobs = Jobs(self._forward_answer, self._pack_task)
         self._loop: asyncio.AbstractEventLoop | None = None
         self._initial_plan_task: asyncio.Future[None] | None = None
         self._autosave_error = ""
@@ -111,9 +111,9 @@ class Server:
     # Start and end.
 
     async def run(self) -> None:
-        """Autosave until the server ends."""
+        """Start the first task, and autosave until the server ends."""
         self._loop = asyncio.get_running_loop()
-        self.jobs.start_first_work(self.session)
+        self.jobs.start_first_task(self.session)
         while True:
             await asyncio.sleep(AUTOSAVE_INTERVAL_S)
             await self._autosave()
@@ -140,9 +140,9 @@ class Server:
     async def _run_judging(self, function: Callable[[], Result]) -> Result:
         return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
-    def _pack_work(self, work: Work | None) -> bytes:
+    def _pack_task(self, task: Task | None) -> bytes:
         """Pickle a task in the judging thread, because judging fills caches of the pickled objects."""
-        return self._judge_thread.submit(pickle.dumps, work).result()
+        return self._judge_thread.submit(pickle.dumps, task).result()
 
     # ------------------------------------------------------------------
     # One page.
@@ -184,9 +184,9 @@ class Server:
             await self._handle_message(page, await _receive_text(page.socket))
             await asyncio.sleep(MESSAGE_PAUSE_S)
 
-    async def _wait_for_free_place(self) -> None:
+    async def _wait_for_free_slot(self) -> None:
         while len(self._pages) >= MAX_PAGES:
-            await asyncio.sleep(_PLACE_CHECK_INTERVAL_S)
+            await asyncio.sleep(_SLOT_CHECK_INTERVAL_S)
 
     async def _welcome(self, socket: WebSocket) -> Page | None:
         """Return the page if its first message has the token; otherwise close the websocket and return None."""
@@ -202,8 +202,8 @@ class Server:
             if has_token and isinstance(message, messages.Hello):
                 socket.scope.get(ALLOW_FULL_SIZE, lambda: None)()
                 code = TOO_MANY
-                # A page that has gone occupies a place until the server notices this, which may take some time.
-                await asyncio.wait_for(self._wait_for_free_place(), TOKEN_TIMEOUT_S)
+                # A page that has gone occupies a slot until the server notices this, which may take some time.
+                await asyncio.wait_for(self._wait_for_free_slot(), TOKEN_TIMEOUT_S)
                 return Page(socket, message.dark)
         with contextlib.suppress(RuntimeError):
             await socket.close(code)
@@ -274,7 +274,7 @@ class Server:
     # Messages of a page.
 
     async def _handle_message(self, page: Page, text: str) -> None:
-        """Handle a message.  Raises ValueError for a message that is not understood."""
+        """Handle a message. Raises ValueError for a message that is not understood."""
         try:
             message = read_message(text)
         except ValidationError as error:
@@ -307,11 +307,11 @@ class Server:
             case messages.Ask(kind="stop"):
                 self.jobs.stop()
             case messages.Ask():
-                self.jobs.ask(message.kind, session)
+                self.jobs.start_task(message.kind, session)
             case messages.Plan():
                 self.jobs.plan(message, session)
             case messages.Save():
-                save_mission = session.save_over if message.over else lambda: session.save(message.form)
+                save_mission = session.overwrite_file if message.over else lambda: session.save(message.form)
                 async with self._change_lock:
                     saved = await self._run_judging(save_mission)
                 content = "" if message.over else base64.b64encode(saved.data).decode()
@@ -333,10 +333,10 @@ class Server:
             await self._run_judging(lambda: self._apply_change(message))
             if session.rev == rev:
                 return
-            sheet = await self._run_judging(self._sheet_message)
+            sheet_message = await self._run_judging(self._sheet_message)
         if session.world_rev != world_rev:
             self._broadcast(session.world_message())
-        self._broadcast(sheet)
+        self._broadcast(sheet_message)
         self.jobs.fly(session)
         if session.world_rev != world_rev:
             for page in list(self._pages):
@@ -349,7 +349,7 @@ class Server:
                 session.edit(message)
             case messages.Step():
                 previous_history = session.history
-                session.step(message.kind)
+                session.step_history(message.kind)
                 if session.history is not previous_history:
                     self.jobs.drop_results()
             case messages.Settings():
@@ -397,11 +397,11 @@ class Server:
     def _handle_answer(self, worker: str, answer: Answer) -> None:
         for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)
-        if self.jobs.take_initial_plan(self.session):
+        if self.jobs.pop_initial_plan(self.session):
             choice = messages.Choose(kind="choose", rev=self.session.rev, which=0)
-            self._initial_plan_task = asyncio.ensure_future(self._take_initial_plan(choice))
+            self._initial_plan_task = asyncio.ensure_future(self._apply_initial_plan(choice))
 
-    async def _take_initial_plan(self, message: messages.Choose) -> None:
+    async def _apply_initial_plan(self, message: messages.Choose) -> None:
         """Use the path that was planned at the start of the studio, unless the mission was edited in the meantime."""
         try:
             await self._change_session(message)
@@ -424,11 +424,11 @@ class Server:
 
 
 async def _receive_text(socket: WebSocket) -> str:
-    """Return the next text message.  Raises ValueError for a binary message, and WebSocketDisconnect at the end."""
-    received = await socket.receive()
-    if received["type"] == "websocket.disconnect":
-        raise WebSocketDisconnect(received.get("code", 1000))
-    text = received.get("text")
+    """Return the next text message. Raises ValueError for a binary message, and WebSocketDisconnect at the end."""
+    event = await socket.receive()
+    if event["type"] == "websocket.disconnect":
+        raise WebSocketDisconnect(event.get("code", 1000))
+    text = event.get("text")
     if text is None:
         raise ValueError("expected a text message")
     return str(text)

@@ -1,6 +1,6 @@
 """Open, edit, judge, save and autosave the edited mission, which all pages share.
 
-The session does not know connections or processes, which belong to `planfly.studio.server`.  Each change increases the
+The session does not know connections or processes, which belong to `planfly.studio.server`. Each change increases the
 revision; an edit of an older revision is refused, so that no page edits a mission that it does not show.
 """
 
@@ -82,14 +82,14 @@ class Session:
 
     @classmethod
     def from_document(cls, document: Document, options: MissionOptions) -> "Session":
-        """Make a session of an opened document."""
+        """Return a session of an opened document."""
         context = EditContext.from_setup(
             document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ())
         )
-        judged = context.judge(document.setup.mission)
+        judged_mission = context.judge(document.setup.mission)
         history = History(document.setup.mission)
         named_path = None if document.path is None else document.path.resolve()
-        return cls(document, options, context, history, judged, named_file=named_path)
+        return cls(document, options, context, history, judged_mission, named_file=named_path)
 
     def open(self, document: Document) -> None:
         """Open another document; an undo before its first edit restores the previous document."""
@@ -107,9 +107,9 @@ class Session:
     def _restore_state(self, opened_state: _OpenedState) -> None:
         """Restore a document as it was left; if it cannot be judged, nothing is changed."""
         _, context, history = opened_state
-        judged = context.judge(history.mission)
+        judged_mission = context.judge(history.mission)
         self.document, self.context, self.history = opened_state
-        self.judged, self.plans = judged, ([], None)
+        self.judged, self.plans = judged_mission, ([], None)
         self.rev, self.world_rev = self.rev + 1, self.world_rev + 1
         self.document_rev += 1
 
@@ -146,18 +146,18 @@ class Session:
     # Edits.
 
     def edit(self, message: Edit) -> None:
-        """Apply an edit.  Raises StaleEdit, or MissionError for an invalid mission; then nothing is changed."""
+        """Apply an edit. Raises StaleEdit, or MissionError for an invalid mission; then nothing is changed."""
         if message.rev != self.rev:
             raise StaleEdit
         mission, text = self._apply_edit(message)
-        self._judge_and_set(mission)
+        self._set_mission(mission)
         self._add_to_history(mission, text)
 
-    def step(self, kind: str) -> None:
+    def step_history(self, kind: str) -> None:
         """Undo, redo, or revert to the opened mission, if there is anything to undo, redo or revert."""
         if kind == "revert":
             if self.is_changed:
-                self._judge_and_set(self.history.first)
+                self._set_mission(self.history.first)
                 self._add_to_history(self.history.first, "revert to the file")
             return
         if kind == "undo" and not self.history.undo_text and self.earlier_states:
@@ -174,7 +174,7 @@ class Session:
         has_moved = self.history.undo() if kind == "undo" else self.history.redo()
         try:
             if has_moved:
-                self._judge_and_set(self.mission)
+                self._set_mission(self.mission)
         except Exception:
             self.history.position = previous_position
             raise
@@ -190,7 +190,7 @@ class Session:
         return {"sheet": sheet_json(self.context, judged_mission)}
 
     def replace_plan(self, message: Choose) -> None:
-        """Replace the whole mission, or the items between two items, by a planned path.  Raises StaleEdit."""
+        """Replace the whole mission, or the items between two items, by a planned path. Raises StaleEdit."""
         if message.rev != self.rev:
             raise StaleEdit
         plans, item_range = self.plans
@@ -201,10 +201,10 @@ class Session:
             self._show_plan(plan)
             return
         mission = self._replace_part(plan, *item_range)
-        self._judge_and_set(mission)
+        self._set_mission(mission)
         self._add_to_history(mission, "plan a part")
 
-    def _judge_and_set(self, mission: Mission, context: EditContext | None = None) -> None:
+    def _set_mission(self, mission: Mission, context: EditContext | None = None) -> None:
         """Judge a mission, make it the current mission, and drop planned paths; change nothing if it is invalid.
 
         context: the editing context to judge the mission with; None for the current context.
@@ -220,7 +220,7 @@ class Session:
     def _show_plan(self, plan: Plan) -> None:
         """Replace the mission by the mission of a new plan, whose certificate applies until the mission is edited."""
         mission = planned_mission(plan, self.context.airframe)
-        self._judge_and_set(mission, self.context.with_plan(plan, mission))
+        self._set_mission(mission, self.context.with_plan(plan, mission))
         self._add_to_history(mission, f"plan with seed {plan.seed}")
 
     def _apply_edit(self, message: Edit) -> tuple[Mission, str]:
@@ -345,7 +345,7 @@ class Session:
         return mission
 
     def item_position(self, index: int) -> tuple[float, float, float]:
-        """Return east, north and altitude AMSL of an item, m.  Raises MissionError if the item has no position."""
+        """Return east, north and altitude AMSL of an item, m. Raises MissionError if the item has no position."""
         edits.movable_item(self.mission, index)
         east, north, altitude = self.context.item_positions(self.mission)[
             edits.movable_indices(self.mission).index(index)
@@ -356,7 +356,7 @@ class Session:
     # The world.
 
     def change_settings(self, settings: Settings) -> None:
-        """Change the settings of the flight.  Raises PlanflyError for a value that is not allowed in a scenario."""
+        """Change the settings of the flight. Raises PlanflyError for a value that is not allowed in a scenario."""
         scenario = apply_scenario_settings(self.context.scenario, settings)
         context = self.context.with_settings(
             scenario, apply_parameter_settings(self.context.parameters, scenario, settings)
@@ -400,24 +400,24 @@ class Session:
         }
 
     def save(self, form: str) -> SavedFile:
-        """Return the mission as a file.  Raises PlanflyError if the format cannot store it."""
-        saved = save_document(self.document, self.context, self.judged, form)
+        """Return the mission as a file. Raises PlanflyError if the format cannot store it."""
+        saved_file = save_document(self.document, self.context, self.judged, form)
         if form != "kml":
             self.saved_mission = self.mission
-        return saved
+        return saved_file
 
-    def save_over(self) -> SavedFile:
-        """Overwrite the file that the command named.  Raises PlanflyError if there is none."""
+    def overwrite_file(self) -> SavedFile:
+        """Overwrite the file that the command named. Raises PlanflyError if there is none."""
         path = self.document.path
         if path is None or not self.document.kind:
             raise PlanflyError("no mission file was named: save it as a new one", field="over")
         if path.exists() and path.read_bytes() != self.document.on_disk:
             message = f"{path.name} was changed by another program since it was opened: save it under another name"
             raise PlanflyError(message, file=path)
-        saved = self.save(self.document.kind)
-        write_whole(path, saved.data)
-        self.document = replace(self.document, on_disk=saved.data)
-        return saved
+        saved_file = self.save(self.document.kind)
+        write_whole(path, saved_file.data)
+        self.document = replace(self.document, on_disk=saved_file.data)
+        return saved_file
 
     # ------------------------------------------------------------------
     # Autosave, in case the server dies.
@@ -431,22 +431,24 @@ class Session:
         """Return the autosave path: `file` for the first document, a file next to it for documents opened later."""
         return sibling_autosave_path(file, self.history.first) if self.earlier_states else file
 
-    def autosave(self, file: Path) -> None:
+    def autosave(self, first_autosave_file: Path) -> None:
         """Write the autosave file if anything has changed since the last autosave."""
         if self.autosaved_rev == self.rev:
             return
-        file = self.autosave_path(file)
-        if file in self.unreadable:
+        first_autosave_file = self.autosave_path(first_autosave_file)
+        if first_autosave_file in self.unreadable:
             return
-        file.parent.mkdir(parents=True, exist_ok=True)
+        first_autosave_file.parent.mkdir(parents=True, exist_ok=True)
         plan = self.judged.setup.plan
-        write_whole(file, autosave_text(self.context, self.history.first, self.mission, plan, self.document.name))
+        write_whole(
+            first_autosave_file, autosave_text(self.context, self.history.first, self.mission, plan, self.document.name)
+        )
         self.autosaved_rev = self.rev
 
     def restore(self, file: Path) -> bool:
         """Restore the autosave of this document, with its mission as an edit; return True if there was one.
 
-        An autosave of another document is ignored.  An autosave that cannot be read is added to `unreadable`, and is
+        An autosave of another document is ignored. An autosave that cannot be read is added to `unreadable`, and is
         neither restored nor overwritten.
         """
         previous_state = self.context, self.judged, self.plans
@@ -454,7 +456,7 @@ class Session:
             autosave = read_autosave(file, self.context, self.history.first)
             if autosave is None:
                 return False
-            self._judge_and_set(*autosave)
+            self._set_mission(*autosave)
             json.dumps(self.sheet(), allow_nan=False)
         except (*INTERNAL, PlanflyError):
             self.context, self.judged, self.plans = previous_state
@@ -466,6 +468,6 @@ class Session:
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:
-    """Open a target of the command; also return True if an autosave was restored.  Raises PlanflyError."""
+    """Open a target of the command; also return True if an autosave was restored. Raises PlanflyError."""
     session = Session.from_document(open_document(target, options), options)
     return session, autosave_file is not None and session.restore(autosave_file)

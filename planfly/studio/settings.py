@@ -42,7 +42,7 @@ class SetParameters:
         return parameters_text(self.values, title)
 
     def airframe(self, scenario: Scenario) -> Airframe:
-        """Load the airframe of a scenario with these parameters and their source.  Raises PlanflyError."""
+        """Load the airframe of a scenario with these parameters and their source. Raises PlanflyError."""
         airframe = load_airframe(scenario, self.values)
         stored_autopilot = airframe.autopilot.store()
         if not self.values or stored_autopilot.parameters is None:
@@ -54,7 +54,7 @@ class SetParameters:
 
 
 def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
-    """Return a scenario with the requested settings.  Raises PlanflyError for an invalid value."""
+    """Return a scenario with the requested settings. Raises PlanflyError for an invalid value."""
     wind = None
     if settings.wind_speed is not None or settings.wind_from is not None:
         speed = scenario.wind.speed if settings.wind_speed is None else settings.wind_speed
@@ -85,7 +85,7 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
 def apply_parameter_settings(current: SetParameters, scenario: Scenario, settings: Settings) -> SetParameters:
     """Return the parameters after a change of settings, for the autopilot of a scenario.
 
-    A change of the autopilot discards all parameters.  A file replaces all parameters; a single parameter replaces only
+    A change of the autopilot discards all parameters. A file replaces all parameters; a single parameter replaces only
     its own value.
     Raises PlanflyError for a name that the simulated autopilot does not have, and for a value that is not allowed.
     """
@@ -109,7 +109,7 @@ def apply_parameter_settings(current: SetParameters, scenario: Scenario, setting
 
 
 def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
-    """Read autopilot parameters from the text of a file.  Raises PlanflyError, which names the file."""
+    """Read autopilot parameters from the text of a file. Raises PlanflyError, which names the file."""
     scenario_values = _load_autopilot_parameters(scenario).by_origin("file")
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "set.parm"
@@ -129,7 +129,7 @@ def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
 
 
 def _load_autopilot_parameters(scenario: Scenario) -> Parameters:
-    """Return the autopilot parameters of a scenario.  Raises PlanflyError if its autopilot has none."""
+    """Return the autopilot parameters of a scenario. Raises PlanflyError if its autopilot has none."""
     autopilot = load_autopilot(scenario, find_airframe(scenario)[0])
     if autopilot.parameters is None:
         raise PlanflyError(f"{autopilot.title} has no parameters: choose another autopilot", field="parameter")

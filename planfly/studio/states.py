@@ -1,6 +1,6 @@
 """States of legs, corners, threats and zones according to a verdict.
 
-A state is "fail", "open" (not judged, therefore not flyable), "near" (close to a limit) or "ok".  Its text describes
+A state is "fail", "open" (not judged, therefore not flyable), "near" (close to a limit) or "ok". Its text describes
 the finding that is closest to its limit.
 """
 

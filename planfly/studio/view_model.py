@@ -1,4 +1,4 @@
-"""Make the data that the page draws, in m: the world, the mission with its states, and the profile."""
+"""Convert the world, the mission with its states, and the profile to the data that the page draws, in m."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -125,14 +125,14 @@ def _zones_json(scenario: Scenario, mission: Mission, setup: FlightSetup) -> lis
 # Data of the mission.
 
 
-def sheet_json(context: EditContext, judged: JudgedMission) -> Json:
+def sheet_json(context: EditContext, judged_mission: JudgedMission) -> Json:
     """Return page data of a mission and its geometric verdict: items, route, path, states, findings and profile."""
-    verdict, setup = judged.verdict, judged.setup
-    states = place_states(judged.requirements, verdict.findings)
-    path = judged.requirements.path
+    verdict, setup = judged_mission.verdict, judged_mission.setup
+    states = place_states(judged_mission.requirements, verdict.findings)
+    path = judged_mission.requirements.path
     return {
-        "items": items_json(context, judged.mission),
-        **route_json(judged.mission, setup.route, 0, setup.route.legs),
+        "items": items_json(context, judged_mission.mission),
+        **route_json(judged_mission.mission, setup.route, 0, setup.route.legs),
         "path": _leg_paths(path.points, path.legs, 0, setup.route.legs),
         "states": states_json(states, 0, setup.route.legs),
         "violated": {"threats": sorted(states.threats), "zones": sorted(states.zones)},

@@ -1,6 +1,6 @@
 """Fly a mission, try the suggestions of its findings, or plan a path in the studio's worker processes.
 
-Arguments are pickled, and results are plain data.  Returns and campaigns, which take longer, are in
+Arguments are pickled, and results are plain data. Returns and campaigns, which take longer, are in
 `planfly.studio.long_worker_tasks`.
 """
 

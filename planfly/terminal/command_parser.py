@@ -151,20 +151,20 @@ class LineParser(CommandParser):
         """Start a section of the help under a title, for the commands added next."""
         self._section = title
 
-    def command(self, name: str, summary: str, *examples: str, extra: str = "", more: str = "") -> CommandParser:
+    def command(self, name: str, summary: str, *examples: str, extra: str = "", details: str = "") -> CommandParser:
         """Add the parser for a command, and return it.
 
         summary: one sentence on the command.
         examples: example command lines in its help.
         extra: the extra of planfly that the command needs, or "".
-        more: further sentences of its help.
+        details: further sentences of its help.
         """
         extra_note = f"  It requires the extra planfly[{extra}]." if extra else ""
         example_text = f"\n{' ' * len('example: ')}".join(examples)
         command_parser: CommandParser = self._parsers.add_parser(
             name,
             help=summary,
-            description=f"{summary[0].upper()}{summary[1:]}.{more}{extra_note}",
+            description=f"{summary[0].upper()}{summary[1:]}.{details}{extra_note}",
             epilog=f"example: {example_text}\n\n{EXIT_CODES}",
         )
         self.commands[name] = command_parser
@@ -177,7 +177,7 @@ class LineParser(CommandParser):
     def parse_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> argparse.Namespace:
-        """Parse the command line.  For bad usage, print one line with a suggestion and raise SystemExit."""
+        """Parse the command line. For bad usage, print one line with a suggestion and raise SystemExit."""
         arguments = _join_negative_numbers(sys.argv[1:] if args is None else list(args))
         if arguments and not arguments[0].startswith("-") and arguments[0] not in self.commands:
             hint = did_you_mean(arguments[0], self.commands) or f"; there are {', '.join(self.commands)}"

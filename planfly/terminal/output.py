@@ -67,11 +67,11 @@ class _TolerantStream(_SafeStream):
 
     def __init__(self, stream: TextIO) -> None:
         super().__init__(stream)
-        self._reader_has_gone = False
+        self._is_reader_gone = False
 
     def write(self, text: str, /) -> int:
         """Write the text, or drop it if the reader has gone."""
-        if not self._reader_has_gone:
+        if not self._is_reader_gone:
             try:
                 super().write(text)
             except BrokenPipeError:
@@ -82,7 +82,7 @@ class _TolerantStream(_SafeStream):
 
     def flush(self) -> None:
         """Flush the buffered text, or drop it if the reader has gone."""
-        if not self._reader_has_gone:
+        if not self._is_reader_gone:
             try:
                 super().flush()
             except BrokenPipeError:
@@ -93,7 +93,7 @@ class _TolerantStream(_SafeStream):
                 raise _with_stream_name(error) from error
 
     def _drop_output(self) -> None:
-        self._reader_has_gone = True
+        self._is_reader_gone = True
         # When the interpreter ends, it flushes the buffered text, which then goes to the null device.
         with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as null_file:
             os.dup2(null_file.fileno(), self.fileno())
@@ -134,7 +134,7 @@ def printable(text: str) -> str:
 
 
 def plain_stream(stream: TextIO) -> TextIO:
-    """Return the underlying stream, which accepts text that moves the cursor."""
+    """Return the stream under a safe stream, for text that moves the cursor."""
     plain: TextIO = getattr(stream, "plain", stream)
     return plain
 
@@ -153,7 +153,7 @@ def safe_streams() -> Iterator[None]:
 # ----------------------------------------------------------------------
 # Durations of previous runs, by kind of stage: the estimate for a stage before it reports any progress.
 
-# Largest file of durations that is read, bytes.  There are a few dozen kinds; a larger file was not written by planfly.
+# Maximum size of the file of durations, bytes. There are a few dozen kinds; planfly does not write a larger file.
 _MAX_BYTES = 20_000
 
 
@@ -207,7 +207,7 @@ def _print_line(line: str) -> None:
 _FIRST_REPORT_DELAY_S = 2.0
 # Ratio of the time of the next line to the time of the last line.
 _REPORT_INTERVAL_RATIO = 4.0
-# Longest time between two lines, also of a stage that reports nothing, s.
+# Maximum time between two lines, also of a stage that reports nothing, s.
 _MAX_REPORT_INTERVAL_S = 60.0
 # Interval at which a stage checks the clock, s; a stage that reports nothing is named after the first interval.
 _REFRESH_INTERVAL_S = 1.0
@@ -225,7 +225,7 @@ class _TimeLeft:
 
     def __init__(self, kind: str) -> None:
         self._kind, self._number = kind, next(_stage_numbers)
-        self._started = time.monotonic()
+        self._start_time = time.monotonic()
         self._first_report: tuple[float, float] | None = None
         self._done, self._next_report_time = 0.0, _FIRST_REPORT_DELAY_S
 
@@ -257,7 +257,7 @@ class _TimeLeft:
 
     def elapsed(self) -> float:
         """Return the seconds since the stage began."""
-        return time.monotonic() - self._started
+        return time.monotonic() - self._start_time
 
     def store_duration(self) -> None:
         """Store the duration for the next run, unless the stage contained another stage, such as a compilation."""
@@ -287,8 +287,8 @@ def progress(title: str, kind: str = "") -> Iterator[Advance]:
     """Show the progress of a stage; the work reports the units done, the total and a remark.
 
     kind: see `planfly.runtime.stages.stage`.
-    The time left follows the remark, unless the remark states it.  At first, the duration of the previous stage of its
-    kind on this machine is shown, or "no estimate".  A total of 0 means that the total is unknown.
+    The time left follows the remark, unless the remark states it. At first, the duration of the previous stage of its
+    kind on this machine is shown, or "no estimate". A total of 0 means that the total is unknown.
     """
     time_left = _TimeLeft(kind or title)
     display = _Bar(title, time_left) if sys.stderr.isatty() else _Lines(title, time_left)
@@ -383,7 +383,7 @@ class _Lines:
 
     def __init__(self, title: str, time_left: _TimeLeft) -> None:
         self._title, self._time_left, self._lock = title, time_left, threading.Lock()
-        self._remark, self._printed_at = "", 0.0
+        self._remark, self._last_print_time = "", 0.0
         self._has_started = self._knows_total = self._is_over = False
 
     def __enter__(self) -> None:
@@ -432,7 +432,7 @@ class _Lines:
                 return
             if not self._has_started:
                 self._print_first_line(self._time_left.initial_estimate(0.0))
-            elif self._time_left.elapsed() - self._printed_at >= _MAX_REPORT_INTERVAL_S:
+            elif self._time_left.elapsed() - self._last_print_time >= _MAX_REPORT_INTERVAL_S:
                 self._print_and_note_time(
                     f"{self._title}: {_join_nonempty(self._remark, f'{self._time_left.elapsed():.0f} s so far')}"
                 )
@@ -442,7 +442,7 @@ class _Lines:
         self._print_and_note_time(f"{self._title} ... ({estimate})")
 
     def _print_and_note_time(self, line: str) -> None:
-        self._printed_at = self._time_left.elapsed()
+        self._last_print_time = self._time_left.elapsed()
         _print_line(line)
 
 

@@ -33,9 +33,9 @@ _COMPILER_PACKAGES = ("numba", "llvmlite")
 def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
     """Raise `Interrupted` for SIGINT and SIGTERM, and end the process by force ``grace`` seconds after a signal.
 
-    Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long.  A thread
+    Compiled code and compilers can delay Python's signal handlers, and waits for other processes can be long. A thread
     therefore kills this process's children, removes its unfinished files and ends it with exit code 128 plus the number
-    of the signal.  The thread keeps watching after this block until the process has ended, so use this block as the
+    of the signal. The thread keeps watching after this block until the process has ended, so use this block as the
     outermost block of a program.
 
     Yields a list to which the number of a signal is added when it arrives.
@@ -84,7 +84,7 @@ def end_on_signals(grace: float = GRACE_S) -> Iterator[list[int]]:
 def _called_by_compiled_code(frame: FrameType | None) -> bool:
     """Return True if Numba is in the call stack, compiling, reading a cached kernel or boxing a kernel's results.
 
-    If an exception interrupts Numba, compiled code continues with a null pointer, and the process crashes.  A result
+    If an exception interrupts Numba, compiled code continues with a null pointer, and the process crashes. A result
     that is a named tuple is made by a module named after its class.
     """
     while frame is not None:

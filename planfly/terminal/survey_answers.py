@@ -15,7 +15,7 @@ from planfly.terminal.verdict_answers import STRICT
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PhotoLineEntry:
-    """A photo line as flown; if not flown, all fields but its items are null.  Shares are fractions of its length."""
+    """A photo line as flown; if not flown, all fields but its items are null. Shares are fractions of its length."""
 
     first_item: int
     last_item: int

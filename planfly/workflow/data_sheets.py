@@ -42,8 +42,17 @@ from aircraft.uncertainty import (
 from flight.autopilots.arduplane.parameters import DEFINITIONS
 from flight.autopilots.parameter_files import Entry, read_parameter_file
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import Simulator, Trim, fastest, full_throttle, idle, linearise, slowest, straight
-from flight.guidance.model_gains import AMSL, gains_of_model, gains_text, idle_throttle
+from flight.dynamics.trim import (
+    Simulator,
+    Trim,
+    fastest_level_flight,
+    full_throttle_climb,
+    idle_descent,
+    linearise,
+    slowest_level_flight,
+    steady_flight,
+)
+from flight.guidance.model_gains import AMSL, gains_from_model, gains_text, idle_throttle
 from world.arrays import Floats
 from world.errors import FlightError
 from world.files import temporary_folder
@@ -296,9 +305,9 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
     properties: values of the model's properties by name.
     """
     fdm = Fdm(aircraft, tried=True, variation=Variation(properties=properties))
-    angles = [trim_function(fdm, aircraft.airspeed, AMSL) for trim_function in (full_throttle, idle)]
-    max_speed_trim = fastest(fdm, AMSL)
-    level = straight(fdm, aircraft.airspeed, AMSL)
+    angles = [trim_function(fdm, aircraft.airspeed, AMSL) for trim_function in (full_throttle_climb, idle_descent)]
+    max_speed_trim = fastest_level_flight(fdm, AMSL)
+    level = steady_flight(fdm, aircraft.airspeed, AMSL)
     if level is not None:
         fdm.balance(level.vector())
     return np.array(
@@ -428,7 +437,7 @@ def _make_files(
     return {
         f"{name}.xml": model,
         f"{name}.toml": metadata,
-        "gains.toml": gains_text(gains_of_model(aircraft, fdm)),
+        "gains.toml": gains_text(gains_from_model(aircraft, fdm)),
         "ardupilot.parm": arduplane_parameters(aircraft, performance, fdm, file_parameters),
         "ardupilot.toml": servo_text(aircraft, performance),
         "uncertainty.toml": uncertainty_text(uncertainty),
@@ -440,14 +449,14 @@ def _make_files(
 def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
     """Trim the aircraft in all flight conditions of `Performance`.  Raises FlightError if one has no trim point."""
     cruise = aircraft.airspeed
-    level = straight(fdm, cruise, AMSL)
+    level = steady_flight(fdm, cruise, AMSL)
     if level is None:
         raise FlightError.of_argument("cruise", cruise, "no level flight there", shown=f"{cruise:g} m/s")
     trims = {
-        "climb": full_throttle(fdm, cruise, AMSL, level),
-        "idle": idle(fdm, cruise, AMSL, level),
-        "slowest": slowest(fdm, AMSL, level),
-        "fastest": fastest(fdm, AMSL, level),
+        "climb": full_throttle_climb(fdm, cruise, AMSL, level),
+        "idle": idle_descent(fdm, cruise, AMSL, level),
+        "slowest": slowest_level_flight(fdm, AMSL, level),
+        "fastest": fastest_level_flight(fdm, AMSL, level),
     }
     for name, trim in trims.items():
         if trim is None:

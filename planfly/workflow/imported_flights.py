@@ -460,7 +460,7 @@ def _refly_followed_legs(
         blocks.append(block)
         if advance is not None:
             advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-    track, end_reason = join_blocks(blocks), blocks[-1].ended
+    track, end_reason = join_blocks(blocks), blocks[-1].end_reason
     if len(track) < 2:
         raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {end_reason}", file=scenario.name)
     if draw is not None:

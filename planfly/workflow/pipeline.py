@@ -224,7 +224,7 @@ def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: Crash
     blocks, end_reason, length = list[FlightBlock](), "", flight.path.length
     for block in simulate(flight):
         blocks.append(block)
-        end_reason = block.ended
+        end_reason = block.end_reason
         if recorder is not None and len(block.rows):
             recorder.write(block.rows)
             end_reason = end_reason or task.limits.log_limit_reason(recorder.size)

@@ -70,7 +70,7 @@ class Trial:
                     raise TrialAborted
         except StartError as error:
             return join_tracks([]), f"not started: {error.reason}"
-        return join_blocks(blocks), blocks[-1].ended
+        return join_blocks(blocks), blocks[-1].end_reason
 
     @cached_property
     def flight_verdict(self) -> Verdict:

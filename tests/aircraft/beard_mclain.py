@@ -14,7 +14,7 @@ from world.arrays import Floats
 
 MASS = 11.0
 JX, JY, JZ, JXZ = 0.8244, 1.135, 1.759, 0.1204
-AREA, SPAN, CHORD, OSWALD = 0.55, 2.8956, 0.18994, 0.9
+AREA, SPAN, MAX_CHORD_TURN_RAD, OSWALD = 0.55, 2.8956, 0.18994, 0.9
 CL_0, CL_ALPHA, CL_Q, CL_ELEVATOR = 0.23, 5.61, 7.95, 0.13
 CD_Q, CD_ELEVATOR = 0.0, 0.0135
 CM_0, CM_ALPHA, CM_Q, CM_ELEVATOR = 0.0135, -2.74, -38.21, -0.99
@@ -86,7 +86,7 @@ def rates(states: Floats, commands: Floats, air: BookAtmosphere) -> Floats:
     airspeed = math.sqrt(u * u + v * v + w * w)
     alpha, beta = math.atan2(w, u), math.asin(v / airspeed)
     pressure = 0.5 * air.density * airspeed**2 * AREA
-    half_span, half_chord = SPAN / (2.0 * airspeed), CHORD / (2.0 * airspeed)
+    half_span, half_chord = SPAN / (2.0 * airspeed), MAX_CHORD_TURN_RAD / (2.0 * airspeed)
 
     aspect = SPAN**2 / AREA
     drag_alpha = air.parasite_drag + (CL_0 + CL_ALPHA * alpha) ** 2 / (math.pi * OSWALD * aspect)
@@ -105,7 +105,9 @@ def rates(states: Floats, commands: Floats, air: BookAtmosphere) -> Floats:
         * (ROLL_BETA * beta + half_span * (ROLL_P * p + ROLL_R * r) + ROLL_AILERON * aileron + ROLL_RUDDER * rudder)
         - torque
     )
-    moment_y = pressure * CHORD * (CM_0 + CM_ALPHA * alpha + CM_Q * half_chord * q + CM_ELEVATOR * elevator)
+    moment_y = (
+        pressure * MAX_CHORD_TURN_RAD * (CM_0 + CM_ALPHA * alpha + CM_Q * half_chord * q + CM_ELEVATOR * elevator)
+    )
     moment_z = (
         pressure
         * SPAN

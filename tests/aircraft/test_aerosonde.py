@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import Trim, attitude, full_throttle, idle, linearise, straight
+from flight.dynamics.trim import Trim, attitude, full_throttle_climb, idle_descent, linearise, steady_flight
 from tests.aircraft import beard_mclain as reference
 from world.arrays import Floats
 from world.kernels import Record
@@ -21,7 +21,7 @@ def _flat(variation: Variation | None = None, *, motor_braking: bool = False) ->
 
 
 def _trim(fdm: Fdm, airspeed: float, climb: float = 0.0) -> Trim:
-    found = straight(fdm, airspeed, 100.0, climb)
+    found = steady_flight(fdm, airspeed, 100.0, climb)
     assert found is not None
     return found
 
@@ -40,7 +40,7 @@ def test_trim_is_the_reference_trim(airspeed: float, climb_deg: float) -> None:
     climb = math.radians(climb_deg)
     states, commands = reference.book_trim(airspeed, climb, reference.BookAtmosphere())
     if not 0.0 < commands[3] < 1.0:
-        assert straight(_flat(), airspeed, 100.0, climb) is None
+        assert steady_flight(_flat(), airspeed, 100.0, climb) is None
         return
     found = _trim(_flat(), airspeed, climb)
     np.testing.assert_allclose(found.commands(), commands, rtol=2e-5)
@@ -151,7 +151,7 @@ def test_limits_of_the_envelope_balance_in_the_reference(motor_braking: bool) ->
     # On the turning WGS84 earth in the standard atmosphere: 1.16727 kg/m^3 at 500 m (ISO 2533).
     fdm = Fdm(load_aircraft("aerosonde"), motor_braking=motor_braking)
     world = reference.BookAtmosphere(density=1.16727, gravity=9.8046, motor_braking=motor_braking)
-    for found in (full_throttle(fdm, 25.0, 500.0), idle(fdm, 25.0, 500.0)):
+    for found in (full_throttle_climb(fdm, 25.0, 500.0), idle_descent(fdm, 25.0, 500.0)):
         assert found is not None
         roll, pitch = attitude(found)
         states = np.zeros(8)

@@ -10,7 +10,7 @@ import pytest
 from aircraft.catalog import jsbsim_folder, load_aircraft, read_aircraft
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.model_check import check_model
-from flight.dynamics.trim import fastest, full_throttle, idle, straight
+from flight.dynamics.trim import fastest_level_flight, full_throttle_climb, idle_descent, steady_flight
 from flight.guidance.gains import load_gains
 from world.errors import FlightError
 
@@ -44,11 +44,15 @@ def test_its_trims_are_those_of_a_cessna() -> None:
     # The 172P's manual: cruise at 75 % power, 2000 ft: 116 knots; climb at sea level 700 ft/min at 76 knots; both of a
     # clean and lighter aircraft than the model, which carries six loads.
     fdm = Fdm(CESSNA)
-    level = [straight(fdm, speed, 600.0) for speed in (40.0, 50.0, 60.0)]
+    level = [steady_flight(fdm, speed, 600.0) for speed in (40.0, 50.0, 60.0)]
     throttles = [trim.throttle for trim in level if trim]
     assert len(throttles) == 3
     assert throttles == sorted(throttles)
-    climb, glide, fast = full_throttle(fdm, 39.0, 0.0), idle(fdm, 39.0, 0.0), fastest(fdm, 0.0)
+    climb, glide, fast = (
+        full_throttle_climb(fdm, 39.0, 0.0),
+        idle_descent(fdm, 39.0, 0.0),
+        fastest_level_flight(fdm, 0.0),
+    )
     assert climb is not None
     assert glide is not None
     assert fast is not None
@@ -60,10 +64,10 @@ def test_its_trims_are_those_of_a_cessna() -> None:
 
 def test_a_trim_does_not_depend_on_where_the_engine_was() -> None:
     fdm = Fdm(CESSNA)
-    first = straight(fdm, 50.0, 600.0)
-    full_throttle(fdm, 40.0, 3000.0)
-    idle(fdm, 60.0, 0.0)
-    again = straight(fdm, 50.0, 600.0)
+    first = steady_flight(fdm, 50.0, 600.0)
+    full_throttle_climb(fdm, 40.0, 3000.0)
+    idle_descent(fdm, 60.0, 0.0)
+    again = steady_flight(fdm, 50.0, 600.0)
     assert first is not None
     assert again is not None
     np.testing.assert_allclose(again.vector(), first.vector(), rtol=1e-6, atol=1e-9)
@@ -108,8 +112,8 @@ def test_what_it_lacks_is_refused_only_where_it_is_asked_for() -> None:
         Fdm(CESSNA, motor_braking=True)
     with pytest.raises(FlightError, match="aero/drag-factor is needed and not defined"):
         Fdm(CESSNA, variation=Variation(drag=1.1))
-    heavy = straight(Fdm(CESSNA, variation=Variation(mass=1.1)), 50.0, 600.0)
-    usual = straight(Fdm(CESSNA), 50.0, 600.0)
+    heavy = steady_flight(Fdm(CESSNA, variation=Variation(mass=1.1)), 50.0, 600.0)
+    usual = steady_flight(Fdm(CESSNA), 50.0, 600.0)
     assert heavy is not None
     assert usual is not None
     assert heavy.alpha > usual.alpha + 0.005
@@ -155,6 +159,6 @@ def test_a_model_of_ones_own_may_bring_in_files_of_its_folder(tmp_path: Path) ->
         (inside / name.replace("c172x", "mine")).write_text(text, encoding="utf-8")
     table = (CESSNA.folder / "c172x.toml").read_text(encoding="utf-8").replace("shipped_by_jsbsim = true", "")
     (folder / "mine.toml").write_text(table, encoding="utf-8")
-    mine, stock = straight(Fdm(read_aircraft(folder)), 50.0, 600.0), straight(Fdm(CESSNA), 50.0, 600.0)
+    mine, stock = steady_flight(Fdm(read_aircraft(folder)), 50.0, 600.0), steady_flight(Fdm(CESSNA), 50.0, 600.0)
     assert mine is not None
     assert mine == stock

@@ -146,14 +146,14 @@ def test_names_and_folders(tmp_path: Path, folder: Path) -> None:
 
 def test_metadata_agrees_with_the_trims() -> None:
     from flight.dynamics.fdm import Fdm
-    from flight.dynamics.trim import fastest, slowest
+    from flight.dynamics.trim import fastest_level_flight, slowest_level_flight
 
-    cessna = slowest(Fdm(load_aircraft("c172x")), 0.0)
+    cessna = slowest_level_flight(Fdm(load_aircraft("c172x")), 0.0)
     assert cessna is not None
     assert cessna.airspeed == pytest.approx(load_aircraft("c172x").stall_speed, abs=0.1)
     aircraft: Aircraft = load_aircraft("aerosonde")
     fdm = Fdm(aircraft)
-    slow, fast = slowest(fdm, 0.0), fastest(fdm, 0.0)
+    slow, fast = slowest_level_flight(fdm, 0.0), fastest_level_flight(fdm, 0.0)
     assert slow is not None
     assert fast is not None
     assert slow.airspeed == pytest.approx(aircraft.stall_speed, abs=0.05)

@@ -11,11 +11,11 @@ from aircraft.model_writer import model_xml
 from benchmarks.tuning.published_aircraft import PUBLISHED
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.dynamics.characteristics import modes_at
+from flight.dynamics.characteristics import level_flight_modes
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import fastest, linearise, slowest, straight
+from flight.dynamics.trim import fastest_level_flight, linearise, slowest_level_flight, steady_flight
 from flight.guidance.gains import load_gains
-from flight.guidance.model_gains import gains_of_model
+from flight.guidance.model_gains import gains_from_model
 from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import setup_maker
 
@@ -26,7 +26,7 @@ NAMES = sorted(PUBLISHED)
 def test_files_are_made_of_the_numbers(name: str) -> None:
     aircraft = load_aircraft(name)
     assert aircraft.model_file.read_text(encoding="utf-8") == model_xml(name, PUBLISHED[name])
-    made, kept = gains_of_model(aircraft), load_gains(aircraft)
+    made, kept = gains_from_model(aircraft), load_gains(aircraft)
     for field in made.__dataclass_fields__:
         assert getattr(kept, field) == pytest.approx(getattr(made, field), rel=1e-3, abs=1e-9), field
 
@@ -35,13 +35,13 @@ def test_files_are_made_of_the_numbers(name: str) -> None:
 def test_speeds_are_those_of_its_trims(name: str) -> None:
     aircraft = load_aircraft(name)
     fdm = Fdm(aircraft)
-    slow, fast = slowest(fdm, 0.0), fastest(fdm, 500.0)
+    slow, fast = slowest_level_flight(fdm, 0.0), fastest_level_flight(fdm, 500.0)
     assert slow is not None
     assert fast is not None
     assert slow.airspeed == pytest.approx(aircraft.stall_speed, abs=0.1)
     assert aircraft.airspeed_max < fast.airspeed
     assert aircraft.airspeed_min > 1.1 * aircraft.stall_speed
-    modes = {mode.name: mode for mode in modes_at(aircraft, aircraft.airspeed)}
+    modes = {mode.name: mode for mode in level_flight_modes(aircraft, aircraft.airspeed)}
     assert modes["short period"].damping > 0.3
     assert modes["Dutch roll"].damping > 0.1
 
@@ -49,7 +49,7 @@ def test_speeds_are_those_of_its_trims(name: str) -> None:
 def test_the_ultra_stick_is_the_universitys() -> None:
     """UAV_trimcondition.mat, and the matrices of its linear model, at 17 m/s and 100 m; see the folder's README.md."""
     fdm = Fdm(load_aircraft("ultrastick25e"))
-    trim = straight(fdm, 17.0, 100.0)
+    trim = steady_flight(fdm, 17.0, 100.0)
     assert trim is not None
     assert trim.alpha == pytest.approx(0.0550619, rel=1e-3)
     assert trim.elevator == pytest.approx(-0.0971978, rel=1e-3)
@@ -80,7 +80,7 @@ def test_the_ultra_stick_is_the_universitys() -> None:
 
 def test_the_x8_trims_as_its_source_does() -> None:
     # simX8.m: u 17.9914, w 0.5551 m/s, elevator 0.0370 rad, in air of 1.225 kg/m^3.
-    trim = straight(Fdm(load_aircraft("x8")), math.hypot(17.9914, 0.5551), 0.0)
+    trim = steady_flight(Fdm(load_aircraft("x8")), math.hypot(17.9914, 0.5551), 0.0)
     assert trim is not None
     assert trim.alpha == pytest.approx(math.atan2(0.5551, 17.9914), rel=2e-3)
     assert trim.elevator == pytest.approx(0.0370, abs=5e-5)
@@ -96,7 +96,7 @@ def test_the_x8_has_its_sources_drag() -> None:
 
 def test_the_zagi_is_the_books_equations() -> None:
     fdm = Fdm(load_aircraft("zagi"))
-    trim = straight(fdm, 15.0, 0.0)
+    trim = steady_flight(fdm, 15.0, 0.0)
     assert trim is not None
     pressure = 0.5 * 1.225 * 225.0 * 0.2589
     thrust = fdm.properties.getter("motor/thrust-n")()

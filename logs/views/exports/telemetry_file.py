@@ -80,7 +80,7 @@ def _upload_messages(log: FlightLog) -> Iterator[Any]:
 def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))
-    start = snapshots.before_start(setup)
+    start = snapshots.start_snapshot(setup)
     home = setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
     status = Status(start, home, battery=setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
     status.total, items = len(setup.mission.items), setup.route.items
@@ -98,7 +98,7 @@ def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
         if not due_names and int(row.leg) == active_leg:
             continue
         snapshot = snapshots.snapshot(row)
-        if not snapshot.finite:
+        if not snapshot.is_finite:
             continue
         status.snapshot, status.boot, status.wall = snapshot, time, EPOCH_NS / 1e9 + time
         if int(row.leg) != active_leg:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track, control_limits, held_at_limit
+from flight.simulation.track import Track, control_limits, saturated_rows
 from logs.recording.reader import FlightLog
 from logs.verdict.findings import closest_to_limit
 from logs.verdict.judge_flight import judge_flight
@@ -142,7 +142,7 @@ def _measure_flight(setup: FlightSetup, track: Track) -> dict[tuple[str, str], f
     durations = np.append(np.diff(track.time), 0.0)
     for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
         if math.isfinite(limit):
-            is_at_limit = held_at_limit(track, k, 0.0 if name == "throttle" else -limit, limit)
+            is_at_limit = saturated_rows(track, k, 0.0 if name == "throttle" else -limit, limit)
             values[f"{name} at its limit", "s"] = float(durations[is_at_limit].sum())
     return values
 

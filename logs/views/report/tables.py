@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import Track, control_limits, held_at_limit
+from flight.simulation.track import Track, control_limits, saturated_rows
 from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
@@ -313,7 +313,7 @@ def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, 
     rows: list[tuple[str, ...]] = []
     for k, ((name, limit), command) in enumerate(zip(control_limits(setup.aircraft), track.commands.T, strict=True)):
         min_command = 0.0 if name == "throttle" else -limit
-        saturation_time = float(durations[held_at_limit(track, k, min_command, limit)].sum())
+        saturation_time = float(durations[saturated_rows(track, k, min_command, limit)].sum())
         scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
         peak_text = number(scale * _max_magnitude(command), digits=1)
         limit_text = number(scale * limit, digits=1)

@@ -16,7 +16,7 @@ def test_a_flight_begun_in_its_own_state_goes_on_as_it_would_have() -> None:
     first.write(commands)
     first.step(120)
     state = first.read()
-    second.begin_at(
+    second.start_untrimmed(
         attitude=(state.roll, state.pitch, state.yaw),
         velocity=(state.velocity_north, state.velocity_east, state.velocity_down),
         rates=(state.roll_rate, state.pitch_rate, state.yaw_rate),

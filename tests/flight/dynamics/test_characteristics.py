@@ -8,14 +8,14 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.dynamics.characteristics import name_modes, step_responses, trim_table
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import linearise, straight
+from flight.dynamics.trim import linearise, steady_flight
 
 AEROSONDE = load_aircraft("aerosonde")
 
 
 def test_the_books_modes_get_their_names() -> None:
     fdm = Fdm(AEROSONDE, flat_earth=True)
-    level = straight(fdm, 25.0, 100.0)
+    level = steady_flight(fdm, 25.0, 100.0)
     assert level is not None
     modes = {mode.name: mode for mode in name_modes(linearise(fdm, level)[0], 25.0)}
     expected = {

@@ -9,7 +9,7 @@ import pytest
 from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.data_sheet import DataSheet
 from aircraft.model_writer import Layout
-from flight.dynamics.compiled_frame import FCS_BEGIN, step_often
+from flight.dynamics.compiled_frame import FCS_START, step_repeatedly
 from flight.dynamics.compiled_model import CompiledModel
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.instructions import Operation
@@ -54,8 +54,8 @@ def first_difference(fdm: Fdm, model: CompiledModel, seconds: float) -> tuple[in
             fdm.properties.set(name, value)
             model.numbers[model.properties[name]] = value
         fdm.step(STEPS)
-        step_often(*model.arrays, STEPS)
-        if found := model.differences():
+        step_repeatedly(*model.arrays, STEPS)
+        if found := model.differing_properties():
             return tick, found
     return None
 
@@ -114,7 +114,7 @@ def test_the_last_bit_of_the_attitude_is_noticed() -> None:
     assert model.find_differences()
 
 
-@pytest.mark.parametrize("field", ["velocity_before", "velocity_two_before", "acceleration_before"])
+@pytest.mark.parametrize("field", ["last_velocity", "second_last_velocity", "last_acceleration"])
 def test_another_integrator_is_noticed(field: str) -> None:
     """Without its past, Adams and Bashforth's method is another one."""
     _, model = begun_aerosonde()
@@ -147,7 +147,7 @@ def test_a_constant_of_a_function_is_noticed() -> None:
 def test_a_wrong_register_is_noticed() -> None:
     """An instruction that reads or writes its neighbour: each of the flight controls."""
     _, model = begun_aerosonde()
-    begin, count = int(model.code[FCS_BEGIN]), 4
+    begin, count = int(model.code[FCS_START]), 4
     assert model.code[begin] == Operation.ACTUATOR
     for instruction in range(count):
         for part in (1, 3):

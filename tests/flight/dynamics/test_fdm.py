@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
-from flight.dynamics.fdm import Fdm, Variation, check_place, silence
+from flight.dynamics.fdm import Fdm, Variation, check_start_position, silence
 from flight.dynamics.jsbsim_properties import FOOT, TERRAIN
 from flight.dynamics.state import STATE, Commands
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from world.errors import FlightError
 from world.kernels import Record, field_names
 
@@ -70,14 +70,14 @@ BEYOND = {
 
 @pytest.mark.parametrize("place", [(-89.9, 180.0, 500.0, 400.0), (46.0, 8.0, 400.1, 400.0), (46.0, 8.0, 10999.9, 0.0)])
 def test_a_place_within_the_limits_is_taken(place: tuple[float, float, float, float]) -> None:
-    check_place(*place)
+    check_start_position(*place)
 
 
 @pytest.mark.parametrize("case", BEYOND)
 def test_a_place_beyond_one_is_refused_by_its_name_and_value(case: str) -> None:
     place = BEYOND[case]
     with pytest.raises(FlightError) as caught:
-        check_place(*place)
+        check_start_position(*place)
     error = caught.value
     # Both heights are the start's.
     field, value = {"latitude": ("latitude", 90.0), "longitude": ("longitude", -180.1)}.get(case, ("start", place[2]))
@@ -371,7 +371,7 @@ def test_variations_change_what_they_say() -> None:
         "drag": Variation(drag=1.3),
         "control": Variation(control=0.75),
     }.items():
-        found = straight(Fdm(AEROSONDE, variation=variation), 25.0, 500.0)
+        found = steady_flight(Fdm(AEROSONDE, variation=variation), 25.0, 500.0)
         assert found is not None
         level[name] = found
     lift = {name: 0.23 + 5.61 * trim.alpha + 0.13 * trim.elevator for name, trim in level.items()}

@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.contacts import Gear
-from flight.dynamics.compiled_frame import step_often
+from flight.dynamics.compiled_frame import step_repeatedly
 from flight.dynamics.compiled_model import CompiledModel
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.ground_contact import MAX_CONTACTS
@@ -43,8 +43,8 @@ def test_every_step_on_the_ground_equals_jsbsims(name: str, gear: Gear) -> None:
     pressed = 0
     for step in range(round(SECONDS / fdm.dt)):
         fdm.step()
-        step_often(*model.arrays, 1)
-        assert model.differences() == [], step
+        step_repeatedly(*model.arrays, 1)
+        assert model.differing_properties() == [], step
         pressed += int((model.contacts["compression"] != 0.0).sum())
     # On two contacts or more, most of the time.
     assert pressed > 2 * 0.8 * SECONDS / fdm.dt
@@ -54,7 +54,7 @@ def test_every_step_on_the_ground_equals_jsbsims(name: str, gear: Gear) -> None:
 def test_friction_brings_the_aircraft_to_rest() -> None:
     """By the dynamic friction of a belly on grass, 0.4: from 16 m/s in 4.1 s."""
     _, model = begun()
-    step_often(*model.arrays, 120 * 6)
+    step_repeatedly(*model.arrays, 120 * 6)
     assert np.linalg.norm(model.frames[0].ground_velocity) < 0.5
     assert np.abs(model.contacts["friction"]).max() > 0.0
 

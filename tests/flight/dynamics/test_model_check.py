@@ -16,7 +16,7 @@ from world.errors import FlightError
 
 AEROSONDE = load_aircraft("aerosonde")
 # As it is but in tests (tests/conftest.py).
-TRY = model_check._try
+TRY = model_check._run_trial
 
 
 @pytest.fixture
@@ -104,7 +104,7 @@ class Tried:
 @pytest.fixture
 def tried(monkeypatch: pytest.MonkeyPatch) -> Tried:
     fake = Tried()
-    monkeypatch.setattr(model_check, "_try", TRY)
+    monkeypatch.setattr(model_check, "_run_trial", TRY)
     monkeypatch.setattr(model_check.subprocess, "run", fake.run)
     return fake
 
@@ -145,7 +145,7 @@ def test_a_model_that_aborts_jsbsim(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(model_check, "_try", TRY)
+    monkeypatch.setattr(model_check, "_run_trial", TRY)
     # An engine that JSBSim would make is one of those names that cannot be looked up before: this one it does not
     # make, because there is only a tank.
     change_model(tmp_path, "<p> aero/beta-rad </p>", "<p> propulsion/engine[7]/thrust-lbs </p>")

@@ -24,12 +24,12 @@ from flight.dynamics.trim import (
     euler,
     first_guess,
     from_vector,
-    full_throttle,
-    idle,
+    full_throttle_climb,
+    idle_descent,
     linearise,
-    slowest,
+    slowest_level_flight,
     solve_trim,
-    straight,
+    steady_flight,
 )
 from tests.kernels.processors import NUMPY_ON_BASELINE_CPU
 from tests.soak import SOAK
@@ -227,10 +227,10 @@ def test_a_balance_that_is_not_a_number_is_no_flight() -> None:
 
 def test_each_kind_of_trim_holds_its_two_quantities() -> None:
     aircraft = LinearAircraft()
-    held = straight(aircraft, 26.0, 700.0, 0.05)
+    held = steady_flight(aircraft, 26.0, 700.0, 0.05)
     assert held is not None
     assert (held.airspeed, held.climb, held.amsl, aircraft.amsl) == (26.0, 0.05, 700.0, 700.0)
-    steepest, lowest = full_throttle(aircraft, 25.0, 0.0), idle(aircraft, 25.0, 0.0)
+    steepest, lowest = full_throttle_climb(aircraft, 25.0, 0.0), idle_descent(aircraft, 25.0, 0.0)
     assert steepest is not None
     assert lowest is not None
     assert (steepest.throttle, lowest.throttle) == (1.0, 0.0)
@@ -239,12 +239,12 @@ def test_each_kind_of_trim_holds_its_two_quantities() -> None:
 
 
 def test_the_slowest_flight_has_the_elevator_at_its_stop() -> None:
-    slow = slowest(LinearAircraft(), 0.0)
+    slow = slowest_level_flight(LinearAircraft(), 0.0)
     # -0.5 is 40 m/s slower than the 25 m/s of -0.1, which is no flight; -0.2 is 15 m/s.
     assert slow is None
     aircraft = LinearAircraft()
     aircraft.surface_limits = lambda: (0.2, 0.4, 0.3)  # type: ignore[method-assign]  # an aircraft with less elevator
-    slow = slowest(aircraft, 0.0)
+    slow = slowest_level_flight(aircraft, 0.0)
     assert slow is not None
     assert (slow.elevator, slow.climb) == (-0.2, 0.0)
     assert slow.airspeed == pytest.approx(15.0)

@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from flight.guidance.gains import load_gains
-from flight.guidance.model_gains import airframe_gains, gains_at_airspeed, gains_of_model, gains_text
+from flight.guidance.model_gains import airframe_gains, gains_at_airspeed, gains_from_model, gains_text
 
 AEROSONDE = load_aircraft("aerosonde")
 
@@ -33,23 +33,23 @@ def test_round_figures_go_with_the_airspeed() -> None:
 
 
 def test_roll_poles_are_where_they_are_placed() -> None:
-    gains = gains_of_model(AEROSONDE)
+    gains = gains_from_model(AEROSONDE)
     # 0.4 / 0.05 s is faster than the round 6 rad/s at 25 m/s.
     assert gains.roll_frequency == 6.0
     power = 1.0 / gains.aileron_per_roll_acceleration
     assert gains.roll_gain * power == pytest.approx(36.0)
     # A slow servo sets the pace: 0.4 / 0.2 s.
-    assert gains_of_model(replace(AEROSONDE, surface_lag=0.2)).roll_frequency == 2.0
+    assert gains_from_model(replace(AEROSONDE, surface_lag=0.2)).roll_frequency == 2.0
 
 
 def test_the_idle_throttle_is_where_the_motor_begins_to_push() -> None:
     """The book's disc leaves with 20 m/s times the throttle: at 15 m/s it pushes from 0.75 on."""
-    assert 0.73 <= gains_of_model(load_aircraft("zagi")).throttle_idle <= 0.75
+    assert 0.73 <= gains_from_model(load_aircraft("zagi")).throttle_idle <= 0.75
     assert load_gains(load_aircraft("zagi")).throttle_idle == 0.74
 
 
 def test_the_file_is_read_as_written(tmp_path: Path) -> None:
-    gains = gains_of_model(AEROSONDE)
+    gains = gains_from_model(AEROSONDE)
     (tmp_path / "gains.toml").write_text(gains_text(gains), encoding="utf-8")
     again = load_gains(replace(AEROSONDE, folder=tmp_path))
     for name in gains.__dataclass_fields__:

@@ -108,10 +108,10 @@ def test_in_flight_a_mode_sends_it_another_way_once(mode: int) -> None:
 
 def test_a_pause_circles_and_a_go_to_needs_a_flight() -> None:
     state, there = flying(), LoiterCenter(46.0, 8.0, 150.0)
-    assert (state.pause(False).result, state.mode) == (ACCEPTED, LOITER)
-    assert (state.pause(True).result, state.mode) == (ACCEPTED, AUTO)
+    assert (state.pause_or_continue(False).result, state.mode) == (ACCEPTED, LOITER)
+    assert (state.pause_or_continue(True).result, state.mode) == (ACCEPTED, AUTO)
     assert (state.go_to(there).result, state.mode, state.loiter_center) == (ACCEPTED, GUIDED, there)
-    assert judged().go_to(there).result == judged().pause(False).result == DENIED
+    assert judged().go_to(there).result == judged().pause_or_continue(False).result == DENIED
     # What ends beside the mission completes nothing of it.
     state.on_flight_ended(True)
     assert (state.mode, state.loiter_center, state.mission_state) == (MANUAL, None, NOT_STARTED)

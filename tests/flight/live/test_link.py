@@ -224,9 +224,9 @@ def test_nobody_beyond_this_machine_is_believed_before_a_heartbeat() -> None:
         ask = packed(mavlink.MAVLink_param_request_list_message(1, 1))
         assert link.decode_datagram(ask, ("192.0.2.1", 5)) == []
         assert link.peers == {}
-        assert link.take_notices() == ["192.0.2.1 sends PARAM_REQUEST_LIST and no HEARTBEAT: it is not answered"]
+        assert link.pop_notices() == ["192.0.2.1 sends PARAM_REQUEST_LIST and no HEARTBEAT: it is not answered"]
         assert link.decode_datagram(ask, ("192.0.2.1", 6)) == []
-        assert link.take_notices() == [], "said once"
+        assert link.pop_notices() == [], "said once"
         assert len(link.decode_datagram(packed(HEARTBEAT) + ask, ("192.0.2.1", 5))) == 2
         assert link.decode_datagram(ask, ("192.0.2.1", 6)) == []
         other = packed(mavlink.MAVLink_param_request_list_message(7, 1))
@@ -336,14 +336,14 @@ def test_an_address_whose_clock_is_far_ahead_is_named_once() -> None:
         for stamp in (2**48 - 1, 2**48 - 1, NOW + 2 * DAY):
             assert made.decode_datagram(signed_at(stamp), ("127.0.0.1", 5)) == []
         assert (made.dropped.future, made.peers) == (3, {})
-        (notice,) = made.take_notices()
+        (notice,) = made.pop_notices()
         assert notice.startswith("127.0.0.1 signs with timestamps more than a day ahead")
         made.decode_datagram(signed_at(NOW + 2 * DAY), ("127.0.0.1", 6))
-        assert made.take_notices() == []
+        assert made.pop_notices() == []
         # Addresses that are named are bounded, and the vehicle still signs.
         for host in range(1000):
             made.decode_datagram(signed_at(2**48 - 1), (f"127.0.{host // 250}.{2 + host % 250}", 5))
-        assert len(made.take_notices()) < 20
+        assert len(made.pop_notices()) < 20
         made.send_heartbeat(HEARTBEAT)
         assert len(made.decode_datagram(signed_at(NOW), ("127.0.0.1", 5))) == 1
     finally:

@@ -62,12 +62,12 @@ def test_a_row_comes_out_under_its_names() -> None:
     assert (snapshot.wind_north, snapshot.wind_east) == pytest.approx((-2.5, 1.5), abs=1e-3)
     assert snapshot.yaw == pytest.approx(0.3, abs=1e-4)
     assert Snapshot.unpack(snapshot.pack()) == snapshot
-    assert snapshot.finite
+    assert snapshot.is_finite
 
 
 def test_an_aircraft_waits_at_the_start_on_its_first_course() -> None:
     setup = setup_of(wp(0, 500), wp(2000, 500))
-    snapshot = SnapshotMaker(setup, LocalMap.around(setup)).before_start(setup)
+    snapshot = SnapshotMaker(setup, LocalMap.around(setup)).start_snapshot(setup)
     assert snapshot.amsl == pytest.approx(400.0)
     assert snapshot.height == pytest.approx(300.0)
     assert snapshot.yaw == pytest.approx(math.pi / 2.0, abs=1e-3)

@@ -132,7 +132,7 @@ def test_a_change_is_told_at_once(clock: Clock) -> None:
     sending = Sending(clock)
     sending.downlink.tick(1000.0)
     clock.now = 1000.3
-    sending.downlink.heartbeat_now()
+    sending.downlink.request_heartbeat()
     sending.downlink.tick(1000.3)
     assert sending.link.heartbeats == 2
 
@@ -164,13 +164,13 @@ def test_a_message_that_is_switched_off_is_not_sent(clock: Clock) -> None:
 def test_the_caller_sleeps_until_something_is_due_and_no_longer_than_it_may(clock: Clock) -> None:
     sending = Sending(clock)
     sending.downlink.tick(1000.0)
-    assert sending.downlink.wait(1000.0, 5.0) == pytest.approx(0.1)
-    assert sending.downlink.wait(1000.0, 0.04) == pytest.approx(0.04)
-    assert sending.downlink.wait(1000.4, 5.0) == 0.0
+    assert sending.downlink.wait_time(1000.0, 5.0) == pytest.approx(0.1)
+    assert sending.downlink.wait_time(1000.0, 0.04) == pytest.approx(0.04)
+    assert sending.downlink.wait_time(1000.4, 5.0) == 0.0
     alone = Sending(clock, stations=0)
     alone.downlink.tick(1000.0)
     # Then only the heartbeat is.
-    assert alone.downlink.wait(1000.3, 5.0) == pytest.approx(0.7)
+    assert alone.downlink.wait_time(1000.3, 5.0) == pytest.approx(0.7)
 
 
 def test_texts_go_to_every_station_and_to_the_terminal(clock: Clock) -> None:
@@ -198,9 +198,9 @@ def test_the_number_of_a_text_stays_within_16_bits_and_is_never_0(clock: Clock) 
 def test_all_parameters_are_streamed_once_in_order_to_who_asked(clock: Clock) -> None:
     sending = Sending(clock)
     sending.first.periods[NAME] = None
-    sending.first.parameter = 0.0
+    sending.first.next_parameter = 0.0
     rounds = 0
-    while sending.first.parameter is not None:
+    while sending.first.next_parameter is not None:
         sending.downlink.tick(1000.0)
         rounds += 1
     streamed = [one for one in sending.link.messages if one.get_type() == "PARAM_VALUE"]

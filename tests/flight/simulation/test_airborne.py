@@ -101,13 +101,13 @@ def test_a_flight_that_still_circles_when_its_time_is_over_says_so() -> None:
         flight = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
         flight._start_disturbances(setup)
         flight.max_ticks, flight.memory.leg = 0, leg
-        assert flight.block(10)[1] == f"{said}not finished after 0 s"
+        assert flight.fly_block(10)[1] == f"{said}not finished after 0 s"
 
 
 def test_a_block_ends_with_the_time() -> None:
     flight = airborne([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])
     flight._start_disturbances(MAKE(np.array([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])))
     flight.max_ticks = 0
-    rows, ended = flight.block(10)
+    rows, ended = flight.fly_block(10)
     assert len(rows) == 0
     assert ended == "time limit: not finished after 0 s"

@@ -33,7 +33,7 @@ STRIP = LandingStrip(500.0, 600.0, length=600.0)
 def flown(setup: FlightSetup, aircraft: Aircraft, variation: Variation | None = None) -> tuple[str, bytes, bytes]:
     """Fly for some seconds; return the engine, all rows, and the whole state of the flight at its end."""
     flight = Flight(setup, aircraft, variation)
-    rows, _ = flight.block(SECONDS * setup.guidance_hz)
+    rows, _ = flight.fly_block(SECONDS * setup.guidance_hz)
     assert len(rows) > 10 * setup.guidance_hz
     return flight.engine, rows.tobytes(), flight._workspace.block.tobytes()
 

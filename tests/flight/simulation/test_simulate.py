@@ -219,7 +219,7 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
     assert _digest(join_blocks(blocks)) == first
     # A second of flight each, up to the end of the path.
     assert {len(block.rows) for block in blocks[:-1]} == {60}
-    assert [block.ended for block in blocks] == [""] * (len(blocks) - 1) + ["completed"]
+    assert [block.end_reason for block in blocks] == [""] * (len(blocks) - 1) + ["completed"]
     distances = [block.distance for block in blocks]
     assert distances == sorted(distances)
     assert distances[-1] == flight.path.length
@@ -252,11 +252,11 @@ def test_a_seed_of_the_wind_wins(make_setup: MakeSetup, aerosonde: Aircraft) -> 
 def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     flight = Flight(replace(make_setup(WAY), engine="jsbsim"), aerosonde)
     for _ in range(8):
-        rows, ended = flight.block(60)
+        rows, ended = flight.fly_block(60)
         assert not ended
     flight.fdm.write(np.full(4, math.nan))
     flight.fdm.step()
-    rows, ended = flight.block(60)
+    rows, ended = flight.fly_block(60)
     assert ended == "loss of control: the state is not a number"
     assert len(rows) == 0
     assert np.isfinite(flight.memory.tolist()).all()

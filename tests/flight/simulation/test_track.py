@@ -27,9 +27,9 @@ from flight.simulation.track import (
     Track,
     as_track,
     control_limits,
-    held_at_limit,
     join_tracks,
     quantise,
+    saturated_rows,
     track_columns,
     track_rows,
 )
@@ -204,15 +204,15 @@ def test_an_unknown_aircraft_has_a_throttle_and_no_limits() -> None:
 def test_a_surface_is_held_at_either_limit_or_beyond(column: int) -> None:
     # Within a thousandth of the range, which is 1 here.
     track = commanded(column, -0.6, -0.5, -0.4995, -0.498, 0.0, 0.498, 0.4995, 0.5, 0.6)
-    assert held_at_limit(track, column, -0.5, 0.5).tolist() == [True] * 3 + [False] * 3 + [True] * 3
+    assert saturated_rows(track, column, -0.5, 0.5).tolist() == [True] * 3 + [False] * 3 + [True] * 3
     other = AILERON if column == ELEVATOR else ELEVATOR
-    assert not held_at_limit(track, other, -0.5, 0.5).any()
+    assert not saturated_rows(track, other, -0.5, 0.5).any()
 
 
 def test_a_throttle_is_held_closed_and_open() -> None:
     track = commanded(THROTTLE, 0.0, 0.002, 0.5, 0.998, 1.0)
-    assert held_at_limit(track, THROTTLE, 0.0, 1.0).tolist() == [True, False, False, False, True]
+    assert saturated_rows(track, THROTTLE, 0.0, 1.0).tolist() == [True, False, False, False, True]
 
 
 def test_unknown_limits_hold_nothing() -> None:
-    assert not held_at_limit(commanded(ELEVATOR, -9.0, 0.0, 9.0), ELEVATOR, math.nan, math.nan).any()
+    assert not saturated_rows(commanded(ELEVATOR, -9.0, 0.0, 9.0), ELEVATOR, math.nan, math.nan).any()

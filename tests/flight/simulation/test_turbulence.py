@@ -149,7 +149,7 @@ def test_gusts_of_a_flight_turn_with_the_wind_and_count_height_from_the_ground(
         )
         setup = make_setup(way, wind=(6.0, from_deg), turbulence="moderate", terrain={"kind": "flat", "amsl_m": ground})
         flight = Flight(setup, aerosonde)
-        rows, _ = flight.block(120)
+        rows, _ = flight.fly_block(120)
         wind = as_track(rows).wind[1:].astype(np.float64)
         along = -np.array([math.sin(course), math.cos(course)])
         return np.column_stack([wind[:, :2] @ along - 6.0, wind[:, :2] @ np.array([along[1], -along[0]]), wind[:, 2]])

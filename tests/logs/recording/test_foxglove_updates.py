@@ -20,7 +20,7 @@ from logs.recording.foxglove_updates import (
     MAX_POINTS,
     THINNED_POINT_COUNT,
     TRACK_INTERVAL_S,
-    TrackSoFar,
+    GrowingTrack,
     points_along_legs,
     thin_line,
 )
@@ -38,7 +38,7 @@ def test_a_long_winding_flight_keeps_its_shape() -> None:
     corners = np.array([[3000.0 * k, 4000.0 * (k % 2), 100.0] for k in range(41)])
     along = np.linspace(0.0, 40.0, 7200 // TRACK_INTERVAL_S)
     flown = np.stack([np.interp(along, range(41), corners[:, k]) for k in range(3)], axis=1)
-    track, longest = TrackSoFar(), 0
+    track, longest = GrowingTrack(), 0
     for k, position in enumerate(flown):
         points = track.add(position)
         longest = max(longest, len(points))

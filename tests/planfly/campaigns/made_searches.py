@@ -65,7 +65,9 @@ def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], go
         for values in table(whole / WINDS_DATABASE):
             if values[0] in numbers:
                 known = dict(zip(WINDS_KIND.columns, (*values, 0.0, ""), strict=True))
-                row = replace(make_flight_row(known["draw"], known), narrow=parse_marginal_passes(known["narrow"]))
+                row = replace(
+                    make_flight_row(known["draw"], known), marginal_passes=parse_marginal_passes(known["narrow"])
+                )
                 store.add(RequestedFlight(*values[:4]), row)
 
 

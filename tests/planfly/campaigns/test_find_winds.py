@@ -97,7 +97,7 @@ def flight_that_states_its_margin(base: CampaignBase, index: int, wind: GivenWin
     """A made flight that also tells by how much it passed, where that is less than a metre a second of wind."""
     row = made_flight(base, index, wind)
     margin = (12.0 if wind.from_deg == 270.0 else 8.0) + row.draw.seed % 1000 / 1000.0 - 0.5 - wind.speed
-    return replace(row, narrow=(("clearance", Place("leg", 1), margin),)) if 0.0 < margin < 1.0 else row
+    return replace(row, marginal_passes=(("clearance", Place("leg", 1), margin),)) if 0.0 < margin < 1.0 else row
 
 
 def test_failures_in_calm_air_are_known_by_rule_and_place(wind_base: CampaignBase) -> None:

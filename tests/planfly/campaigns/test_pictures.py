@@ -143,7 +143,7 @@ def test_the_boundary_passes_through_each_direction() -> None:
 
 def test_the_edge_of_the_search_is_no_limit() -> None:
     """Where nothing failed the boundary is the largest wind that was looked at: no line is drawn there, but a mark."""
-    open_ones = [replace(SPOKES[k], boundary=20.0, low=19.0, high=20.0, reaches=True) for k in (1, 2)]
+    open_ones = [replace(SPOKES[k], boundary=20.0, low=19.0, high=20.0, is_beyond_search=True) for k in (1, 2)]
     figure = draw_go_no_go([SPOKES[0], *open_ones, SPOKES[3]], 20.0, 0.99, 0.95, "demo", None)
     [axes] = figure.axes
     [outline] = [line for line in axes.lines if len(line.get_xdata()) > 100]
@@ -186,7 +186,7 @@ PICTURES = {
     "crossings": lambda: draw_crossings(RANDOM.normal(0.0, 3.0, (40, 8, 2)), FAILED),
     "one crossing": lambda: draw_crossings(RANDOM.normal(0.0, 3.0, (40, 2, 2)), FAILED),
     "winds": lambda: draw_go_no_go(
-        [replace(SPOKES[0], reaches=True), *SPOKES[1:]], 20.0, 0.99, 0.95, "demo", (5.0, 9.0)
+        [replace(SPOKES[0], is_beyond_search=True), *SPOKES[1:]], 20.0, 0.99, 0.95, "demo", (5.0, 9.0)
     ),
 }
 

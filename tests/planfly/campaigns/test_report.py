@@ -18,10 +18,10 @@ from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report import (
     OutputDirectory,
     answer_state,
+    chart_directions,
     clear_campaign,
     finish_campaign,
     fly_row_again,
-    make_spokes,
     wind_lines,
     write_files,
     write_winds,
@@ -123,7 +123,7 @@ FOUND = WindsFound(
 
 
 def test_flights_are_counted_by_wind() -> None:
-    first = make_spokes(FOUND)[0]
+    first = chart_directions(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
     assert wind_lines(FOUND)[0] == (
         "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"

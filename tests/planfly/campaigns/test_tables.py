@@ -31,7 +31,11 @@ from tests.soak import SOAK, note
 
 
 def test_rows_come_back_as_they_were_in_order_of_index(base: CampaignBase, tmp_path: Path) -> None:
-    real, made, lost = replace(fly_one(base, 2), narrow=()), made_flight(base, 0), make_lost_row(base, 1, "died")
+    real, made, lost = (
+        replace(fly_one(base, 2), marginal_passes=()),
+        made_flight(base, 0),
+        make_lost_row(base, 1, "died"),
+    )
     with Store(tmp_path / "c.sqlite", "a", {}, resume=False) as store:
         for row in (real, made, lost):
             store.add(row)
@@ -46,7 +50,7 @@ def test_rows_come_back_as_they_were_in_order_of_index(base: CampaignBase, tmp_p
         assert [row.draw.index for row in store.worst_flights(3)] == [1, 0, 2]
         assert store.has_track() == [False, False, True]
         assert store.column("mass").tolist() == [row.draw.values["mass"] for row in rows]
-        store.delete_flights_from(1)
+        store.delete_later_flights(1)
         assert list(store.outcomes()) == [0]
         with pytest.raises(StoreError, match="UNIQUE"):
             store.add(made)
@@ -65,7 +69,7 @@ def opened(path: Path, *, resume: bool = True, **other: float) -> WindsStore:
 def test_what_was_asked_for_comes_back_in_order(base: CampaignBase, tmp_path: Path) -> None:
     later, first = RequestedFlight(7, 3, 0.1 * 3, 2), RequestedFlight(2, 3, 12.300000000000001, 2)
     narrow = (("slope", Place("leg", 1), 0.1 * 3), ("threat", Place("missile", 0, name="Alfa"), 0.0))
-    bad = replace(made_flight(base, 3, GivenWind(15.0, 0.0)), narrow=narrow)
+    bad = replace(made_flight(base, 3, GivenWind(15.0, 0.0)), marginal_passes=narrow)
     with opened(tmp_path / "w.sqlite", resume=False) as store:
         store.add(later, all_fly(base, 2))
         store.add(RequestedFlight(8, 3, 15.0, 3), bad)

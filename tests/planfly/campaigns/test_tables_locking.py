@@ -36,7 +36,7 @@ def test_values_make_the_row_again(base: CampaignBase) -> None:
         values = row_values(row)
         assert tuple(values) == tuple(ROW_COLUMNS)
         # But for its narrow passes, which a search's table keeps for itself.
-        assert make_flight_row(row.draw.index, values) == replace(row, narrow=())
+        assert make_flight_row(row.draw.index, values) == replace(row, marginal_passes=())
 
 
 def test_who_flew_and_how_long_makes_no_other_flight(base: CampaignBase, tmp_path: Path) -> None:

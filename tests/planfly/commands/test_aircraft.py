@@ -13,7 +13,7 @@ import planfly
 from aircraft.catalog import load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from logs.recording.reader import read_log
 from logs.views import aircraft as drawn
 from planfly.cli import main
@@ -62,7 +62,7 @@ def test_the_weight_of_a_propeller_does_not_change_a_trim(inertia: str) -> None:
     assert "<ixx> 1.67 </ixx>" in text
     propeller.write_text(text.replace("<ixx> 1.67 </ixx>", f"<ixx> {inertia} </ixx>"))
     both = (load_aircraft("c172x"), planfly.aircraft("./mine"))
-    own, other = (straight(Fdm(aircraft), 50.0, 500.0) for aircraft in both)
+    own, other = (steady_flight(Fdm(aircraft), 50.0, 500.0) for aircraft in both)
     assert own is not None
     assert other is not None
     assert np.abs(own.vector() - other.vector()).max() < 1e-4

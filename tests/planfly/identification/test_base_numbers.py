@@ -14,7 +14,7 @@ from aircraft.identification.motor_table import MotorTable
 from aircraft.identification.parameters import prior_means
 from aircraft.identification.performance import performance
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from planfly.identification.base_numbers import base_model, is_flying_wing, scale_model
 from planfly.identification.model_text import identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
@@ -92,7 +92,7 @@ def test_a_motor_of_another_form_becomes_tables(name: str) -> None:
     numbers = base_model(aircraft)
     assert isinstance(numbers.motor, MotorTable)
     fdm = Fdm(aircraft)
-    trim = straight(fdm, aircraft.airspeed, 500.0)
+    trim = steady_flight(fdm, aircraft.airspeed, 500.0)
     assert trim is not None
     fdm.balance(trim.vector())
     flow = np.full(1, aircraft.airspeed), np.full(1, trim.throttle), np.full(1, numbers.motor.density)
@@ -120,7 +120,7 @@ def test_an_identified_ultra_stick_without_a_log_flies_as_its_base(tmp_path: Pat
     powers = []
     for aircraft in (base, read_aircraft(folder)):
         fdm = Fdm(aircraft)
-        trim = straight(fdm, base.airspeed, 500.0)
+        trim = steady_flight(fdm, base.airspeed, 500.0)
         assert trim is not None
         fdm.balance(trim.vector())
         powers.append((trim.throttle, float(fdm.read().power)))
@@ -189,7 +189,7 @@ def test_a_flying_wing_from_a_data_sheet_is_a_base_without_the_propellers_torque
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "mine.xml").write_text(identified_xml(wing, "mine", numbers, prior_means()), encoding="utf-8")
     shutil.copy(wing.folder / "foam.toml", tmp_path / "mine" / "mine.toml")
-    before, after = (straight(Fdm(one), 15.0, 500.0) for one in (wing, read_aircraft(tmp_path / "mine")))
+    before, after = (steady_flight(Fdm(one), 15.0, 500.0) for one in (wing, read_aircraft(tmp_path / "mine")))
     assert before is not None
     assert after is not None
     assert after.vector() == pytest.approx(before.vector(), abs=2e-3)
@@ -206,7 +206,7 @@ def test_the_battery_power_of_a_data_sheet_is_kept(tmp_path: Path) -> None:
 
     def power(aircraft: Aircraft) -> float:
         fdm = Fdm(aircraft)
-        level = straight(fdm, 15.0, 500.0)
+        level = steady_flight(fdm, 15.0, 500.0)
         assert level is not None
         fdm.balance(level.vector())
         return float(fdm.read().power)

@@ -14,7 +14,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import INDEX, prior_means, prior_sds
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import fastest
+from flight.dynamics.trim import fastest_level_flight
 from logs.importers.motion import MotionLog
 from planfly.identification.base_numbers import base_model
 from planfly.identification.folder import Identified, flown_parameters, folder_files, make_identified, posterior_text
@@ -105,7 +105,7 @@ def test_the_fastest_is_as_sure_as_the_drag(tmp_path: Path) -> None:
     tops = []
     for factor in (0.9, 1.1):
         edited = changed_aerosonde(tmp_path / f"v{factor:g}", Truth(zero_lift_drag=factor))
-        found = fastest(Fdm(edited), 480.0)
+        found = fastest_level_flight(Fdm(edited), 480.0)
         assert found is not None
         tops.append(found.airspeed)
     sds = np.full(len(prior_sds()), 1e-6)

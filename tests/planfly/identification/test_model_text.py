@@ -9,7 +9,7 @@ import pytest
 from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
 from aircraft.identification.parameters import INDEX, PARAMETERS, prior_means
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from planfly.identification.base_numbers import _Probe, base_model, scale_model
 from planfly.identification.model_text import check_base, identified_xml
 from tests.instrumented_flights import Truth, changed_aerosonde
@@ -67,7 +67,7 @@ def test_a_stubbier_wing_has_the_induced_drag_of_its_aspect_ratio(tmp_path: Path
 
 
 def test_at_the_prior_it_is_the_base_trim_for_trim(tmp_path: Path) -> None:
-    own, base = straight(Fdm(written(tmp_path, prior_means())), 25.0, 500.0), straight(Fdm(BASE), 25.0, 500.0)
+    own, base = steady_flight(Fdm(written(tmp_path, prior_means())), 25.0, 500.0), steady_flight(Fdm(BASE), 25.0, 500.0)
     assert own is not None
     assert base is not None
     assert own.vector() == pytest.approx(base.vector(), abs=1e-6)
@@ -79,7 +79,7 @@ def test_motor_and_propeller_are_those_of_a_model_edited_by_hand(tmp_path: Path)
     for name in ("thrust", "motor-speed", "propeller-torque"):
         values[INDEX[name]] = truth.parameters()[name]
     trims = [
-        straight(Fdm(aircraft), 25.0, 500.0)
+        steady_flight(Fdm(aircraft), 25.0, 500.0)
         for aircraft in (written(tmp_path, values, 13.2), changed_aerosonde(tmp_path / "edited", truth))
     ]
     one, other = trims
@@ -116,7 +116,7 @@ def test_a_wing_is_the_wing_edited_by_hand(tmp_path: Path, name: str) -> None:
         trims = []
         for aircraft in (edited, read_aircraft(folder)):
             fdm = Fdm(aircraft)
-            found = straight(fdm, base.airspeed, 500.0, climb)
+            found = steady_flight(fdm, base.airspeed, 500.0, climb)
             assert found is not None
             fdm.balance(found.vector())
             trims.append([*found.vector(), fdm.read().power])
@@ -126,9 +126,9 @@ def test_a_wing_is_the_wing_edited_by_hand(tmp_path: Path, name: str) -> None:
 def test_a_draw_is_a_set_of_properties(tmp_path: Path) -> None:
     fdm = Fdm(written(tmp_path, prior_means()))
     fdm.properties.set("ident/thrust", 0.8)
-    weaker = straight(fdm, 25.0, 500.0)
+    weaker = steady_flight(fdm, 25.0, 500.0)
     assert weaker is not None
-    base = straight(Fdm(BASE), 25.0, 500.0)
+    base = steady_flight(Fdm(BASE), 25.0, 500.0)
     assert base is not None
     assert weaker.throttle > base.throttle + 0.02
     power = fdm.read().power

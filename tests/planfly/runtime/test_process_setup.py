@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from planfly.runtime import process_setup
-from planfly.runtime.process_setup import limit_of_address_space, prepare_process, watch_address_space, with_large_stack
+from planfly.runtime.process_setup import address_space_limit, prepare_process, watch_address_space, with_large_stack
 from world.address_space import RoomFinder
 
 LIMIT = 480_000 * 1024
@@ -61,10 +61,10 @@ def test_work_in_a_large_stack_returns_and_raises_as_it_does_alone() -> None:
 def test_only_a_process_with_a_limit_is_watched(monkeypatch: pytest.MonkeyPatch) -> None:
     before = list(sys.meta_path)
     monkeypatch.setattr(sys, "meta_path", list(before))
-    monkeypatch.setattr(process_setup, "limit_of_address_space", lambda: None)
+    monkeypatch.setattr(process_setup, "address_space_limit", lambda: None)
     watch_address_space()
     assert sys.meta_path == before
-    monkeypatch.setattr(process_setup, "limit_of_address_space", lambda: LIMIT)
+    monkeypatch.setattr(process_setup, "address_space_limit", lambda: LIMIT)
     for _ in range(2):
         watch_address_space()
     assert [type(one) for one in sys.meta_path[:2]] == [RoomFinder, type(before[0])]
@@ -73,4 +73,4 @@ def test_only_a_process_with_a_limit_is_watched(monkeypatch: pytest.MonkeyPatch)
 def test_the_limit_is_the_systems(monkeypatch: pytest.MonkeyPatch) -> None:
     for given, found in (((LIMIT, resource.RLIM_INFINITY), LIMIT), ((resource.RLIM_INFINITY,) * 2, None)):
         monkeypatch.setattr(resource, "getrlimit", lambda _, given=given: given)
-        assert limit_of_address_space() == found
+        assert address_space_limit() == found

@@ -25,7 +25,7 @@ def test_a_height_that_fails_and_is_mended_is_said_with_its_leg_and_figures() ->
     place, was, now = next(found.groups() for line in said if (found := words.fullmatch(line)))
     assert float(was) > 60.0 > float(now)
     assert said[-1] == "3 s longer"
-    session.step("undo")
+    session.step_history("undo")
     assert f"{place}: clearance {now} m \u2192 {was} m, now passes" in describe_changes(low, figures_of(session))
     assert describe_changes(before, figures_of(session)) == ["nothing"]
 

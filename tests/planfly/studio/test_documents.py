@@ -9,7 +9,7 @@ import pytest
 from flight.mission_files.formats import mission_text
 from logs.recording.example_log import write_example_log
 from planfly.flight_options import MissionOptions
-from planfly.studio.documents import DROPPED, open_dropped, straight_plan
+from planfly.studio.documents import DROPPED_SUFFIXES, open_dropped, straight_plan
 from planfly.studio.folder import find_file_in_folder, folder_message
 from planner.plan import plan_json
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
@@ -52,7 +52,7 @@ FORMS: dict[str, tuple[Callable[[Path], Path], int]] = {
 
 
 def test_each_suffix_is_tried() -> None:
-    assert tuple(FORMS) == DROPPED
+    assert tuple(FORMS) == DROPPED_SUFFIXES
 
 
 @pytest.mark.parametrize("suffix", FORMS)

@@ -9,7 +9,7 @@ from planfly.studio import jobs as jobs_module
 from planfly.studio import messages
 from planfly.studio.documents import open_document
 from planfly.studio.jobs import FLIGHT_WORKER, LONG_WORKER, Jobs
-from planfly.studio.pilot import Answer, Work
+from planfly.studio.pilot import Answer, Task
 from planfly.studio.session import Session
 from planfly.studio.worker_tasks import fly, try_suggestions
 from tests.planfly.studio.drafts import drawn_session
@@ -20,10 +20,10 @@ class Asked:
     """Takes the place of a process, and keeps what it was asked."""
 
     def __init__(self) -> None:
-        self.works: list[Work] = []
+        self.works: list[Task] = []
 
-    def ask(self, work: Work) -> None:
-        self.works.append(work)
+    def submit(self, task: Task) -> None:
+        self.works.append(task)
 
     def start(self) -> None:
         """Start nothing."""
@@ -37,14 +37,14 @@ def jobs(monkeypatch: pytest.MonkeyPatch) -> Jobs:
     return made
 
 
-def asked(jobs: Jobs, pilot: str) -> list[Work]:
+def asked(jobs: Jobs, pilot: str) -> list[Task]:
     return jobs._workers[pilot].works  # type: ignore[attr-defined, no-any-return]
 
 
 def test_a_work_that_another_replaces_is_said_to_have_stopped(jobs: Jobs) -> None:
     session = drawn_session(8, 8)
-    jobs.ask("returns", session)
-    jobs.ask("campaign", session)
+    jobs.start_task("returns", session)
+    jobs.start_task("campaign", session)
     first, second = asked(jobs, LONG_WORKER)
     assert jobs.handle_answer(LONG_WORKER, Answer(first.number, "progress", (1.0, 2.0, "")), session) == []
     assert jobs.handle_answer(LONG_WORKER, Answer(first.number, "cancelled"), session) == [
@@ -52,13 +52,13 @@ def test_a_work_that_another_replaces_is_said_to_have_stopped(jobs: Jobs) -> Non
     ]
     assert jobs.handle_answer(LONG_WORKER, Answer(first.number, "cancelled"), session) == []
     # One that is asked for again goes on for the pages.
-    jobs.ask("campaign", session)
+    jobs.start_task("campaign", session)
     assert jobs.handle_answer(LONG_WORKER, Answer(second.number, "cancelled"), session) == []
 
 
 def test_progress_never_runs_backwards_and_is_told_to_new_pages(jobs: Jobs) -> None:
     session = drawn_session(8, 8)
-    jobs.ask("campaign", session)
+    jobs.start_task("campaign", session)
     (work,) = asked(jobs, LONG_WORKER)
     shares = []
     for done, total in ((1.0, 4.0), (3.0, 4.0), (1.0, 9.0), (0.0, 0.0), (8.0, 9.0)):
@@ -66,14 +66,14 @@ def test_progress_never_runs_backwards_and_is_told_to_new_pages(jobs: Jobs) -> N
         shares.append(message["share"])
     assert shares == [0.25, 0.75, 0.75, 0.75, 0.889]
     assert [(one["job"], one["share"]) for one in jobs.progress_messages()] == [("campaign", 0.889)]
-    jobs.ask("campaign", session)
+    jobs.start_task("campaign", session)
     assert jobs.progress_messages()[0]["share"] == 0.0
     assert jobs.progress_messages()[0]["number"] != work.number
 
 
 def test_a_scenario_is_planned_first_and_not_judged_meanwhile(jobs: Jobs) -> None:
     session = Session.from_document(open_document("tight", MissionOptions()), MissionOptions())
-    jobs.start_first_work(session)
+    jobs.start_first_task(session)
     assert jobs.is_planning_first_path(session)
     (work,) = asked(jobs, LONG_WORKER)
     jobs.handle_answer(LONG_WORKER, Answer(work.number, "fault", "no"), session)

@@ -20,7 +20,7 @@ from planfly.flight_options import MissionOptions
 from planfly.studio import documents, messages
 from planfly.studio.documents import open_document, open_dropped, straight_plan
 from planfly.studio.jobs import LONG_WORKER, Jobs
-from planfly.studio.pilot import Answer, Work
+from planfly.studio.pilot import Answer, Task
 from planfly.studio.server import NO_TOKEN, Page, Server
 from planfly.studio.session import Session, StaleEdit, open_session
 from planner.plan import read_plan
@@ -94,7 +94,7 @@ def test_a_failed_undo_leaves_what_is_shown() -> None:
     shown, rev = session.mission, session.rev
     session.history.first = replace(shown, items=shown.items[:1])
     with pytest.raises(PlanflyError):
-        session.step("undo")
+        session.step_history("undo")
     assert session.mission is shown
     assert session.rev == rev
 
@@ -175,20 +175,20 @@ def test_a_planned_path_is_taken_of_the_sheet_that_it_is_of_alone() -> None:
 
 def test_a_path_that_was_searched_for_an_older_sheet_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     session, asked = planned_session(), []
-    monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.ask", lambda self, work: asked.append(work))
+    monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.submit", lambda self, work: asked.append(work))
     monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.start", lambda self: None)
     jobs = Jobs(lambda name, answer: None)
-    jobs.start_first_work(session)
+    jobs.start_first_task(session)
     assert [work.function for work in asked] == ["planfly.studio.worker_tasks.plan"]
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=5.0))
     answers = jobs.handle_answer(
         LONG_WORKER, Answer(asked[0].number, "done", [straight_plan(session.context.scenario, 3)]), session
     )
     assert [one["kind"] for one in answers] == ["stopped", "fault"]
-    assert not jobs.take_initial_plan(session)
+    assert not jobs.pop_initial_plan(session)
     # What was restored is flown, not planned anew.
     again = Jobs(lambda name, answer: None)
-    again.start_first_work(session)
+    again.start_first_task(session)
     assert asked[-1].function == "planfly.studio.worker_tasks.fly"
 
 
@@ -229,14 +229,14 @@ def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_pa
     session.open(open_document(str(other), session.options))
     assert session.sheet()["over"] == ""
     with pytest.raises(PlanflyError, match="no mission file was named"):
-        session.save_over()
+        session.overwrite_file()
     session.open(open_document(str(file), session.options))
     for _ in range(2):
         session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
-        session.save_over()
+        session.overwrite_file()
     file.write_text(other.read_text(encoding="utf-8"), encoding="utf-8")
     with pytest.raises(PlanflyError, match="changed by another program"):
-        session.save_over()
+        session.overwrite_file()
     assert file.read_bytes() == other.read_bytes()
 
 
@@ -256,17 +256,17 @@ def test_an_opening_is_undone_and_each_document_is_kept_for_itself(tmp_path: Pat
     theirs = session.mission
     session.autosave(kept)
     assert open_session(str(file), MissionOptions(scenario="jacksboro"), kept)[0].mission.items == mine.items
-    session.step("undo")
+    session.step_history("undo")
     assert session.sheet()["undo"] == "open other.waypoints"
-    session.step("undo")
+    session.step_history("undo")
     assert session.mission is mine
     assert session.sheet()["name"] == "m.waypoints"
     assert session.sheet()["over"] == "waypoints"
-    session.step("redo")
-    session.step("redo")
+    session.step_history("redo")
+    session.step_history("redo")
     assert session.mission is theirs
-    session.step("undo")
-    session.step("undo")
+    session.step_history("undo")
+    session.step_history("undo")
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=1.0))
     assert session.redo_text == ""
 
@@ -325,7 +325,7 @@ class ByWhom:
 def test_works_are_pickled_where_missions_are_judged() -> None:
     """Judging fills caches of the mission: pickled beside it, a flight was lost, and every one after it."""
     server = server_of(drawn_session(5, 12))
-    work = pickle.loads(server._pack_work(Work(1, "works.fly", ByWhom())))
+    work = pickle.loads(server._pack_task(Task(1, "works.fly", ByWhom())))
     assert work.payload.startswith("studio-judge")
 
 

@@ -336,7 +336,9 @@ def test_a_long_work_is_stopped(studio: Served, monkeypatch: pytest.MonkeyPatch)
         # Of a campaign nothing counts here but that it takes long.
         count = "tests.planfly.studio.light_works.count"
         monkeypatch.setattr(
-            Jobs, "ask", lambda self, kind, session: self._send_work(LONG_WORKER, kind, count, 10**6, session.rev)
+            Jobs,
+            "start_task",
+            lambda self, kind, session: self._submit_task(LONG_WORKER, kind, count, 10**6, session.rev),
         )
     with studio.page() as page:
         page.until("sheet")

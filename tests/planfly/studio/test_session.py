@@ -50,7 +50,7 @@ def draw_edit(session: Session, rng: np.random.Generator) -> None:
                 finding = ready[int(rng.integers(len(ready)))][0]
                 session.edit(messages.Apply(kind="apply", rev=rev, finding=finding, which=0))
         case _:
-            session.step(str(kind))
+            session.step_history(str(kind))
 
 
 def test_edits_and_undos_come_to_the_verdict_of_the_api(tmp_path: Path) -> None:
@@ -85,11 +85,11 @@ def test_undo_goes_back_to_the_first_mission_itself() -> None:
     for step in range(3):
         session.edit(messages.Move(kind="move", rev=session.rev, k=k, up=900.0 + step))
     for _ in range(4):
-        session.step("undo")
+        session.step_history("undo")
     assert session.mission is first
     assert session.judged.verdict == verdict
     assert session.sheet()["redo"]
-    session.step("redo")
+    session.step_history("redo")
     assert session.is_changed
 
 
@@ -153,11 +153,11 @@ def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
     file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
     session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0))
-    session.save_over()
+    session.overwrite_file()
     assert parse_mission(file.read_text(encoding="utf-8"), "m").items == session.mission.items
     session.open(open_dropped("other.waypoints", file.read_bytes(), session.options))
     with pytest.raises(PlanflyError, match="no mission file was named"):
-        session.save_over()
+        session.overwrite_file()
 
 
 @pytest.mark.parametrize(
@@ -194,7 +194,7 @@ def test_what_was_done_is_there_after_the_server_died(tmp_path: Path) -> None:
     again, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)
     assert restored
     assert again.mission.items == session.mission.items
-    again.step("undo")
+    again.step_history("undo")
     assert again.mission is again.history.first
     file.write_text(mission_text(drawn_session(9, 10).mission, "waypoints"), encoding="utf-8")
     other, restored = open_session(str(file), MissionOptions(scenario="jacksboro"), kept)

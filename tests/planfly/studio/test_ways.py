@@ -7,7 +7,7 @@ from planfly.flight_options import MissionOptions
 from planfly.studio import messages
 from planfly.studio.documents import open_document
 from planfly.studio.jobs import LONG_WORKER, Jobs
-from planfly.studio.pilot import Answer, Work
+from planfly.studio.pilot import Answer, Task
 from planfly.studio.session import Session
 from planfly.studio.worker_tasks import plan
 from world.errors import PlanflyError
@@ -17,8 +17,8 @@ from world.errors import PlanflyError
 def test_other_ways_are_of_one_search_and_none_is_better_than_another(monkeypatch: pytest.MonkeyPatch) -> None:
     # Kernels may have to be compiled first.
     monkeypatch.setattr("planfly.studio.worker_tasks.MAX_SEARCH_SECONDS_FOR_SEVERAL", 600.0)
-    asked: list[Work] = []
-    monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.ask", lambda self, work: asked.append(work))
+    asked: list[Task] = []
+    monkeypatch.setattr("planfly.studio.jobs.WorkerProcess.submit", lambda self, work: asked.append(work))
     session, jobs = (
         Session.from_document(open_document("hard-07", MissionOptions()), MissionOptions()),
         Jobs(lambda name, answer: None),

@@ -12,10 +12,10 @@ from aircraft.data_sheet import DataSheet
 from aircraft.uncertainty import read_draws, read_uncertainty
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.dynamics.characteristics import modes_at
+from flight.dynamics.characteristics import level_flight_modes
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.trim import fastest, full_throttle, slowest, straight
+from flight.dynamics.trim import fastest_level_flight, full_throttle_climb, slowest_level_flight, steady_flight
 from flight.simulation.simulate import Flight, fly_to_end
 from planfly.workflow.data_sheets import factor_effect, make_data_sheet_folder, stated_parameters, with_parameters
 from tests.setups import setup_maker
@@ -36,7 +36,11 @@ def foam(tmp_path_factory: pytest.TempPathFactory) -> Aircraft:
 def test_the_model_does_what_the_sheet_says(foam: Aircraft) -> None:
     assert {file.name for file in foam.folder.iterdir()} == FILES
     fdm = Fdm(foam, tried=True)
-    climb, fast, slow = full_throttle(fdm, 15.0, 500.0), fastest(fdm, 500.0), slowest(fdm, 0.0)
+    climb, fast, slow = (
+        full_throttle_climb(fdm, 15.0, 500.0),
+        fastest_level_flight(fdm, 500.0),
+        slowest_level_flight(fdm, 0.0),
+    )
     assert climb is not None
     assert fast is not None
     assert slow is not None
@@ -48,7 +52,7 @@ def test_the_model_does_what_the_sheet_says(foam: Aircraft) -> None:
 
 
 def test_it_is_stable(foam: Aircraft) -> None:
-    modes = {mode.name: mode for mode in modes_at(foam, 15.0)}
+    modes = {mode.name: mode for mode in level_flight_modes(foam, 15.0)}
     assert modes["short period"].damping > 0.3
     assert modes["Dutch roll"].damping > 0.05
 
@@ -75,13 +79,13 @@ def test_its_intervals_are_those_of_its_draws(foam: Aircraft) -> None:
     angles, tops, powers = [], [], []
     for seed in range(40):
         fdm = Fdm(foam, tried=True, variation=Variation(properties=draws.properties(seed)))
-        climb = full_throttle(fdm, 15.0, 500.0)
+        climb = full_throttle_climb(fdm, 15.0, 500.0)
         assert climb is not None
         angles.append(math.degrees(climb.climb))
-        top = fastest(fdm, 500.0)
+        top = fastest_level_flight(fdm, 500.0)
         assert top is not None
         tops.append(top.airspeed)
-        level = straight(fdm, 15.0, 500.0)
+        level = steady_flight(fdm, 15.0, 500.0)
         assert level is not None
         fdm.balance(level.vector())
         powers.append(math.log(float(fdm.read().power)))
@@ -104,7 +108,7 @@ def test_a_stated_climb_is_known_well(tmp_path: Path) -> None:
     assert not known.climb_guessed
     climbs = []
     for seed in range(20):
-        climb = full_throttle(
+        climb = full_throttle_climb(
             Fdm(made, tried=True, variation=Variation(properties=draws.properties(seed))), 15.0, 500.0
         )
         assert climb is not None
@@ -137,7 +141,7 @@ def test_parameters_are_data(tmp_path: Path) -> None:
     made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
     assert (made.airspeed, made.stall_speed) == (16.0, 10.0)
     assert math.degrees(made.max_bank) == pytest.approx(30.0)
-    climb = full_throttle(Fdm(made, tried=True), 16.0, 500.0)
+    climb = full_throttle_climb(Fdm(made, tried=True), 16.0, 500.0)
     assert climb is not None
     # 4 m/s at 16 m/s.
     assert climb.climb == pytest.approx(math.asin(0.25), abs=math.radians(0.4))
@@ -184,7 +188,7 @@ def test_fuel_and_a_tail(tmp_path: Path) -> None:
     assert made.battery_voltage == 0.0
     assert made.battery_energy == pytest.approx(1.5 * 43.5e6)
     fdm = Fdm(made, tried=True)
-    level = straight(fdm, 24.0, 500.0)
+    level = steady_flight(fdm, 24.0, 500.0)
     assert level is not None
     fdm.balance(level.vector())
     state = fdm.read()

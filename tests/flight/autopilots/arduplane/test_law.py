@@ -651,7 +651,7 @@ def test_bank_follows_its_demand_late(make_setup: MakeSetup, aerosonde: Aircraft
     flight = Flight(replace(setup, autopilot=ArduPlane(usual)), aerosonde)
     demanded, flown = [], []
     for _ in range(60 * 70):
-        rows, ended = flight.block(1)
+        rows, ended = flight.fly_block(1)
         if ended:
             break
         demanded.append(float(flight._workspace.own.memory.roll_demand))

@@ -222,7 +222,7 @@ def test_satellites_mistake_the_place_as_the_setup_says(fake_autopilot: MakeFake
             found.append(flight._lockstep.error)
             flight.prepare()
             for _ in range(seconds):
-                flight.block(60)
+                flight.fly_block(60)
                 found.append(flight._lockstep.error)
         return found
 

@@ -34,7 +34,7 @@ from flight.autopilots.sitl.exchange import (
 )
 from flight.autopilots.sitl.servos import ServoOutput, load_servo_map
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import waypoint_records
 from flight.mission.items import Home
@@ -303,7 +303,7 @@ def test_full_pulses_are_the_aircrafts_full_throws(name: str) -> None:
     middle, *rest = servos.commands([1500, 1500, 1000, 1500])
     assert rest == pytest.approx([0.0, 0.0, 0.0])
     # The elevator moves by as much about the place where level flight at cruise has it.
-    level = straight(Fdm(aircraft), aircraft.airspeed, 500.0)
+    level = steady_flight(Fdm(aircraft), aircraft.airspeed, 500.0)
     assert level is not None
     assert middle == pytest.approx(level.elevator, abs=math.radians(0.1))
     assert elevator - middle == pytest.approx(-aircraft.max_elevator)

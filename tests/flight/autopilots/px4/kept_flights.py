@@ -109,7 +109,7 @@ def by_law(flight: str) -> Flown:
     memory = flying._workspace.own["memory"]
     blocks, ended, leg, switches = [], "", 0, {}
     while not ended:
-        rows, ended = flying.block(2)
+        rows, ended = flying.fly_block(2)
         blocks.append(np.array(rows))
         if int(memory["leg"]) != leg and len(rows):
             leg = int(memory["leg"])

@@ -12,7 +12,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import straight
+from flight.dynamics.trim import steady_flight
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
@@ -35,7 +35,7 @@ def real_setup(*, table: Envelope | None = None, scenario: Scenario | None = Non
 @pytest.mark.parametrize("angle_deg", [-4.0, -2.0, 0.0, 2.0, 4.0])
 def test_the_parabola_through_three_trims_is_the_trims_between_them(airspeed: float, angle_deg: float) -> None:
     fdm = Fdm(AEROSONDE)
-    found = straight(fdm, airspeed, 700.0, math.radians(angle_deg))
+    found = steady_flight(fdm, airspeed, 700.0, math.radians(angle_deg))
     assert found is not None
     fdm.balance(found.vector())
     known = load_envelope(AEROSONDE).power(airspeed, 700.0, math.radians(angle_deg))
