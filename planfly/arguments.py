@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from flight.autopilots.catalog import autopilot_names
 from planfly.workflow.output_paths import MAX_BY_PROGRAM
 from world.errors import ArgumentError
 
@@ -87,7 +88,7 @@ RANGES: Mapping[str, Range] = {
 CHOICES: Mapping[str, tuple[Any, ...]] = {
     "turbulence": ("none", "light", "moderate"),
     "guidance": ("path", "l1", "vector-field"),
-    "autopilot": ("ardupilot", "ardupilot-4.6", "ardupilot-4.7", "px4", "px4-1.16", "px4-1.17", "planfly"),
+    "autopilot": autopilot_names(),
     "nav": ("perfect", "rtk", "gnss"),
     "engine": ("auto", "jsbsim"),
     "log_hz": (60, 30, 20, 10),

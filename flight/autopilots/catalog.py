@@ -1,35 +1,79 @@
-"""List all autopilots that planfly knows; add a new autopilot here."""
+"""List all autopilots that planfly knows; add a new autopilot here.
 
+The list names the classes instead of importing them, so that the command line reads the names without loading any
+control law.
+"""
+
+import importlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, cast
 
-from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
-from flight.autopilots.autopilot import Autopilot, StoredAutopilot
-from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from flight.autopilots.program import ProgramAutopilot
-from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4_sitl.autopilot import Px4Sitl
 from world.errors import ScenarioError
 from world.files import did_you_mean
-from world.scenario import Scenario
 
-# Simulated autopilots stand before the programs that they model.  The first program that recognises a file is used.
-AUTOPILOTS: tuple[type[Autopilot], ...] = (
-    ArduPlane,
-    PlanflyGuidance,
-    Px4,
-    Px4Sitl,
-    ArduPlaneSitl,
+if TYPE_CHECKING:
+    from aircraft.catalog import Aircraft
+    from flight.autopilots.autopilot import Autopilot, StoredAutopilot
+    from flight.autopilots.program import ProgramAutopilot
+    from world.scenario import Scenario
+
+
+class Entry(NamedTuple):
+    """A simulated autopilot.
+
+    name: name in a scenario.
+    autopilot: module, below `flight.autopilots`, and class.
+    releases: releases that fly differently, as the `[flight]` table names them.
+    """
+
+    name: str
+    autopilot: str
+    releases: tuple[str, ...] = ()
+
+
+AUTOPILOTS = (
+    Entry("ardupilot", "arduplane.autopilot.ArduPlane", ("4.6", "4.7")),
+    Entry("px4", "px4.autopilot.Px4", ("1.16", "1.17")),
+    Entry("planfly", "planfly.autopilot.PlanflyGuidance"),
 )
-# Simulated autopilots by their names in a scenario.
-_SIMULATED = {kind.name: kind for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)}
-_PROGRAMS = tuple(kind for kind in AUTOPILOTS if issubclass(kind, ProgramAutopilot))
+# External programs.  The first program that recognises a file is used.
+PROGRAMS = (
+    "px4_sitl.autopilot.Px4Sitl",
+    "arduplane_sitl.autopilot.ArduPlaneSitl",
+)
 
 
-def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
+def autopilot_names() -> tuple[str, ...]:
+    """Return the names of the simulated autopilots and of their releases, as `--autopilot` accepts them.
+
+    >>> autopilot_names()
+    ('ardupilot', 'ardupilot-4.6', 'ardupilot-4.7', 'px4', 'px4-1.16', 'px4-1.17', 'planfly')
+    """
+    return tuple(
+        name
+        for entry in AUTOPILOTS
+        for name in (entry.name, *(f"{entry.name}-{release}" for release in entry.releases))
+    )
+
+
+def autopilot_classes() -> "Mapping[str, type[Autopilot]]":
+    """Return the classes of the simulated autopilots by name."""
+    return {entry.name: _load_class(entry.autopilot) for entry in AUTOPILOTS}
+
+
+def program_classes() -> "Iterator[type[ProgramAutopilot]]":
+    """Yield the classes of the external programs."""
+    return (cast("type[ProgramAutopilot]", _load_class(path)) for path in PROGRAMS)
+
+
+def _load_class(path: str) -> "type[Autopilot]":
+    module, _, name = path.rpartition(".")
+    return cast("type[Autopilot]", getattr(importlib.import_module(f"flight.autopilots.{module}"), name))
+
+
+def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
     """Return the autopilot that a scenario names, with its settings.
 
     Raises ScenarioError if the name is not listed, and as `Autopilot.load` does.
@@ -39,23 +83,30 @@ def load_autopilot(scenario: Scenario, aircraft: Aircraft) -> Autopilot:
     >>> load_autopilot(load_scenario("paper-07"), load_aircraft("aerosonde")).title
     'ArduPlane'
     """
-    name = scenario.flight.steering.autopilot
-    if name not in _SIMULATED:
-        known_names = " or ".join(f"'{known_names}'" for known_names in _SIMULATED)
-        allowed = f"expected {known_names}{did_you_mean(name, sorted(_SIMULATED))}"
+    from flight.autopilots.parts import RtlSettings
+
+    name, paths = scenario.flight.steering.autopilot, {entry.name: entry.autopilot for entry in AUTOPILOTS}
+    if name not in paths:
+        known_names = " or ".join(f"'{known_name}'" for known_name in paths)
+        allowed = f"expected {known_names}{did_you_mean(name, sorted(paths))}"
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
-    autopilot, return_settings = _SIMULATED[name].load(scenario.flight, aircraft, scenario.name), scenario.returns
-    rtl_settings = (
-        (None, None) if return_settings is None else (return_settings.rtl_altitude, return_settings.rtl_autoland)
+    autopilot = _load_class(paths[name]).load(scenario.flight, aircraft, scenario.name)
+    stated = scenario.returns
+    rtl_parameters = autopilot.returns.parameters_of(
+        RtlSettings(
+            altitude=None if stated is None else stated.rtl_altitude,
+            autoland=None if stated is None else stated.rtl_autoland,
+            lands=scenario.landing is not None,
+            field_depth=_field_depth_below_home(scenario),
+        )
     )
-    with_rtl_settings = autopilot.with_scenario_rtl_settings(
-        *rtl_settings, lands=scenario.landing is not None, lower=_field_depth_below_home(scenario)
-    )
-    _check_no_conflict(scenario, autopilot, with_rtl_settings)
-    return with_rtl_settings
+    if not rtl_parameters:
+        return autopilot
+    _check_no_conflict(scenario, autopilot, rtl_parameters)
+    return autopilot.with_parameters(**rtl_parameters)
 
 
-def _field_depth_below_home(scenario: Scenario) -> float:
+def _field_depth_below_home(scenario: "Scenario") -> float:
     """Return the height of home above the ground at the landing point, m; 0 if either altitude is unknown."""
     landing, home = scenario.landing, scenario.home
     if landing is None or home is None or scenario.terrain is None:
@@ -64,32 +115,31 @@ def _field_depth_below_home(scenario: Scenario) -> float:
     return 0.0 if math.isnan(depth) else depth
 
 
-def _check_no_conflict(scenario: Scenario, autopilot: Autopilot, with_rtl_settings: Autopilot) -> None:
+def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_parameters: Mapping[str, float]) -> None:
     """Raise ScenarioError if a scenario and the user's parameter file state different values.
 
-    with_rtl_settings: the autopilot with the RTL settings of the scenario.
+    rtl_parameters: parameters that the scenario's RTL settings set.
     """
-    if autopilot.parameters is None or with_rtl_settings.parameters is None:
-        return
-    values = with_rtl_settings.parameters.by_origin("file")
-    for name, stated_value in autopilot.parameters.by_origin("file").items():
-        if not math.isclose(values[name], stated_value, rel_tol=1e-6, abs_tol=1e-6):
-            allowed = f"{autopilot.parameters.source} states {name} {stated_value:g}"
-            raise ScenarioError.at(scenario.name, f"returns ({name})", values[name], allowed, shown=f"{values[name]:g}")
+    for name, value in rtl_parameters.items():
+        stated_value = autopilot.stated_value(name)
+        if stated_value is not None and not math.isclose(value, stated_value, rel_tol=1e-6, abs_tol=1e-6):
+            source = "" if autopilot.parameters is None else autopilot.parameters.source
+            allowed = f"{source} states {name} {stated_value:g}"
+            raise ScenarioError.at(scenario.name, f"returns ({name})", value, allowed, shown=f"{value:g}")
 
 
-def program_autopilot(program: Path) -> type[ProgramAutopilot]:
+def program_autopilot(program: Path) -> "type[ProgramAutopilot]":
     """Return the autopilot of a program.
 
     >>> program_autopilot(Path("arduplane")).name
     'ardupilot'
     """
-    return next(kind for kind in _PROGRAMS if kind.recognises(program))
+    return next(kind for kind in program_classes() if kind.recognises(program))
 
 
 def autopilot_of_log(
     program: str, parameters: Mapping[str, float], source: str
-) -> tuple[Autopilot, tuple[str, ...]] | None:
+) -> "tuple[Autopilot, tuple[str, ...]] | None":
     """Return the autopilot that wrote a flight log, and notes on its parameters; None if planfly does not know it.
 
     The notes name the parameters that could not be used.
@@ -97,29 +147,33 @@ def autopilot_of_log(
     program: name of the flown program in the log.
     source: the log's file.
     """
-    return next(filter(None, (kind.of_flight_log(program, parameters, source) for kind in _SIMULATED.values())), None)
+    found = (kind.of_flight_log(program, parameters, source) for kind in autopilot_classes().values())
+    return next(filter(None, found), None)
 
 
-def restore_autopilot(name: str | None, stored: StoredAutopilot) -> Autopilot:
+def restore_autopilot(name: str | None, stored: "StoredAutopilot") -> "Autopilot":
     """Return the autopilot that a log stores.
 
     name: None if the stored settings imply it.
 
     Raises ParameterError if a value is not allowed, and KeyError if the name is unknown.
     """
-    classes = _SIMULATED if stored.program is None else {kind.name: kind for kind in _PROGRAMS}
-    return classes[name or _implied_name(stored)].restore(stored)
+    name = name or _implied_name(stored)
+    if stored.program is None:
+        return _load_class({entry.name: entry.autopilot for entry in AUTOPILOTS}[name]).restore(stored)
+    return {kind.name: kind for kind in program_classes()}[name].restore(stored)
 
 
-def stored_name(autopilot: Autopilot) -> str | None:
+def stored_name(autopilot: "Autopilot") -> str | None:
     """Return the name that a log must state for an autopilot, or None if its settings imply the name.
 
+    >>> from flight.autopilots.planfly.autopilot import PlanflyGuidance
     >>> stored_name(PlanflyGuidance("l1")) is None
     True
     """
     return None if _implied_name(autopilot.store()) == autopilot.name else autopilot.name
 
 
-def _implied_name(stored: StoredAutopilot) -> str:
+def _implied_name(stored: "StoredAutopilot") -> str:
     """Return the autopilot of a log without its name: ArduPlane if it has parameters or a program, else planfly."""
-    return (PlanflyGuidance if stored.parameters is None and stored.program is None else ArduPlane).name
+    return "planfly" if stored.parameters is None and stored.program is None else "ardupilot"

@@ -2,14 +2,13 @@
 
 from abc import abstractmethod
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-import numpy as np
-
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Autopilot, AutopilotProgram, describe_program
+from flight.autopilots.parts import MissionChecks, MissionParts
 from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FlightSetup
 
@@ -31,37 +30,45 @@ class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
 
 @dataclass(frozen=True)
 class ProgramAutopilot(Autopilot):
-    """Autopilot that is an external program; `law` is the simulated autopilot that models it.
+    """Autopilot that is an external program; `model` is the simulated autopilot that models it.
 
     log_suffix: suffix of the log that the program itself writes.
     program: the program that flew; None before the flight.
     binary: the program's file; None for a flight from a log.
     """
 
-    own: ClassVar[np.dtype[np.record] | None] = None
-    is_program: ClassVar[bool] = True
     log_suffix: ClassVar[str]
     program: AutopilotProgram | None = None
     binary: Path | None = field(default=None, compare=False)
-    # A program starts in the air, at the end of a rail, unless its own class says otherwise.
-    flies_ground: ClassVar[bool] = False
-
-    @property
-    def follows_ground(self) -> bool:
-        """False, because heights above terrain are sent to a program as altitudes above sea level."""
-        return False
 
     @classmethod
     @abstractmethod
-    def flying(cls, law: Any, binary: Path) -> Self:
+    def recognises(cls, program: Path) -> bool:
+        """Return True if the program of --sitl is this autopilot."""
+
+    @classmethod
+    @abstractmethod
+    def flying(cls, model: Any, binary: Path) -> Self:
         """Return the program's autopilot with the settings of the simulated autopilot.
 
         binary: the program's file.
         """
 
-    def described(self, aircraft: str) -> str:
+    @property
+    def checks(self) -> MissionChecks:
+        """Checks of the simulated autopilot, with the settings that a program does not fly.
+
+        Heights above terrain are sent to a program as altitudes above sea level.
+        """
+        return replace(super().checks, follows_terrain=False, settings_not_flown=self.settings_not_flown_by_program)
+
+    @abstractmethod
+    def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
+        """Describe the settings that change the flight path but are not flown by the program."""
+
+    def describe(self, aircraft: str) -> str:
         """Describe the program and the parameters that the user changed; before the flight, the simulated autopilot."""
-        return super().described(aircraft) if self.program is None else describe_program(self.program, aircraft)
+        return super().describe(aircraft) if self.program is None else describe_program(self.program, aircraft)
 
     @property
     def version(self) -> str:

@@ -134,7 +134,7 @@ class CompiledModel:
 
     @property
     def arrays(self) -> tuple[Records, Floats, Code, Records, Records]:
-        """Arguments of a `flight.autopilots.autopilot.Loop`."""
+        """Arguments of a `flight.autopilots.parts.Loop`."""
         return self.frames, self.numbers, self.code, self.contacts, self.frictions
 
     # ----------------------------------------------------------------------

@@ -13,7 +13,7 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Gear
 from aircraft.path_limits import Limits, ground_speed_on
-from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.parts import ControlLaw
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -49,8 +49,10 @@ class Airborne(ABC):
     fdm: the simulated aircraft.
     max_ticks: time limit, ticks.
     engine: flight model in use, and the reason for it, as in "JSBSim, as chosen".
+    _law: control law that keeps its record in the workspace; None for a program that starts in the air.
     """
 
+    _law: ControlLaw | None = None
     engine: str = "JSBSim, for a flight by a program"
 
     def __init__(
@@ -89,17 +91,18 @@ class Airborne(ABC):
         """Create the workspace for a route, and set the flight's time limit."""
         self.setup, self.map = setup, local_map
         # An autopilot with its own turns does not follow the arcs after fly-over waypoints.
-        follows_arcs = setup.autopilot.follows_path and setup.autopilot.keeps_to_arcs
+        turns = setup.autopilot.turns
+        follows_arcs = turns.follows_path and turns.keeps_to_arcs
         follows_arcs = follows_arcs or not setup.route.fly_over.any()
         self.path = (
             setup.path if follows_arcs else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swing="none")
         )
         waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
-        waypoints["is_mission_end"] &= setup.autopilot.loiter_rules.ends_in_circle
-        self._airspeeds = setup.autopilot.speeds_flown(setup.route.airspeed, setup.airspeed)
+        waypoints["is_mission_end"] &= setup.autopilot.loiters.ends_in_circle
+        self._airspeeds = setup.autopilot.speeds.flown(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         waypoints["min_ground_speed"] = setup.min_ground_speeds
-        self._workspace = Workspace(self._gains, self.path, waypoints, self._flying_autopilot(setup).own)
+        self._workspace = Workspace(self._gains, self.path, waypoints, None if self._law is None else self._law.memory)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
@@ -120,12 +123,8 @@ class Airborne(ABC):
             radius_factor = true_by_equivalent(setup.route.return_to.up) ** 2
             time_limit += rtl_loiter_timeout(radius_factor * setup.route.return_to.radius)
         if waypoints["is_mission_end"][-1]:
-            time_limit += rtl_loiter_timeout(setup.autopilot.loiter_rules.radius)
+            time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
         self.max_ticks = int(time_limit / self.dt)
-
-    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
-        """Return the autopilot that keeps its record in the workspace."""
-        return setup.autopilot
 
     @property
     def position(self) -> Floats:
@@ -215,7 +214,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 
     waypoints: waypoints of the route, (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     """
-    if not setup.autopilot.loiter_rules.steers_to_center:
+    if not setup.autopilot.loiters.steers_to_center:
         return 0.0
     extra_lengths = dict[int, float]()
     circles = waypoints[waypoints["loiter_radius"] != 0.0]

@@ -251,7 +251,7 @@ class FlightSetup:
     @property
     def corridor(self) -> float:
         """Half width of the corridor along the legs in which the flight must stay, m."""
-        return corridor_half_width(self.scenario.limits.corridor_m, self.autopilot.acceptance_radius)
+        return corridor_half_width(self.scenario.limits.corridor_m, self.autopilot.turns.acceptance_radius)
 
     @property
     def airspeed(self) -> float:
@@ -262,7 +262,7 @@ class FlightSetup:
     def min_ground_speeds(self) -> Floats:
         """Minimum ground speeds on the leg to each waypoint, (w,) m/s; 0 or less for none."""
         stated_speeds = self.route.min_ground_speed
-        return np.where(np.isnan(stated_speeds), self.autopilot.min_ground_speed, stated_speeds)
+        return np.where(np.isnan(stated_speeds), self.autopilot.speeds.min_ground_speed, stated_speeds)
 
     @property
     def max_bank(self) -> float:
@@ -275,12 +275,13 @@ class FlightSetup:
         has_ground_ends = self.scenario.launch is not None or self.scenario.landing is not None
         if self.source is not None or not has_ground_ends:
             return GroundPhases()
-        if not self.autopilot.flies_ground:
+        ground_rules = self.autopilot.ground
+        if ground_rules.control_law is None:
             title = self.autopilot.title
             return GroundPhases(notes=(f"take-off and landing are not flown, and not judged as flown, by {title}",))
         ground_phases = find_ground_phases(self.scenario, self.mission, self.route, self.default_launch_speed)
         if (
-            self.autopilot.flies_both_ends
+            ground_rules.needs_both_ends
             and ground_phases
             and (ground_phases.take_off is None or ground_phases.approach is None)
         ):

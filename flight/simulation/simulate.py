@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import contacts_of
-from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.parts import ControlLaw
 from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
 from flight.dynamics.jsbsim_properties import Getter, Setter
@@ -239,6 +239,8 @@ _DIVERSION_RECORDS = ("state", "true", "estimated", "commands", "air", "place", 
 class Flight(Airborne):
     """A flight by a simulated autopilot: as fast as possible by `simulate`, or live in real time."""
 
+    _law: ControlLaw
+
     def __init__(
         self,
         setup: FlightSetup,
@@ -260,10 +262,11 @@ class Flight(Airborne):
         gains = load_gains(aircraft)
         self._chosen_engine = engine or setup.engine
         self._ground_phases, gear = setup.ground_phases, None
-        if self._ground_phases:
+        self._law = setup.autopilot.model.control_law
+        ground_law = setup.autopilot.ground.control_law
+        if self._ground_phases and ground_law is not None:
             gear = default_gear(self._ground_phases)
-            contacts = contacts_of(aircraft, gear)
-            self._ground_autopilot = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts)
+            self._law = ground_law(self._ground_phases, aircraft, contacts_of(aircraft, gear))
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ground_phases:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
@@ -271,11 +274,10 @@ class Flight(Airborne):
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._trim_at_start(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
-        autopilot = self._flying_autopilot(setup).law
-        autopilot.initialise_records(self.memory, self._workspace.own)
+        self._law.initialise(self.memory, self._workspace.own)
         self._start_disturbances(setup)
-        self._compiled, self.engine = self._choose_engine(autopilot)
-        self._loop = self._make_loop(autopilot)
+        self._compiled, self.engine = self._choose_engine(setup)
+        self._loop = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
         """Leave the route for the route of another setup, which starts at the aircraft's position at time 0.
@@ -288,16 +290,15 @@ class Flight(Airborne):
         """
         old_record, old_memory = self._work, self._workspace.own
         # The aircraft is in the air, even if the new mission starts with a take-off.
-        self._ground_phases = GroundPhases()
+        self._ground_phases, self._law = GroundPhases(), setup.autopilot.model.control_law
         self._prepare_route(setup, self.fdm.aircraft, local_map)
         for name in _DIVERSION_RECORDS:
             setattr(self._work, name, getattr(old_record, name))
         for name in _PATH_MEMORY_FIELDS:
             setattr(self.memory, name, 0)
-        autopilot = setup.autopilot.law
-        autopilot.initialise_records(self.memory, self._workspace.own)
-        autopilot.transfer_state(old_memory, self._workspace.own, setup.route.waypoints[0])
-        self._loop = self._make_loop(autopilot)
+        self._law.initialise(self.memory, self._workspace.own)
+        self._law.transfer_state(old_memory, self._workspace.own, setup.route.waypoints[0])
+        self._loop = self._make_loop()
 
     def _trim_at_start(self, setup: FlightSetup, model: Fdm, reference_airspeed: float) -> None:
         """Trim the aircraft at the start of the route, and store the trim of the model in the guidance memory.
@@ -305,8 +306,8 @@ class Flight(Airborne):
         reference_airspeed: airspeed for which the gains apply, m/s.
         """
         start = self._find_start(setup)
-        if setup.autopilot.equivalent_airspeeds:
-            true_airspeed = start.airspeed * setup.autopilot.airspeed_factor(start.amsl)
+        if setup.autopilot.speeds.equivalent:
+            true_airspeed = start.airspeed * setup.autopilot.speeds.true_airspeed_factor(start.amsl)
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true_airspeed))
         level = steady_flight(model, reference_airspeed, start.amsl)
         if level is None:
@@ -325,22 +326,19 @@ class Flight(Airborne):
         self._start_trimmed(setup.mission.source, start)
         if self._ground_phases.take_off is not None:
             release_state = find_release(setup, self.map, self._ground, self.fdm.aircraft, self._ground_phases.take_off)
-            commands = (elevator, 0.0, 0.0, self._ground_autopilot.released_throttle)
+            commands = (elevator, 0.0, 0.0, self._law.released_throttle)
             self._work.commands = release(self.fdm, release_state, commands)
             self._work.air.wind_north, self._work.air.wind_east = release_state.wind[:2]
-
-    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
-        return self._ground_autopilot if self._ground_phases else setup.autopilot
 
     def _fly_ticks(self, count: int) -> int:
         return self._loop(count)
 
-    def _choose_engine(self, autopilot: Autopilot) -> tuple[CompiledModel | None, str]:
+    def _choose_engine(self, setup: FlightSetup) -> tuple[CompiledModel | None, str]:
         """Return the compiled model, or None for JSBSim, and the name of the engine with the reason."""
         if self._chosen_engine == "jsbsim":
             return None, "JSBSim, as chosen"
-        if autopilot.loop is None:
-            return None, f"JSBSim, since {autopilot.title} has no compiled loop"
+        if self._law.loop is None:
+            return None, f"JSBSim, since {setup.autopilot.title} has no compiled loop"
         has_gusts, has_terrain = self._windy, bool(self._ground.known)
         try:
             model = CompiledModel(self.fdm, READ_FIELDS, self._steps, gusts=has_gusts, terrain=has_terrain)
@@ -355,21 +353,21 @@ class Flight(Airborne):
             return None, f"JSBSim, since the compiled model differs from it in {differences[0]}"
         return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} in {PROOF_STEPS} steps"
 
-    def _make_loop(self, autopilot: Autopilot) -> Callable[[int], int]:
-        """Return a function that flies ``count`` ticks, fills the workspace's rows, and returns the last status."""
+    def _make_loop(self) -> Callable[[int], int]:
+        """Return a function that flies a number of ticks, fills the workspace's rows, and returns the last status."""
         record, workspace, access = self._work, self._workspace, self.fdm.loop_access()
         record.state_factors = access.factors[0]
         record.scale_above, record.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
-        if self._compiled is not None and autopilot.loop is not None:
+        if self._compiled is not None and self._law.loop is not None:
             model = self._compiled
-            return partial(autopilot.loop, workspace.block, self._ground.heights, *model.arrays)
+            return partial(self._law.loop, workspace.block, self._ground.heights, *model.arrays)
         # Do not set gusts in still air, nor the altitude of unknown ground.
         is_used = (True, True, True, True, self._windy, self._windy, self._windy, self._ground.known)
         setters = [setter if use else _discard for setter, use in zip(access.setters, is_used, strict=True)]
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
-            partial(autopilot.tick, workspace.block, self._ground.heights),
+            partial(self._law.tick, workspace.block, self._ground.heights),
             workspace,
             access.run,
             self._steps,

@@ -77,13 +77,13 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         mass_kg=mass,
         aircraft_named=not flight_table.aircraft_by_default,
         airspeed_mps=airspeed,
-        airspeed_kind="equivalent" if autopilot.equivalent_airspeeds else "true",
+        airspeed_kind="equivalent" if autopilot.speeds.equivalent else "true",
         airspeed_source=_airspeed_source(scenario, autopilot),
         wind_mps=wind.speed,
         wind_from_deg=round(math.degrees(wind.from_course) % 360.0, 9),
         turbulence=wind.turbulence,
         navigation=flight_table.steering.nav,
-        autopilot=autopilot.described(aircraft) + _autopilot_source(flight_table),
+        autopilot=autopilot.describe(aircraft) + _autopilot_source(flight_table),
         autopilot_version=autopilot.version,
         terrain=None if terrain is None else terrain.source,
         height_datum=None if terrain is None else terrain.datum,
@@ -101,7 +101,8 @@ def _autopilot_source(flight_table: FlightTable) -> str:
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
     if scenario.flight.airspeed_mps is not None:
         return "scenario"
-    return "aircraft" if autopilot.stated_airspeed is None else "parameters"
+    stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
+    return "aircraft" if stated_airspeed is None else "parameters"
 
 
 def setup_conditions(setup: FlightSetup) -> Conditions:
@@ -191,7 +192,7 @@ def corridor_line(setup: FlightSetup) -> str:
     Warn if the corridor is wider than the gap between legs, because a flight within it may then never have been on its
     lines.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
     """
-    half_width, radius = setup.corridor, setup.autopilot.acceptance_radius or 0.0
+    half_width, radius = setup.corridor, setup.autopilot.turns.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or judged_surveys(setup):
         return ""
     origin = "planfly's default"

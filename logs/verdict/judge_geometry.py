@@ -41,7 +41,7 @@ def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
 
     planfly wrote the items of a plan itself, so for a plan only PX4's requirements are checked.
     """
-    items_are_judged = setup.plan is None or setup.autopilot.refuses
+    items_are_judged = setup.plan is None or setup.autopilot.checks.dialect == "px4"
     findings = mission_findings(setup) if items_are_judged else []
     return [finding for finding in findings if finding.ok is False or undecided_findings([finding])]
 

@@ -213,7 +213,8 @@ def summary_lines(
         for finding in findings
         if finding.rule == "mission" and finding.ok is None and finding.check != NOT_FLOWN
     ]
-    missing_ends = missing_ends_text(setup.mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    checks = setup.autopilot.checks
+    missing_ends = missing_ends_text(setup.mission, checks.feasibility) if checks.dialect == "px4" else ""
     if missing_ends and not any(finding.rule == "mission" for finding in findings):
         lines.append(f"PX4 would reject it: {missing_ends}")
     lines += [

@@ -346,7 +346,7 @@ SPHERE_STAY_TOLERANCE_S = 1e-6
 # which changes the exposure by less than 0.1 %.
 SPHERE_FAR_DIAGONALS = 30.0
 
-# PX4's checks: constants of its `FeasibilityChecker` in addition to `flight.autopilots.autopilot.MissionChecks`
+# PX4's checks: constants of its `FeasibilityChecker` in addition to `flight.autopilots.parts.FeasibilityLimits`
 
 # rad.  A landing approach may be steeper than FW_LND_ANG by this; a literal in the checker.
 PX4_LANDING_BUFFER_RAD = math.radians(0.1)

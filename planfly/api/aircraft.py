@@ -9,7 +9,7 @@ from typing import TypedDict, Unpack, cast, overload
 from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft, make_own_folder, model_hash
 from aircraft.envelope import Envelope
 from aircraft.model_writer import Layout
-from flight.autopilots.catalog import AUTOPILOTS
+from flight.autopilots.catalog import autopilot_classes, program_classes
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow, level_flight_modes, step_responses, trim_table
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.model_check import shipped_model
@@ -169,7 +169,8 @@ def describe_aircraft(
     aircraft_entry = _load_aircraft(name)
     model_sha256 = model_hash(aircraft_entry)
     # This also refuses invalid settings files.
-    missing_files = tuple(missing_file for kind in AUTOPILOTS for missing_file in kind.missing_files(aircraft_entry))
+    kinds = (*autopilot_classes().values(), *program_classes())
+    missing_files = tuple(missing_file for kind in kinds for missing_file in kind.missing_files(aircraft_entry))
     folder = None if out is None else expand_path_pattern(out, aircraft_entry.name, 0)
     if folder is not None:
         check_output_folder(folder, overwrite)

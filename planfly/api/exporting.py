@@ -221,7 +221,8 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     if not is_plan:
         return _with_zones(source, setup.scenario)
     mission, notes = add_plan_fence(setup)
-    missing_ends = missing_ends_text(mission, setup.autopilot.mission_checks) if setup.autopilot.refuses else ""
+    checks = setup.autopilot.checks
+    missing_ends = missing_ends_text(mission, checks.feasibility) if checks.dialect == "px4" else ""
     return replace(source, mission=mission, notes=(*notes, *([missing_ends] if missing_ends else [])))
 
 

@@ -115,7 +115,7 @@ def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float])
     airframe = load_airframe(scenario, stated_values)
     parameters = airframe.autopilot.parameters
     values = {} if parameters is None else {parameter.name: parameter.value for parameter in parameters.values}
-    cruise = airframe.autopilot.cruise_parameter
+    cruise = airframe.autopilot.speeds.cruise_parameter
     return values | {cruise: airframe.airspeed} if cruise in values else values
 
 

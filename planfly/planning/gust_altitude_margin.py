@@ -120,10 +120,11 @@ def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
     """Return the relevant kinds of gusts, each with its displacement, m, as a function of the unused rate, m/s."""
-    displacements: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", autopilot.gust_sink)]
+    deviations = autopilot.deviations
+    displacements: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", deviations.gust_sink)]
     # Above a path there are no hazards other than a maximum height or a zone.
     if scenario.zones or scenario.limits.max_height_m is not None:
-        displacements.append(("updrafts", autopilot.gust_rise))
+        displacements.append(("updrafts", deviations.gust_rise))
     return displacements
 
 
@@ -140,7 +141,7 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
     climb_rate, min_climb_rate = airframe.limits.with_margin().rates(amsl)[0], LEAST_SIGMAS * gust_deviation(turbulence)
-    if climb_rate >= min_climb_rate or not airframe.autopilot.gust_sink(climb_rate, turbulence):
+    if climb_rate >= min_climb_rate or not airframe.autopilot.deviations.gust_sink(climb_rate, turbulence):
         return ""
     return (
         f"climbs {climb_rate:.2f} m/s at {amsl:.0f} m at most; with less than {min_climb_rate:.2f} m/s downdrafts of"

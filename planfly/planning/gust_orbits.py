@@ -92,7 +92,7 @@ def _is_accepted(plan: Plan, airframe: Airframe) -> bool:
 
 def _plan_corridor_half_width(plan: Plan, airframe: Airframe) -> float:
     """Return the maximum distance from the legs for a flight of the plan, m."""
-    return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.acceptance_radius)
+    return corridor_half_width(plan.scenario.limits.corridor_m, airframe.autopilot.turns.acceptance_radius)
 
 
 def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
@@ -126,7 +126,9 @@ def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     turbulence, orbits = plan.scenario.wind.turbulence, 0.0
     for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
         climb, sink = limits.rates(float(waypoint[2]))
-        orbits += autopilot.altitude_miss_probability(climb - max(0.0, rate), sink - max(0.0, -rate), turbulence)
+        orbits += autopilot.deviations.altitude_miss_probability(
+            climb - max(0.0, rate), sink - max(0.0, -rate), turbulence
+        )
     return orbits
 
 
@@ -143,7 +145,7 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     """
     scenario, count = plan.scenario, len(plan.waypoints)
     climb, sink = airframe.limits.with_margin().rates(float(plan.waypoints[:, 2].max()))
-    probability = airframe.autopilot.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
+    probability = airframe.autopilot.deviations.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
     if probability == 0.0:
         return count
     return max(count, min(scenario.planner.waypoints, 2 + int(MAX_EXPECTED_ORBITS / probability)))
@@ -151,7 +153,7 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
 
 def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
     """Return a line on the orbits that make a plan unsafe in its turbulence, and on the remedies."""
-    count, name = len(plan.waypoints) - 2, autopilot.height_parameter
+    count, name = len(plan.waypoints) - 2, autopilot.deviations.altitude_parameter
     orbits = expected_orbits(plan, autopilot, limits)
     radius = first_that_passes(
         _TRIED_ALTITUDE_RADII_M,

@@ -315,7 +315,7 @@ def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: 
 
 def _other_targets(world: ReturnWorld, simulated_target: ReturnTarget) -> Iterator[ReturnTarget]:
     """Yield home and all rally points, except the target of the simulated ArduPlane."""
-    home_altitude = ArduPlane(world.parameters).return_rules.height + world.home.up
+    home_altitude = ArduPlane(world.parameters).returns.rules.height + world.home.up
     positions = [
         ("home", (world.home.east, world.home.north, home_altitude)),
         *(

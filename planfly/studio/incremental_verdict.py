@@ -139,7 +139,7 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
 def _speed_factor(context: EditContext, altitude: float) -> float:
     """Return the ratio of true airspeed to commanded airspeed at an altitude, m AMSL."""
     autopilot = context.airframe.autopilot
-    return autopilot.airspeed_factor(altitude) if autopilot.equivalent_airspeeds else 1.0
+    return autopilot.speeds.true_airspeed_factor(altitude) if autopilot.speeds.equivalent else 1.0
 
 
 def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Window:

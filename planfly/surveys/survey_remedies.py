@@ -364,7 +364,7 @@ class _Trials:
             if autopilot.parameters is None
             else {parameter.name: parameter.value for parameter in autopilot.parameters.values}
         )
-        for name, step, farthest, unit, _ in autopilot.side_candidates if values else ():
+        for name, step, farthest, unit, _ in autopilot.deviations.track_candidates if values else ():
             current = values[name]
             value = round(
                 current + math.copysign(step, farthest - current) * (abs(farthest - current) // (2.0 * step)), 6

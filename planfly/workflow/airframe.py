@@ -62,8 +62,8 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan
     """
     autopilot, cruise = airframe.autopilot, airframe.airspeed
     final_law = FinalModel(
-        airspeed=lambda tailwind, amsl: autopilot.landing_airspeed(cruise, tailwind, amsl),
-        slope=lambda height, distance, tailwind, amsl: autopilot.landing_glide(height, distance, tailwind, amsl).slope,
+        airspeed=lambda tailwind, amsl: autopilot.ground.airspeed(cruise, tailwind, amsl),
+        slope=lambda height, distance, tailwind, amsl: autopilot.ground.glide(height, distance, tailwind, amsl).slope,
     )
     flown_departure = None if flown_plan is None or flown_plan.ways is None else flown_plan.ways.climb
     return with_ground_ways(plan, airframe.limits.with_margin(), final_law, flown_departure)
@@ -113,13 +113,13 @@ def airframe_of(setup: FlightSetup) -> Airframe:
 
 def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
     """Return the bank limit in turns, rad: the lower limit of scenario and autopilot."""
-    return min(math.radians(scenario.flight.max_bank_deg), autopilot.bank_limit)
+    return min(math.radians(scenario.flight.max_bank_deg), autopilot.turns.max_bank)
 
 
 def with_tracking(limits: Limits, autopilot: Autopilot, scenario: Scenario) -> Limits:
     """Return limits that allow for the tracking error of an autopilot in a scenario."""
     table = scenario.flight
-    tracking = autopilot.tracking_error(
+    tracking = autopilot.deviations.tracking_error(
         limits.airspeed, table.steering.nav, fly_over=table.fly_over, turbulence=scenario.wind.turbulence
     )
     return replace(limits, tracking=tracking)
@@ -146,11 +146,12 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 
     Raises ScenarioError for an airspeed that the aircraft cannot fly.
     """
-    file_airspeed, parameters = autopilot.stated_airspeed, autopilot.parameters
+    cruise_parameter, parameters = autopilot.speeds.cruise_parameter, autopilot.parameters
+    file_airspeed = autopilot.stated_value(cruise_parameter)
     if (airspeed := scenario.flight.airspeed_mps) is not None:
         file, field = scenario.name, "flight.airspeed_mps"
     elif file_airspeed is not None and parameters is not None:
-        (airspeed, field), file = file_airspeed, parameters.source
+        airspeed, file, field = file_airspeed, parameters.source, cruise_parameter
     else:
         airspeed, file, field = aircraft.airspeed, aircraft.name, "airspeed"
     if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:

@@ -237,12 +237,13 @@ def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight,
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
     airspeed, bank = scenario.flight.airspeed_mps or default_airspeed, math.radians(scenario.flight.max_bank_deg)
-    if autopilot.stated_airspeed is not None:
-        airspeed, _ = autopilot.stated_airspeed
+    stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
+    if stated_airspeed is not None:
+        airspeed = stated_airspeed
     elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
         airspeed = float(np.nanmedian(flight.columns["airspeed"]))
-    if autopilot.stated_bank is not None:
-        bank = autopilot.stated_bank
+    if autopilot.stated_value(autopilot.turns.bank_parameter) is not None:
+        bank = autopilot.turns.max_bank
     return make_limits(scenario, envelope, max(5.0, airspeed), bank)
 
 

@@ -99,7 +99,7 @@ def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = N
     old_plan: the plan being flown, or None.
     """
     plan = with_departure_and_approach(plan, airframe, old_plan)
-    if continues or not airframe.autopilot.loiter_rules.ends_in_circle:
+    if continues or not airframe.autopilot.loiters.ends_in_circle:
         return plan
     setup = make_setup(plan.scenario, airframe, mission_of_plan(plan, airframe), plan.seed, plan=plan)
     loiter_hazards = end_loiter_hazards(route_requirements(setup))

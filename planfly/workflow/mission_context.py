@@ -56,7 +56,7 @@ class MissionContext:
         Raises FlightError if the aircraft is missing.
         """
         airframe = airframe_of(setup)
-        airframe = replace(airframe, autopilot=setup.autopilot.law)
+        airframe = replace(airframe, autopilot=setup.autopilot.model)
         return cls(setup.scenario, airframe, setup.seed, setup, planned=setup.plan is not None)
 
     # ------------------------------------------------------------------

@@ -155,7 +155,7 @@ def make_setup(
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     autopilot = airframe.autopilot
     mission = replace(mission, autopilot=autopilot.name)
-    resets = autopilot.resets_jump_counters
+    resets = autopilot.checks.resets_jump_counters
     if placed is None:
         placed = place_stops(mission, scenario.origin, scenario.terrain, resets_jump_counters=resets)
     elif resets and placed.itinerary.passes_exhausted_jump:
@@ -165,8 +165,8 @@ def make_setup(
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
     file_parameters = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
-    notes = autopilot.parameter_notes
-    notes += preflight_notes(mission, route, scenario, autopilot.return_rules, file_parameters)
+    notes = autopilot.checks.parameter_notes
+    notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,

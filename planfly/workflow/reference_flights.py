@@ -59,7 +59,8 @@ def find_passing_parameter(
         # No flight parameter changes the rejection of a mission.
         return None
     values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
-    vertical_candidates, lateral_candidates = autopilot.height_candidates, autopilot.side_candidates
+    deviations = autopilot.deviations
+    vertical_candidates, lateral_candidates = deviations.altitude_candidates, deviations.track_candidates
     for name, step, farthest, unit, min_value in (
         (*vertical_candidates, *lateral_candidates)
         if failed_finding.rule in _VERTICAL_RULES
@@ -143,7 +144,9 @@ def find_deciding_parameter(
         return None
     findings = verdict.findings
     if setup.autopilot.program is not None:
-        simulated_verdict = Trial(replace(setup, autopilot=setup.autopilot.law), aircraft, should_abort).flight_verdict
+        simulated_verdict = Trial(
+            replace(setup, autopilot=setup.autopilot.model), aircraft, should_abort
+        ).flight_verdict
         if simulated_verdict.flies:
             return None
         findings = simulated_verdict.findings

@@ -177,7 +177,7 @@ class SuggestionTrials:
         self, judged_mission: JudgedMission, finding: Finding, suggestion: Suggestion
     ) -> tuple[Mission, FlightSetup]:
         """Apply a suggestion to mission and setup; a shorter duration is tried as a larger battery."""
-        setup = replace(judged_mission.setup, autopilot=judged_mission.setup.autopilot.law)
+        setup = replace(judged_mission.setup, autopilot=judged_mission.setup.autopilot.model)
         match suggestion:
             case (Change(what="battery" | "tank") as change,):
                 return judged_mission.mission, replace(setup, battery=change.wanted * setup.battery)

@@ -133,7 +133,9 @@ def test_other_plans_have_as_many_waypoints_as_level_flight_allows() -> None:
     plan = make_plan(scenario, airframe, SEED)
     climb, sink = airframe.limits.rates(150.0)
     wider = replace(airframe, autopilot=airframe.autopilot.with_parameters(NAV_FW_ALT_RAD=12.0))
-    assert wider.autopilot.altitude_miss_probability(climb, sink, "moderate") == pytest.approx(0.0083, abs=0.0001)
+    assert wider.autopilot.deviations.altitude_miss_probability(climb, sink, "moderate") == pytest.approx(
+        0.0083, abs=0.0001
+    )
     assert max_waypoints_in_gusts(plan, wider) == 5
     calm = scenario_of("none")
     assert max_waypoints_in_gusts(replace(plan, scenario=calm), load_airframe(calm)) == len(plan.waypoints)

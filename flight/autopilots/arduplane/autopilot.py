@@ -3,13 +3,11 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import ClassVar, Literal, Self
-
-import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import Contact
-from aircraft.tracking import TrackingError
 from flight.autopilots.arduplane.failsafes import battery_failsafes
 from flight.autopilots.arduplane.ground_law import (
     ARDUPLANE_GROUND,
@@ -24,27 +22,24 @@ from flight.autopilots.arduplane.launch import motor_start, takeoff_slew
 from flight.autopilots.arduplane.law import ARDUPLANE, arduplane_loop, arduplane_tick
 from flight.autopilots.arduplane.navigator import LOITER_ALTITUDE_TOLERANCE_M, MAX_ACCEPTANCE_M, turn_distance
 from flight.autopilots.arduplane.open_settings import describe_open_settings
-from flight.autopilots.arduplane.parameters import (
-    HEIGHT_CANDIDATES,
-    SIDE_CANDIDATES,
-    ArduPilotParameters,
-    speeds_flown,
-)
+from flight.autopilots.arduplane.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, ArduPilotParameters
 from flight.autopilots.arduplane.releases import choose_release, release_note, simulated_release
 from flight.autopilots.arduplane.tracking_error import tracking_error
-from flight.autopilots.autopilot import (
-    Autopilot,
-    BatteryFailsafe,
-    GroundAutopilot,
-    LandingGlide,
-    Loop,
-    MissionParts,
-    SpeedLimits,
-    StoredAutopilot,
-    StoredParameters,
-    Tick,
-)
+from flight.autopilots.autopilot import Autopilot, StoredAutopilot, StoredParameters
 from flight.autopilots.gust_height import height_in_updrafts
+from flight.autopilots.parts import (
+    ControlLaw,
+    Deviations,
+    GroundRules,
+    LandingGlide,
+    MissionChecks,
+    MissionParts,
+    ReturnBehaviour,
+    RtlSettings,
+    SpeedLimits,
+    SpeedRules,
+    TurnRules,
+)
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.ground_ways import Approach, GroundPhases, TakeOff
 from flight.mission.itinerary import Loiter
@@ -52,8 +47,7 @@ from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.arrays import Floats
 from world.kernels import Record
-from world.scenario_tables import ArduPlaneVersion, FlightTable, Navigation
-from world.wind import Turbulence
+from world.scenario_tables import ArduPlaneVersion, FlightTable
 
 # Fields of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` that belong to the current leg or mission, not to the
 # aircraft.
@@ -98,20 +92,12 @@ class ArduPlane(Autopilot):
     """ArduPlane's control law: L1 along the legs, TECS for altitude and airspeed.
 
     >>> made = ArduPlane(ArduPilotParameters.defaults())
-    >>> made.acceptance_radius, made.turn_distance(math.radians(45.0), 0.0), made.speed_limits[:2]
+    >>> made.turns.acceptance_radius, made.turns.distance(math.radians(45.0), 0.0), made.speeds.limits[:2]
     (90.0, 45.0, (9.0, 22.0))
     """
 
     name: ClassVar = "ardupilot"
     title: ClassVar = "ArduPlane"
-    own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE
-    cruise_parameter: ClassVar = "AIRSPEED_CRUISE"
-    equivalent_airspeeds: ClassVar = True
-    acceptance_limit: ClassVar = MAX_ACCEPTANCE_M
-    refuses_as_arduplane: ClassVar = True
-    flies_ground: ClassVar[bool] = True
-    height_candidates: ClassVar = HEIGHT_CANDIDATES
-    side_candidates: ClassVar = SIDE_CANDIDATES
     parameters: ArduPilotParameters = field()
 
     @classmethod
@@ -162,27 +148,15 @@ class ArduPlane(Autopilot):
         return []
 
     @property
-    def tick(self) -> Tick:
-        """Compiled function for one tick of ArduPlane's controllers."""
-        return arduplane_tick
+    def control_law(self) -> ControlLaw:
+        """ArduPlane's controllers with these parameters."""
+        return ControlLaw(arduplane_tick, arduplane_loop, ARDUPLANE, self._initialise, _transfer_state)
 
-    @property
-    def loop(self) -> Loop:
-        """Compiled simulation loop of ArduPlane's controllers and the aircraft model."""
-        return arduplane_loop
-
-    def initialise_records(self, guidance: Record, record: Record) -> None:
+    def _initialise(self, guidance: Record, record: Record) -> None:
         """Copy the parameters into the controllers' record."""
         record.parameters = self.parameters.record()
 
-    def transfer_state(self, previous_record: Record, record: Record, start: Floats) -> None:
-        """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
-        record.memory = previous_record.memory
-        for name in _LEG_FIELDS:
-            setattr(record.memory, name, 0)
-        record.memory.from_east, record.memory.from_north, record.memory.from_up = start
-
-    def described(self, aircraft: str) -> str:
+    def describe(self, aircraft: str) -> str:
         """Return a description of the simulated ArduPlane with the parameters that matter most in a flight."""
         parameters = self.parameters
         source_text = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
@@ -197,26 +171,19 @@ class ArduPlane(Autopilot):
         return self.parameters.version
 
     @property
-    def parameter_notes(self) -> tuple[str, ...]:
-        """Notes on a parameter file of another release."""
-        return self.parameters.notes
+    def checks(self) -> MissionChecks:
+        """Checks by ArduPlane's list of commands, from TERRAIN_ENABLE, MIS_OPTIONS and BATT_*."""
+        parameters = self.parameters
+        return MissionChecks(
+            dialect="ardupilot",
+            resets_jump_counters=parameters.resets_jump_counters,
+            follows_terrain=parameters.terrain_enable == 1.0,
+            battery_failsafes=battery_failsafes(parameters),
+            settings_not_flown=partial(self.settings_not_flown, by_program=False),
+            parameter_notes=parameters.notes,
+        )
 
-    @property
-    def battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
-        """Failsafes from BATT_FS_LOW_ACT and BATT_FS_CRT_ACT with their thresholds; none in a program's flight."""
-        return () if self.is_program else battery_failsafes(self.parameters)
-
-    @property
-    def resets_jump_counters(self) -> bool:
-        """True in 4.7, unless MIS_OPTIONS keeps the counters."""
-        return self.parameters.resets_jump_counters
-
-    @property
-    def acceptance_radius(self) -> float | None:
-        """WP_RADIUS."""
-        return self.parameters.wp_radius
-
-    def settings_not_flown(self, mission: MissionParts) -> list[str]:
+    def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
         """Return `_NEUTRAL` settings that are not neutral, zero rate gains, an own fence, RTL over terrain, and others.
 
         The others are those of `flight.autopilots.arduplane.open_settings`.
@@ -240,73 +207,97 @@ class ArduPlane(Autopilot):
             texts.append(
                 f"TERRAIN_FOLLOW {parameters.terrain_follow:g} has the return follow the terrain, which is not flown"
             )
-        return texts + describe_open_settings(parameters, mission, by_program=self.is_program)
+        return texts + describe_open_settings(parameters, mission, by_program=by_program)
 
     @property
-    def follows_ground(self) -> bool:
-        """TERRAIN_ENABLE."""
-        return self.parameters.terrain_enable == 1.0
+    def turns(self) -> TurnRules:
+        """Rules of turns from WP_RADIUS and ROLL_LIMIT_DEG."""
+        parameters = self.parameters
+        return TurnRules(
+            acceptance_radius=parameters.wp_radius,
+            distance=self._turn_distance,
+            acceptance_limit=MAX_ACCEPTANCE_M,
+            max_bank=parameters.roll_limit,
+            bank_parameter="ROLL_LIMIT_DEG",
+        )
 
-    def turn_distance(self, turn: float, amsl: float) -> float:
+    def _turn_distance(self, turn: float, amsl: float) -> float:
         """Return WP_RADIUS for a right angle, more in thin air, and a fraction of it for a smaller turn."""
         factor = float(true_by_equivalent(amsl))
         return float(turn_distance(0.0, turn, self.parameters.wp_radius, math.inf, factor))
 
-    def airspeed_factor(self, amsl: float) -> float:
-        """Return the ratio of true to equivalent airspeed."""
-        return float(true_by_equivalent(amsl))
+    @property
+    def speeds(self) -> SpeedRules:
+        """Rules of airspeeds from AIRSPEED_MIN, AIRSPEED_MAX, AIRSPEED_CRUISE and MIN_GROUNDSPEED.
 
-    def landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
+        A command of another speed changes nothing: commanded to fly at 17 m/s with AIRSPEED_MIN at 18, ArduPlane 4.6
+        flew on at its 25 m/s.
+        """
+        parameters = self.parameters
+        limits = SpeedLimits(parameters.airspeed_min, parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
+        return SpeedRules(
+            limits, equivalent=True, min_ground_speed=parameters.ground_speed_min, cruise_parameter="AIRSPEED_CRUISE"
+        )
+
+    @property
+    def ground(self) -> GroundRules:
+        """Rules of take-off, landing and go-around from TKOFF_*, LAND_* and TECS_LAND_*."""
+        min_acceleration = self.parameters.takeoff_acceleration
+        return GroundRules(
+            control_law=self._ground_law,
+            glide=self._landing_glide,
+            airspeed=self._landing_airspeed,
+            # The landing item's first parameter, or the take-off's height, or 30 m.
+            go_around_height=go_around_height,
+            launch_trigger=(min_acceleration, "TKOFF_THR_MINACC") if min_acceleration > 0.0 else None,
+        )
+
+    def _ground_law(self, ground_phases: GroundPhases, aircraft: Aircraft, contacts: Sequence[Contact]) -> ControlLaw:
+        return ArduPlaneFromGround(self, ground_phases, aircraft, tuple(contacts)).control_law
+
+    def _landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
         """Return the airspeed by TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
-        return landing_airspeed(self.parameters, tail_wind) * self.airspeed_factor(amsl)
+        return landing_airspeed(self.parameters, tail_wind) * self.speeds.true_airspeed_factor(amsl)
 
-    def with_scenario_rtl_settings(
-        self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
-    ) -> Autopilot:
-        """Return the autopilot with a scenario's RTL_ALTITUDE and RTL_AUTOLAND.
+    @property
+    def returns(self) -> ReturnBehaviour:
+        """Behaviour in an RTL from the parameters."""
+        return ReturnBehaviour(self._return_rules, self._rtl_parameters)
+
+    def _rtl_parameters(self, settings: RtlSettings) -> dict[str, float]:
+        """Return RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX for a scenario's settings of the RTL.
 
         RTL_AUTOLAND is 1 unless a file states it: with 0 ArduPlane does not arm if the mission has a landing.  On a
         field that is lower than home the flare would climb (`flight.autopilots.arduplane.ground_law`): there
         TECS_LAND_PMAX holds the nose down unless a file states it.
 
         >>> default = ArduPlane(ArduPilotParameters.defaults())
-        >>> made = default.with_scenario_rtl_settings(180.0, None, lands=True, lower=50.0)
-        >>> made.parameters.rtl_altitude, made.parameters.rtl_autoland, round(made.parameters.landing_pitch_max, 4)
-        (180.0, 1.0, -0.0175)
+        >>> default.returns.parameters_of(RtlSettings(180.0, lands=True, field_depth=50.0))
+        {'RTL_ALTITUDE': 180.0, 'RTL_AUTOLAND': 1.0, 'TECS_LAND_PMAX': -1.0}
         """
-        values = {} if rtl_altitude is None else {"RTL_ALTITUDE": rtl_altitude}
+        values = {} if settings.altitude is None else {"RTL_ALTITUDE": settings.altitude}
         stated = self.parameters.by_origin("file")
-        if rtl_autoland is not None:
-            values["RTL_AUTOLAND"] = float(rtl_autoland)
-        elif lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in stated:
+        if settings.autoland is not None:
+            values["RTL_AUTOLAND"] = float(settings.autoland)
+        elif settings.lands and self.parameters.rtl_autoland == 0.0 and "RTL_AUTOLAND" not in stated:
             values["RTL_AUTOLAND"] = 1.0
-        if lands and lower > _LOW_FIELD_M and "TECS_LAND_PMAX" not in stated:
+        if settings.lands and settings.field_depth > _LOW_FIELD_M and "TECS_LAND_PMAX" not in stated:
             values["TECS_LAND_PMAX"] = _NOSE_DOWN_DEG
-        return ArduPlane(self.parameters.changed(**values)) if values else self
+        return values
 
-    def landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
+    def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
         """Return the glide by LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
-        airspeed = self.landing_airspeed(0.0, tail_wind, amsl)
+        airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
     @property
-    def launch_trigger(self) -> tuple[float, str] | None:
-        """TKOFF_THR_MINACC."""
-        min_acceleration = self.parameters.takeoff_acceleration
-        return (min_acceleration, "TKOFF_THR_MINACC") if min_acceleration > 0.0 else None
-
-    def go_around_height(self, stated_height: float, takeoff_height: float) -> float | None:
-        """Return the landing item's first parameter, or the take-off's height, or 30 m."""
-        return go_around_height(stated_height, takeoff_height)
-
-    @property
-    def return_rules(self) -> ReturnRules:
+    def _return_rules(self) -> ReturnRules:
         """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_* and TECS and slope limits.
 
         >>> made = ArduPlane(ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
-        >>> made.return_rules.height, made.return_rules.climb_first, made.return_rules.rally_limit
+        >>> made.returns.rules.height, made.returns.rules.climb_first, made.returns.rules.rally_limit
         (nan, inf, 5000.0)
-        >>> made.return_rules.lands
+        >>> made.returns.rules.lands
         'straight'
         """
         parameters = self.parameters
@@ -325,10 +316,10 @@ class ArduPlane(Autopilot):
         )
 
     @property
-    def loiter_rules(self) -> LoiterRules:
+    def loiters(self) -> LoiterRules:
         """Rules of loiters from WP_LOITER_RAD, the air's density, and `LOITER_ALTITUDE_TOLERANCE_M`.
 
-        >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiter_rules
+        >>> rules = ArduPlane(ArduPilotParameters.defaults().changed(WP_LOITER_RAD=-80.0)).loiters
         >>> rules.radius, round(rules.radius_scale(1300.0), 3)
         (-80.0, 1.135)
         """
@@ -348,45 +339,13 @@ class ArduPlane(Autopilot):
         )
 
     @property
-    def speed_limits(self) -> SpeedLimits | None:
-        """AIRSPEED_MIN and AIRSPEED_MAX."""
-        return SpeedLimits(self.parameters.airspeed_min, self.parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
-
-    @property
-    def min_ground_speed(self) -> float:
-        """MIN_GROUNDSPEED."""
-        return self.parameters.ground_speed_min
-
-    def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the last airspeed that ArduPlane accepted, for each leg."""
-        return speeds_flown(commanded, cruise, self.parameters)
-
-    @property
-    def stated_bank(self) -> float | None:
-        """ROLL_LIMIT_DEG of the user's file, or None if the file does not state it."""
-        return self.parameters.roll_limit if "ROLL_LIMIT_DEG" in self.parameters.by_origin("file") else None
-
-    @property
-    def bank_limit(self) -> float:
-        """ROLL_LIMIT_DEG, from any source."""
-        return self.parameters.roll_limit
-
-    def tracking_error(
-        self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
-    ) -> TrackingError | None:
-        """Return ArduPlane's deviations with these parameters."""
-        return tracking_error(self.parameters, airspeed, nav, fly_over=fly_over, turbulence=turbulence)
-
-    def gust_rise(self, sink: float, turbulence: Turbulence) -> float:
-        """Return the altitude gained in updrafts while ArduPlane holds airspeed and cannot sink fast enough, m."""
-        return height_in_updrafts(sink, turbulence)
-
-    def from_ground(
-        self, ground_phases: GroundPhases, aircraft: Aircraft, contacts: Sequence[Contact]
-    ) -> "ArduPlaneFromGround":
-        """Return the same controllers with take-off and landing."""
-        return ArduPlaneFromGround(
-            self.parameters, ground_phases=ground_phases, aircraft=aircraft, contacts=tuple(contacts)
+    def deviations(self) -> Deviations:
+        """Deviations from the legs, and the altitude gained in updrafts while ArduPlane holds its airspeed."""
+        return Deviations(
+            tracking_error=partial(tracking_error, self.parameters),
+            gust_rise=height_in_updrafts,
+            altitude_candidates=HEIGHT_CANDIDATES,
+            track_candidates=SIDE_CANDIDATES,
         )
 
     def with_parameters(self, **values: float) -> "ArduPlane":
@@ -394,28 +353,38 @@ class ArduPlane(Autopilot):
         return ArduPlane(self.parameters.changed(**values))
 
 
+def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
+    """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
+    record.memory = previous_record.memory
+    for name in _LEG_FIELDS:
+        setattr(record.memory, name, 0)
+    record.memory.from_east, record.memory.from_north, record.memory.from_up = start
+
+
 @dataclass(frozen=True)
-class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
-    """ArduPlane's law with take-off, landing, or both.
+class ArduPlaneFromGround:
+    """ArduPlane's controllers with take-off, landing, or both.
 
     ground_phases: take-off and landing that are flown.
     contacts: points where the aircraft touches the ground.
     """
 
-    own: ClassVar[np.dtype[np.record] | None] = ARDUPLANE_GROUND
-    ground_phases: GroundPhases = field(kw_only=True)
-    aircraft: Aircraft = field(kw_only=True)
-    contacts: tuple[Contact, ...] = field(kw_only=True)
+    autopilot: ArduPlane
+    ground_phases: GroundPhases
+    aircraft: Aircraft
+    contacts: tuple[Contact, ...]
 
     @property
-    def tick(self) -> Tick:
-        """Compiled function for one tick of ArduPlane's controllers."""
-        return ground_tick
+    def parameters(self) -> ArduPilotParameters:
+        """Parameters of the autopilot."""
+        return self.autopilot.parameters
 
     @property
-    def loop(self) -> Loop:
-        """Compiled simulation loop of ArduPlane's controllers and the aircraft model."""
-        return ground_loop
+    def control_law(self) -> ControlLaw:
+        """Control law from the ground."""
+        return ControlLaw(
+            ground_tick, ground_loop, ARDUPLANE_GROUND, self._initialise, released_throttle=self.released_throttle
+        )
 
     @property
     def motor_start(self) -> float:
@@ -437,9 +406,9 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
             running_time * takeoff_slew(parameters) if running_time else 0.0,
         )
 
-    def initialise_records(self, guidance: Record, record: Record) -> None:
+    def _initialise(self, guidance: Record, record: Record) -> None:
         """Copy the parameters, the contacts, the take-off and the landing into the controllers' record."""
-        super().initialise_records(guidance, record)
+        record.parameters = self.parameters.record()
         record.stage_parameters = record.parameters
         ground = record.ground
         contacts = self.contacts[:CONTACTS]
@@ -487,7 +456,7 @@ class ArduPlaneFromGround(ArduPlane, GroundAutopilot):
 
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
         landing_altitude = float(approach.point[2])
-        glide = self.landing_glide(
+        glide = self.autopilot.ground.glide(
             approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
         )
         ground.has_landing, ground.landing_leg = True, approach.leg

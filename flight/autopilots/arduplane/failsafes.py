@@ -7,7 +7,7 @@ Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event
 from typing import Literal, NamedTuple
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.autopilot import BatteryFailsafe
+from flight.autopilots.parts import BatteryFailsafe
 
 # Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or else RTL;
 # "on": it continues the mission; "landed": it is on the ground; "never": nothing can trigger the cause; the others do

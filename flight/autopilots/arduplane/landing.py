@@ -8,7 +8,7 @@ at the distance which it flies over the ground while the sink rate falls to TECS
 """
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.autopilot import LandingGlide
+from flight.autopilots.parts import LandingGlide
 
 # Limit of the flare's length, as a fraction of the distance from the waypoint to the landing point.
 _MAX_FLARE_FRACTION = 0.5

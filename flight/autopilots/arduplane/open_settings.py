@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from enum import StrEnum
 from typing import NamedTuple
 
-from flight.autopilots.arduplane.parameters import ArduPilotParameters, accepts_speed
-from flight.autopilots.autopilot import MissionParts
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.parts import MissionParts
 
 
 class Phase(StrEnum):
@@ -137,7 +137,7 @@ def _describe_others(
     if by_program:
         return
     for airspeed in mission.throttled_airspeeds:
-        if not accepts_speed(airspeed, parameters):
+        if not parameters.airspeed_min <= airspeed <= parameters.airspeed_max:
             # `Plane::do_change_speed` falls through to the throttle.
             range_text = f"AIRSPEED_MIN {values['AIRSPEED_MIN']:g} to AIRSPEED_MAX {values['AIRSPEED_MAX']:g}"
             yield (

@@ -12,10 +12,9 @@ from typing import Any, ClassVar, Self, get_args
 
 import numpy as np
 
-from flight.autopilots.autopilot import Candidate
 from flight.autopilots.parameter_origin import ARDUPILOT
 from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable, Stated
-from world.arrays import Floats
+from flight.autopilots.parts import Candidate
 from world.errors import ParameterError
 from world.kernels import Record, record_dtype
 from world.scenario_tables import NEWEST_ARDUPLANE, ArduPlaneVersion
@@ -489,33 +488,3 @@ SIDE_CANDIDATES = (
 
 # ----------------------------------------------------------------------
 # Airspeeds of a mission that ArduPlane accepts.
-
-
-def accepts_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
-    """Return True if ArduPlane accepts a commanded airspeed (m/s, equivalent).
-
-    It accepts AIRSPEED_MIN to AIRSPEED_MAX.  A command of another speed changes nothing: commanded to fly at 17 m/s
-    with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at its 25 m/s.
-
-    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> accepts_speed(22.0, ArduPilotParameters.defaults()), accepts_speed(22.1, ArduPilotParameters.defaults())
-    (True, False)
-    """
-    return parameters.airspeed_min <= airspeed <= parameters.airspeed_max
-
-
-def speeds_flown(commanded: Floats, cruise: float, parameters: ArduPilotParameters) -> Floats:
-    """Return the airspeeds (l,) that ArduPlane flies on each leg for commanded ones (l,); m/s, equivalent.
-
-    cruise: its airspeed until it accepts the first command.
-
-    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> speeds_flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0, ArduPilotParameters.defaults()).tolist()
-    [12.0, 15.0, 15.0, 10.0]
-    """
-    flown_speeds = []
-    current = cruise
-    for command in commanded.tolist():
-        current = command if accepts_speed(command, parameters) else current
-        flown_speeds.append(current)
-    return np.array(flown_speeds)

@@ -1,12 +1,13 @@
 """Implement ArduPlane itself as an autopilot, by its SITL program in lockstep with planfly's physics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
-from flight.autopilots.autopilot import MissionParts, StoredAutopilot
+from flight.autopilots.autopilot import StoredAutopilot
+from flight.autopilots.parts import GroundRules, MissionChecks, MissionParts
 from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.autopilots.sitl.servos import SERVO_FILE, load_servo_map
 from flight.simulation.setup import FlightSetup
@@ -17,10 +18,8 @@ _FLOWN_BY_PROGRAM = ("ARSPD_USE", "RLL_RATE_P", "PTCH_RATE_P")
 
 @dataclass(frozen=True)
 class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
-    """ArduPlane itself.  Before the flight, its control law stands in for the program."""
+    """ArduPlane itself.  Before the flight, the simulated ArduPlane stands in for the program."""
 
-    flies_ground: ClassVar[bool] = True
-    flies_both_ends: ClassVar[bool] = True
     log_suffix: ClassVar = ".BIN"
 
     @classmethod
@@ -34,9 +33,9 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
         return True
 
     @classmethod
-    def flying(cls, law: ArduPlane, binary: Path) -> Self:
-        """Return the program's autopilot in place of its control law."""
-        return cls(law.parameters, binary=binary)
+    def flying(cls, model: ArduPlane, binary: Path) -> Self:
+        """Return the program's autopilot with the parameters of the simulated ArduPlane."""
+        return cls(model.parameters, binary=binary)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
@@ -46,14 +45,24 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
             return []
         return [f"{aircraft.folder / SERVO_FILE}: missing; --sitl needs to know what each servo moves"]
 
-    def settings_not_flown(self, mission: MissionParts) -> list[str]:
-        """Return the settings that the program does not get, or that its flight does not show."""
-        settings = super().settings_not_flown(mission)
+    @property
+    def checks(self) -> MissionChecks:
+        """Checks of a program; the program's battery failsafes are off."""
+        return replace(super().checks, battery_failsafes=())
+
+    def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
+        """Describe the settings that the program does not get, or that its flight does not show."""
+        settings = self.settings_not_flown(mission, by_program=True)
         return [text for text in settings if not text.startswith(_FLOWN_BY_PROGRAM)]
 
     @property
-    def law(self) -> ArduPlane:
-        """ArduPlane's law with the same parameters."""
+    def ground(self) -> GroundRules:
+        """Rules of take-off and landing; the program flies them only together."""
+        return replace(super().ground, needs_both_ends=True)
+
+    @property
+    def model(self) -> ArduPlane:
+        """Simulated ArduPlane with the same parameters."""
         return ArduPlane(self.parameters)
 
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:

@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.arduplane.autopilot import ArduPlane, ArduPlaneFromGround
-from flight.autopilots.arduplane.launch import run_up_time
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.launch import motor_start, run_up_time
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane.releases import simulated_release
 from flight.autopilots.arduplane_sitl.ground_tick import program_ground_tick
 from flight.autopilots.arduplane_sitl.physics import JsonLockstep, PhysicsPort
@@ -20,7 +21,8 @@ from flight.autopilots.arduplane_sitl.process import (
     autopilot_parameters,
     person_parameters,
 )
-from flight.autopilots.autopilot import AutopilotProgram, Tick
+from flight.autopilots.autopilot import AutopilotProgram
+from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.sitl.conversation import Talk
 from flight.autopilots.sitl.flight import SitlFlight
@@ -92,10 +94,11 @@ class AutopilotFlight(SitlFlight):
     def _wait_for_thrust(self) -> Talk:
         """Wait for full thrust before the launch, if the motor runs before it."""
         take_off = self._ground_phases.take_off
-        law = None if take_off is None else self._from_ground
-        if take_off is None or take_off.launch.method == "runway" or not isinstance(law, ArduPlaneFromGround):
+        parameters = self.setup.autopilot.parameters
+        if take_off is None or take_off.launch.method == "runway" or not isinstance(parameters, ArduPilotParameters):
             return
-        run_up_s = run_up_time(law.motor_start, law.parameters)
+        start_time = motor_start(take_off.acceleration, take_off.speed, take_off.launch.incline, parameters)
+        run_up_s = run_up_time(start_time, parameters)
         deadline = self._lockstep.time + (run_up_s + _SPOOL_TIME_S if run_up_s else 0.0)
         while self._lockstep.time < deadline:
             yield

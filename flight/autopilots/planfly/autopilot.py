@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Autopilot, Level, Loop, StoredAutopilot, Tick
+from flight.autopilots.autopilot import Autopilot, Level, StoredAutopilot
 from flight.autopilots.gust_height import height_in_gusts
+from flight.autopilots.parts import ControlLaw, Deviations, TurnRules
 from flight.autopilots.planfly.law import LAWS, planfly_loop, planfly_tick
 from flight.guidance.gains import GAINS_FILE, load_gains
 from world.kernels import Record
 from world.scenario_tables import FlightTable, Guidance
-from world.wind import Turbulence
 
 _LAW_NAMES = {
     "path": "planfly's guidance on the fly-by path",
@@ -54,31 +54,24 @@ class PlanflyGuidance(Autopilot):
         return [f"{aircraft.folder / GAINS_FILE}: missing; {aircraft.name} does not fly without gains"]
 
     @property
-    def tick(self) -> Tick:
-        """Compiled function for one tick, for all three lateral laws."""
-        return planfly_tick
+    def control_law(self) -> ControlLaw:
+        """Control law of the guidance, for all three lateral laws."""
+        return ControlLaw(planfly_tick, planfly_loop, initialise=self._initialise)
 
-    @property
-    def loop(self) -> Loop:
-        """Compiled simulation loop of the guidance and the aircraft model."""
-        return planfly_loop
-
-    def initialise_records(self, guidance: Record, record: Record) -> None:
+    def _initialise(self, guidance: Record, record: Record) -> None:
         """Set the lateral law in the guidance memory."""
         guidance.lateral_law = LAWS[self.guidance]
 
-    def gust_sink(self, climb_reserve: float, turbulence: Turbulence) -> float:
-        """Return the altitude loss in a downdraft with an exceedance probability of 1 %, m.
-
-        Updrafts do not lift the aircraft, because the guidance dives and flies faster.
-        """
-        return height_in_gusts(climb_reserve, turbulence)
-
-    def described(self, aircraft: str) -> str:
+    def describe(self, aircraft: str) -> str:
         """Return a description of the lateral law."""
         return _LAW_NAMES[self.guidance]
 
     @property
-    def keeps_to_arcs(self) -> bool:
-        """False for the reference laws, which may pass a waypoint at any distance."""
-        return self.guidance == "path"
+    def turns(self) -> TurnRules:
+        """Rules of turns: the reference laws may pass a waypoint at any distance."""
+        return TurnRules(keeps_to_arcs=self.guidance == "path")
+
+    @property
+    def deviations(self) -> Deviations:
+        """Altitude loss in downdrafts; in updrafts the guidance dives and flies faster, so they do not lift it."""
+        return Deviations(gust_sink=height_in_gusts)

@@ -3,24 +3,26 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import ClassVar, NamedTuple, Self
-
-import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
-from flight.autopilots.autopilot import (
-    Autopilot,
+from flight.autopilots.autopilot import Autopilot, StoredAutopilot, StoredParameters
+from flight.autopilots.gust_height import height_in_updrafts
+from flight.autopilots.parts import (
     BatteryFailsafe,
-    Loop,
+    ControlLaw,
+    Deviations,
+    FeasibilityLimits,
     MissionChecks,
     MissionParts,
+    ReturnBehaviour,
+    RtlSettings,
     SpeedLimits,
-    StoredAutopilot,
-    StoredParameters,
-    Tick,
+    SpeedRules,
+    TurnRules,
 )
-from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
@@ -107,20 +109,12 @@ class Px4(Autopilot):
     """Simulated PX4 for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
 
     >>> made = Px4(Px4Parameters.defaults("1.16"))
-    >>> made.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).acceptance_radius
+    >>> made.turns.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).turns.acceptance_radius
     (33.6, 10.0)
     """
 
     name: ClassVar = "px4"
     title: ClassVar = "PX4"
-    own: ClassVar[np.dtype[np.record] | None] = PX4
-    cruise_parameter: ClassVar = "FW_AIRSPD_TRIM"
-    equivalent_airspeeds: ClassVar = True
-    refuses: ClassVar = True
-    reads_as_px4: ClassVar = True
-    height_parameter: ClassVar = "NAV_FW_ALT_RAD"
-    height_candidates: ClassVar = HEIGHT_CANDIDATES
-    side_candidates: ClassVar = SIDE_CANDIDATES
     parameters: Px4Parameters = field()
 
     @classmethod
@@ -153,28 +147,15 @@ class Px4(Autopilot):
         return []
 
     @property
-    def tick(self) -> Tick:
-        """Compiled function for one tick of PX4's controllers."""
-        return px4_tick
+    def control_law(self) -> ControlLaw:
+        """PX4's controllers with these parameters."""
+        return ControlLaw(px4_tick, px4_loop, PX4, self._initialise, _transfer_state)
 
-    @property
-    def loop(self) -> Loop:
-        """Compiled simulation loop of PX4's controllers and the aircraft model."""
-        return px4_loop
-
-    def initialise_records(self, guidance: Record, record: Record) -> None:
+    def _initialise(self, guidance: Record, record: Record) -> None:
         """Copy the parameters into the controllers' record."""
         record.parameters = self.parameters.record()
 
-    def transfer_state(self, previous_record: Record, record: Record, start: Floats) -> None:
-        """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
-        record.memory = previous_record.memory
-        for name in _LEG_FIELDS:
-            setattr(record.memory, name, 0)
-        record.memory.from_east, record.memory.from_north, record.memory.from_up = start
-        record.memory.min_distance_to_end, record.memory.leg_start_altitude = math.inf, start[2]
-
-    def described(self, aircraft: str) -> str:
+    def describe(self, aircraft: str) -> str:
         """Return a description of the simulated PX4 with the parameters that matter most in a flight."""
         parameters = self.parameters
         source_text = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
@@ -190,11 +171,24 @@ class Px4(Autopilot):
         return self.parameters.version
 
     @property
-    def acceptance_radius(self) -> float | None:
-        """NAV_ACC_RAD; up to 1.16 at least guidance's own switch distance at sea level."""
-        return self.turn_distance(math.pi, 0.0)
+    def checks(self) -> MissionChecks:
+        """PX4's feasibility checks, from FW_LND_ANG and MIS_TKO_LAND_REQ.
 
-    def settings_not_flown(self, mission: MissionParts) -> list[str]:
+        A file with all parameters is assumed to state MIS_TKO_LAND_REQ.
+
+        >>> Px4(Px4Parameters.defaults()).checks.feasibility.requires
+        2
+        """
+        parameters = self.parameters
+        is_stated = parameters.is_whole_set or "MIS_TKO_LAND_REQ" in parameters.by_origin("file")
+        return MissionChecks(
+            dialect="px4",
+            feasibility=FeasibilityLimits(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated),
+            battery_failsafes=self._battery_failsafes(),
+            settings_not_flown=partial(self.settings_not_flown, by_program=False),
+        )
+
+    def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
         """Describe settings that end a mission or change its flight and are not simulated."""
         parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX"]
         if parameters["GF_ACTION"] > 0.0:
@@ -209,11 +203,10 @@ class Px4(Autopilot):
         changing_texts = [
             f"{name} {parameters[name]:g} changes the flight and is not flown"
             for name, neutral in _NEUTRAL.items()
-            if not neutral.lowest <= parameters[name] <= neutral.highest
-            and not (self.is_program and neutral.by_program)
+            if not neutral.lowest <= parameters[name] <= neutral.highest and not (by_program and neutral.by_program)
         ]
         ending_texts += self._describe_endings(mission)
-        return [*ending_texts, *changing_texts, *([] if self.is_program else self._describe_mission_settings(mission))]
+        return [*ending_texts, *changing_texts, *([] if by_program else self._describe_mission_settings(mission))]
 
     def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:
         """Describe settings that change only some missions or releases."""
@@ -252,12 +245,11 @@ class Px4(Autopilot):
                 if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6):
                     yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not flown"
 
-    @property
-    def battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
-        """Failsafe from COM_LOW_BAT_ACT and BAT_CRIT_THR, which PX4's own program does not get.
+    def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
+        """Return the failsafe from COM_LOW_BAT_ACT and BAT_CRIT_THR, which PX4's own program does not get.
 
         >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
-        >>> Px4(made).battery_failsafes
+        >>> Px4(made).checks.battery_failsafes
         (BatteryFailsafe(parameter='BAT_CRIT_THR', threshold=0.1, used_charge=4500.0),)
         """
         parameters = self.parameters
@@ -269,11 +261,20 @@ class Px4(Autopilot):
         return (BatteryFailsafe("BAT_CRIT_THR", threshold, (1.0 - threshold) * capacity),)
 
     @property
-    def reads_acceptance(self) -> bool:
-        """False, because only PX4's multicopters read the second parameter of a waypoint."""
-        return False
+    def turns(self) -> TurnRules:
+        """Rules of turns from NAV_ACC_RAD (up to 1.16 at least guidance's own switch distance) and FW_R_LIM.
 
-    def turn_distance(self, turn: float, amsl: float) -> float:
+        Only PX4's multicopters read the second parameter of a waypoint.
+        """
+        return TurnRules(
+            acceptance_radius=self._turn_distance(math.pi, 0.0),
+            distance=self._turn_distance,
+            reads_acceptance=False,
+            max_bank=self.parameters["FW_R_LIM"],
+            bank_parameter="FW_R_LIM",
+        )
+
+    def _turn_distance(self, turn: float, amsl: float) -> float:
         """Return the distance before a waypoint at which PX4 turns in still air, for any turn, m.
 
         Up to 1.16 the distance grows with altitude.
@@ -291,12 +292,20 @@ class Px4(Autopilot):
         switch_distance = parameters["NPFG_SW_DST_MLT"] * period * parameters["NPFG_DAMPING"] * speed
         return max(parameters["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE, switch_distance), 6))
 
-    def airspeed_factor(self, amsl: float) -> float:
-        """Return the ratio of true to equivalent airspeed."""
-        return float(true_by_equivalent(amsl))
+    @property
+    def speeds(self) -> SpeedRules:
+        """Rules of airspeeds; a speed outside FW_AIRSPD_MIN and FW_AIRSPD_MAX is replaced by the nearest limit."""
+        min_airspeed, max_airspeed = self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"]
+        limits = SpeedLimits(min_airspeed, max_airspeed, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
+        return SpeedRules(limits, equivalent=True, cruise_parameter="FW_AIRSPD_TRIM")
 
     @property
-    def return_rules(self) -> ReturnRules:
+    def returns(self) -> ReturnBehaviour:
+        """Behaviour in an RTL; a scenario's RTL altitude sets RTL_RETURN_ALT."""
+        return ReturnBehaviour(self._return_rules, _rtl_parameters)
+
+    @property
+    def _return_rules(self) -> ReturnRules:
         """Rules of an RTL at any distance, from RTL_RETURN_ALT, RTL_LOITER_RAD and RTL_TYPE.
 
         RTL_RETURN_ALT applies above a rally point as above home.  Follows PX4's
@@ -304,7 +313,7 @@ class Px4(Autopilot):
         of fixed wings) and 5 return to the nearest rally point, or to home without a rally point.  The other types, and
         1, also use a mission's landing, which is not simulated.
 
-        >>> rules = Px4(Px4Parameters.defaults()).return_rules
+        >>> rules = Px4(Px4Parameters.defaults()).returns.rules
         >>> rules.includes_home, rules.rally_height, rules.deviation_note
         (False, 100.0, '')
         """
@@ -323,10 +332,10 @@ class Px4(Autopilot):
         )
 
     @property
-    def loiter_rules(self) -> LoiterRules:
+    def loiters(self) -> LoiterRules:
         """Rules of loiters from NAV_LOITER_RAD, the reference climb and sink rates, and NAV_FW_ALT_RAD.
 
-        >>> Px4(Px4Parameters.defaults()).loiter_rules.radius
+        >>> Px4(Px4Parameters.defaults()).loiters.radius
         80.0
         """
         parameters = self.parameters
@@ -342,59 +351,36 @@ class Px4(Autopilot):
         )
 
     @property
-    def mission_checks(self) -> MissionChecks:
-        """Mission checks from FW_LND_ANG and MIS_TKO_LAND_REQ.
+    def deviations(self) -> Deviations:
+        """Deviations from the legs, the altitude gained in updrafts, and circles outside NAV_FW_ALT_RAD."""
+        return Deviations(
+            tracking_error=self._tracking_error,
+            gust_rise=height_in_updrafts,
+            altitude_miss_probability=partial(altitude_miss_probability, self.parameters["NAV_FW_ALT_RAD"]),
+            altitude_parameter="NAV_FW_ALT_RAD",
+            altitude_candidates=HEIGHT_CANDIDATES,
+            track_candidates=SIDE_CANDIDATES,
+        )
 
-        A file with all parameters is assumed to state MIS_TKO_LAND_REQ.
-
-        >>> Px4(Px4Parameters.defaults()).mission_checks.requires
-        2
-        """
-        parameters = self.parameters
-        is_stated = parameters.is_whole_set or "MIS_TKO_LAND_REQ" in parameters.by_origin("file")
-        return MissionChecks(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated)
-
-    @property
-    def speed_limits(self) -> SpeedLimits | None:
-        """FW_AIRSPD_MIN and FW_AIRSPD_MAX; a speed outside these limits is replaced by the nearest limit."""
-        parameters = self.parameters
-        min_airspeed, max_airspeed = parameters["FW_AIRSPD_MIN"], parameters["FW_AIRSPD_MAX"]
-        return SpeedLimits(min_airspeed, max_airspeed, "FW_AIRSPD_MIN", "FW_AIRSPD_MAX", nearest=True)
-
-    def speeds_flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the commanded airspeeds, clipped to FW_AIRSPD_MIN and FW_AIRSPD_MAX."""
-        return np.clip(commanded, self.parameters["FW_AIRSPD_MIN"], self.parameters["FW_AIRSPD_MAX"])
-
-    @property
-    def stated_bank(self) -> float | None:
-        """FW_R_LIM of the user's file, or None if the file does not state it."""
-        return self.parameters["FW_R_LIM"] if "FW_R_LIM" in self.parameters.by_origin("file") else None
-
-    @property
-    def bank_limit(self) -> float:
-        """FW_R_LIM, from any source."""
-        return self.parameters["FW_R_LIM"]
-
-    def tracking_error(
+    def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
         """Return PX4's deviations with these parameters; PX4 flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
-    def altitude_miss_probability(self, climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
-        """Return the probability that the altitude error exceeds NAV_FW_ALT_RAD at a waypoint."""
-        return altitude_miss_probability(self.parameters["NAV_FW_ALT_RAD"], climb_reserve, sink_reserve, turbulence)
-
-    def gust_rise(self, sink_reserve: float, turbulence: Turbulence) -> float:
-        """Return the altitude gained in updrafts while PX4 holds airspeed and cannot sink fast enough, m."""
-        return height_in_updrafts(sink_reserve, turbulence)
-
-    def with_scenario_rtl_settings(
-        self, rtl_altitude: float | None, rtl_autoland: int | None, *, lands: bool, lower: float = 0.0
-    ) -> Autopilot:
-        """Return the autopilot with a scenario's RTL altitude as RTL_RETURN_ALT."""
-        return self if rtl_altitude is None else Px4(self.parameters.changed(RTL_RETURN_ALT=rtl_altitude))
-
     def with_parameters(self, **values: float) -> "Px4":
         """Return a copy with the given parameters changed."""
         return Px4(self.parameters.changed(**values))
+
+
+def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:
+    """Start a new leg at ``start``, as after a change of mode, and keep the state of TECS and airspeed filter."""
+    record.memory = previous_record.memory
+    for name in _LEG_FIELDS:
+        setattr(record.memory, name, 0)
+    record.memory.from_east, record.memory.from_north, record.memory.from_up = start
+    record.memory.min_distance_to_end, record.memory.leg_start_altitude = math.inf, start[2]
+
+
+def _rtl_parameters(settings: RtlSettings) -> dict[str, float]:
+    return {} if settings.altitude is None else {"RTL_RETURN_ALT": settings.altitude}

@@ -15,10 +15,10 @@ from typing import ClassVar, get_args
 
 import numpy as np
 
-from flight.autopilots.autopilot import Candidate
 from flight.autopilots.parameter_files import Entry
 from flight.autopilots.parameter_origin import PX4
 from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable
+from flight.autopilots.parts import Candidate
 from world.errors import ParameterError
 from world.kernels import Record, record_dtype
 from world.scenario_tables import NEWEST_PX4, Px4Version

@@ -6,6 +6,7 @@ from typing import ClassVar, Self
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import StoredAutopilot
+from flight.autopilots.parts import MissionParts
 from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4_sitl.process import startup_files
@@ -29,9 +30,9 @@ class Px4Sitl(ProgramAutopilot, Px4):
         return program.name.lower().startswith("px4") or startup_files(program) is not None
 
     @classmethod
-    def flying(cls, law: Px4, binary: Path) -> Self:
+    def flying(cls, model: Px4, binary: Path) -> Self:
         """Return the program's autopilot with the parameters of the simulated PX4."""
-        return cls(law.parameters, binary=binary)
+        return cls(model.parameters, binary=binary)
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
@@ -39,9 +40,13 @@ class Px4Sitl(ProgramAutopilot, Px4):
         return []
 
     @property
-    def law(self) -> Px4:
+    def model(self) -> Px4:
         """Simulated PX4 with the same parameters."""
         return Px4(self.parameters)
+
+    def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
+        """Describe the settings that neither PX4's program nor planfly's physics flies."""
+        return self.settings_not_flown(mission, by_program=True)
 
     def store(self) -> StoredAutopilot:
         """Return the settings of the simulated PX4, and the program."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.contacts import contacts_of
-from flight.autopilots.autopilot import Autopilot, Tick
+from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramFlight
 from flight.autopilots.sitl.conversation import Talk
 from flight.autopilots.sitl.exchange import FRAME_HZ, LOOK_FRAMES, PUSH, Lockstep, RailEnd, rail_end
@@ -205,23 +205,21 @@ class SitlFlight(ProgramFlight):
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, binary: Path) -> None:
         self._binary, self._ground_phases, gear = binary, setup.ground_phases, None
-        if self._ground_phases:
+        ground_law = setup.autopilot.ground.control_law
+        if self._ground_phases and ground_law is not None:
             gear = default_gear(self._ground_phases)
-            self._from_ground = setup.autopilot.from_ground(self._ground_phases, aircraft, contacts_of(aircraft, gear))
+            self._law = ground_law(self._ground_phases, aircraft, contacts_of(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
         self._rail = self._trim_on_rail(setup)
         self._start_disturbances(setup)
         self._mission = uploaded_mission(setup)
-        if self._ground_phases:
+        if self._law is not None:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)
-            self._from_ground.initialise_records(self.memory, self._workspace.own)
+            self._law.initialise(self.memory, self._workspace.own)
         # Compiled here, while no autopilot waits for it.
         tick = self._ground_tick if self._ground_phases else autopilot_tick
         tick(self._workspace.block.copy(), self._ground.heights)
-
-    def _flying_autopilot(self, setup: FlightSetup) -> Autopilot:
-        return self._from_ground if self._ground_phases else setup.autopilot
 
     @property
     def _ground_tick(self) -> Tick:

@@ -72,7 +72,7 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
         items.append(_make_waypoint(items[-1].seq + 1, route.waypoints[-1], 0.0, origin))
     if (route.return_from >= 0 and not has_landing) or items[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally)
-    if setup.autopilot.loiter_rules.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
+    if setup.autopilot.loiters.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
         return UploadedMission(_home_for_upload(setup), _renumber(items))
     items.append(_make_waypoint(items[-1].seq + 1, _extra_point(route), 0.0, origin))
     return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally if has_landing else ())

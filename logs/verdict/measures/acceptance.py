@@ -57,11 +57,11 @@ def acceptance_condition(requirements: RouteRequirements, i: int) -> AcceptanceC
     tolerance = position_error(setup) + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     if mission_radius > 0.0:
         return AcceptanceCondition(mission_radius, "mission", tolerance)
-    if not setup.autopilot.follows_path:
+    if not setup.autopilot.turns.follows_path:
         is_inner = 0 < i < requirements.legs and i != setup.route.return_from
         turn = abs(float(requirements.turns[i])) if is_inner else math.pi
         return AcceptanceCondition(
-            setup.autopilot.turn_distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance
+            setup.autopilot.turns.distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance
         )
     return AcceptanceCondition(path_radius, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
 
@@ -96,13 +96,13 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     depths = corner_depths(requirements)[ends]
     source = requirements.setup.source
     radius_is_known = source is None or source.aircraft_known
-    if radius_is_known and not requirements.setup.autopilot.follows_path:
+    if radius_is_known and not requirements.setup.autopilot.turns.follows_path:
         # The autopilot may turn as late as at the waypoint.  Without a named aircraft the turn radius is an estimate.
         radius = np.where(requirements.setup.route.arcs[ends] == 0.0, requirements.radius[ends], 0.0)
         swings = np.where(np.isfinite(radius), radius, 0.0) * (1.0 - np.cos(requirements.turns[ends]))
         depths = np.maximum(depths, FLY_OVER_SWING_RATIO * swings)
     turn_width = float(depths.max()) + WAYPOINT_PASS_MARGIN_M
-    if requirements.setup.autopilot.loiter_rules.steers_to_center:
+    if requirements.setup.autopilot.loiters.steers_to_center:
         arcs, tightest = requirements.setup.route.arcs[ends], requirements.min_radius[ends]
         turn_radius = float(np.where(np.isfinite(tightest), tightest, 0.0).max())
         # A loiter too tight for the bank is as wide as the bank limit makes the aircraft swing, whatever its radius.
@@ -116,7 +116,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
             return loiter_width, "circle"
     if turn_width > half_width:
         return turn_width, "fly-by path"
-    return half_width, "default" if requirements.setup.autopilot.follows_path else "autopilot"
+    return half_width, "default" if requirements.setup.autopilot.turns.follows_path else "autopilot"
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:

@@ -53,7 +53,7 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 
     Return None if the autopilot does not loiter there, or if the mission continues.
     """
-    setup, rules = requirements.setup, requirements.setup.autopilot.loiter_rules
+    setup, rules = requirements.setup, requirements.setup.autopilot.loiters
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
         return None
     altitude, speed = float(requirements.points[-1, 2]), float(requirements.route.airspeed[-1])

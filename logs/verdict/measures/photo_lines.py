@@ -182,7 +182,7 @@ def _camera_on_rows(
     The camera is on from reaching the line's first waypoint to reaching its last waypoint.  It is always on if the
     mission does not switch it on this line.
     """
-    follows_path, rows = requirements.setup.autopilot.follows_path, np.arange(len(along))
+    follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(along))
 
     def first_row_at(waypoint: int, min_along: float, first_row: int = 0) -> int:
         distances = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)

@@ -500,11 +500,12 @@ def true_route(setup: FlightSetup) -> Route:
     True
     """
     route = setup.route
-    if not setup.autopilot.equivalent_airspeeds:
+    speeds = setup.autopilot.speeds
+    if not speeds.equivalent:
         return route
     mean_altitudes = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
     return replace(
-        route, airspeed=route.airspeed * [setup.autopilot.airspeed_factor(altitude) for altitude in mean_altitudes]
+        route, airspeed=route.airspeed * [speeds.true_airspeed_factor(altitude) for altitude in mean_altitudes]
     )
 
 

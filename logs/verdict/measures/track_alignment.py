@@ -149,7 +149,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
 
 def _arrival_radii(requirements: RouteRequirements) -> Floats:
     """Return the radius within which a track that ends has arrived at each waypoint, m, (w,)."""
-    route, follows_path = requirements.setup.route, requirements.setup.autopilot.follows_path
+    route, follows_path = requirements.setup.route, requirements.setup.autopilot.turns.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
     radii = [
         max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, i).radius)
@@ -164,7 +164,7 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
         radii[first_return + 1 : end_return] = [
             max(anywhere, radius) for radius in radii[first_return + 1 : end_return]
         ]
-    if requirements.setup.autopilot.loiter_rules.steers_to_center:
+    if requirements.setup.autopilot.loiters.steers_to_center:
         # A mission that ends on a loiter about a center ends anywhere on it, as wide as it is flown.
         k, item = route.arcs.size - 1, route.items[-1]
         while k > 0 and route.items[k] == item and route.arcs[k - 1]:

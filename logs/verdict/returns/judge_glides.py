@@ -305,7 +305,7 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
     targets = [world.target(row) for row in starts.rows]
     if "terrain" in world.unjudged_parts:
         return [EngineOutReturn(target, "not flown", math.nan, math.nan, _NO_POSITION, math.nan) for target in targets]
-    radius = ArduPlane(world.parameters).return_rules.radius
+    radius = ArduPlane(world.parameters).returns.rules.radius
     return_circles = [
         None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
     ]

@@ -343,7 +343,7 @@ class ReturnWorld:
 
     def target(self, row: Record, ending: Ending | None = None) -> ReturnTarget:
         """Return the destination of an RTL from a start.  ending: how the RTL ends; by default by RTL_AUTOLAND."""
-        rules = ArduPlane(self.parameters).return_rules
+        rules = ArduPlane(self.parameters).returns.rules
         position = (float(row["east"]), float(row["north"]), float(row["up"]))
         ending = ending or self.ending
         if ending == "straight to land" and (landing := nearest_landing_sequence(position, self.landings)) is not None:
@@ -392,7 +392,7 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         message = f"{source}: home: not stated, so there is nowhere to return to"
         raise MissionError(message, file=source, field="home")
     aircraft: Aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
-    setup_parameters = setup.autopilot.law.parameters
+    setup_parameters = setup.autopilot.model.parameters
     parameters = (
         setup_parameters if isinstance(setup_parameters, ArduPilotParameters) else ArduPilotParameters.load(aircraft)
     )
@@ -512,7 +512,7 @@ def simulate_returns(
     limits: the argument ``least`` of `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
     keep_paths: True to return the paths also without zones.
     """
-    radius = ArduPlane(world.parameters).return_rules.radius
+    radius = ArduPlane(world.parameters).returns.rules.radius
     circles = [
         None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
     ]

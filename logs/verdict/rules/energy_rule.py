@@ -110,7 +110,7 @@ def _battery_failsafe_messages(requirements: RouteRequirements, energy_used: flo
     messages, unjudged = [], []
     if requirements.setup.source is not None or math.isnan(energy_used):
         return [], ""
-    for failsafe in requirements.setup.autopilot.battery_failsafes:
+    for failsafe in requirements.setup.autopilot.checks.battery_failsafes:
         if math.isnan(failsafe.used_charge):
             unjudged.append(f"{failsafe.parameter} {failsafe.threshold:g}")
         elif volts and energy_used / volts * _MAH_PER_AH > failsafe.used_charge:

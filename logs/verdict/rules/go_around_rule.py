@@ -17,7 +17,7 @@ import numpy as np
 
 from flight.autopilots.arduplane.go_around_point_mass import aborted_at, climb_rows, fly_go_arounds
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
-from flight.autopilots.autopilot import LandingGlide
+from flight.autopilots.parts import LandingGlide
 from flight.mission.ground_ways import climb_pitch
 from flight.mission.items import Command, MissionItem, command_name
 from flight.mission.placing import home_point, landing_sequence, landing_starts
@@ -186,7 +186,7 @@ def _find_landing(
     home_altitude = math.nan if home_position is None else home_position.up
     first, takeoff = first_item(requirements)
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
-    height = setup.autopilot.go_around_height(item.params[0], takeoff_climb)
+    height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
     landings = _go_around_destinations(requirements, waypoint)
     ground_altitude, terrain_altitude = (
         setup.route.landing_ground,
@@ -202,14 +202,14 @@ def _find_landing(
     wind = setup.scenario.wind.along(course, ground_altitude)[0]
     point = np.array([landing_point[0], landing_point[1], ground_altitude])
     return _Landing(
-        glide=setup.autopilot.landing_glide(float(glide_start[2]) - ground_altitude, leg_length, wind, ground_altitude),
+        glide=setup.autopilot.ground.glide(float(glide_start[2]) - ground_altitude, leg_length, wind, ground_altitude),
         waypoint=waypoint,
         point=point,
         ground_altitude=terrain_altitude,
         course=course,
         leg_length=leg_length,
         glide_start_altitude=float(glide_start[2]),
-        airspeed=setup.autopilot.landing_airspeed(setup.airspeed, wind, ground_altitude),
+        airspeed=setup.autopilot.ground.airspeed(setup.airspeed, wind, ground_altitude),
         pitch=_CLIMB_PITCH_RAD if takeoff is None else climb_pitch(takeoff),
         home_altitude=home_altitude,
         climb_height=height,

@@ -9,7 +9,7 @@ scenario's `[launch]`.  An obstacle at the steepest climb fails; an obstacle tha
 that climb leaves the finding undecided.  If the mission does not take off, a pilot flies the aircraft to its first
 waypoint, perhaps on another path, so an obstacle on the straight path leaves the finding undecided.
 
-The approach is the glide that the autopilot lays out (`Autopilot.landing_glide`).
+The approach is the glide that the autopilot lays out (`GroundRules.glide`).
 """
 
 import math
@@ -381,7 +381,7 @@ def approach_findings(
     if start_altitude <= point_altitude:
         reason = "it begins no higher than the landing point"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
-    glide = setup.autopilot.landing_glide(
+    glide = setup.autopilot.ground.glide(
         start_altitude - point_altitude, length, setup.scenario.wind.along(course, point_altitude)[0], point_altitude
     )
     flare = (length - glide.flare_distance, point_altitude + glide.flare_height)

@@ -45,7 +45,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     position, distances = path
     height_lost = float(position[0, 2] - position[:, 2].min())
     clearance, distance = _climb_clearance(requirements, path)
-    trigger = requirements.setup.autopilot.launch_trigger
+    trigger = requirements.setup.autopilot.ground.launch_trigger
     faults = []
     if trigger is not None and take_off.acceleration < trigger[0]:
         faults.append(message(gentle_launch_text(take_off.acceleration, trigger), ": the motor never starts"))

@@ -81,7 +81,7 @@ def merge_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Merge the findings at each loiter's corners into one, and keep only each rule's worst finding on its legs."""
-    joins_at_center = requirements.setup.autopilot.loiter_rules.steers_to_center
+    joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     merged: list[Finding | None] = list(findings)
     # Indexed by rule and place: a mission of jumps has hundreds of loiters, and each thousands of findings.
     positions: dict[tuple[str, Place], list[int]] = {}
@@ -160,13 +160,13 @@ def _loiter_finding(
     is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
     min_radius = float(requirements.min_radius[corners].max()) if is_known else math.nan
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
-    joins_at_center = requirements.setup.autopilot.loiter_rules.steers_to_center
+    joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     uses_parameter = _uses_parameter_radius(requirements, circle)
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
         failed_corners = []
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
     facts = [f"{circle.laps:.2f} turns with {circle.radius:.0f} m"]
-    hazards_text, parameter_name = "", requirements.setup.autopilot.loiter_rules.radius_name
+    hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
@@ -235,7 +235,7 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle
 
     The mission item then has no radius that the autopilot reads.
     """
-    rules, seq = requirements.setup.autopilot.loiter_rules, int(requirements.setup.route.items[circle.first])
+    rules, seq = requirements.setup.autopilot.loiters, int(requirements.setup.route.items[circle.first])
     loiter = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.exits_on_heading and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
 
@@ -254,7 +254,7 @@ def _held_bank(
     if measured_banks:
         return math.radians(max(measured_banks))
     needed_bank = math.atan(math.tan(requirements.limits.max_bank) * min_radius / circle.radius)
-    return min(requirements.setup.autopilot.bank_limit, needed_bank)
+    return min(requirements.setup.autopilot.turns.max_bank, needed_bank)
 
 
 def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> str:
@@ -274,7 +274,7 @@ def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle:
     The corners do not show this, because a flight that leaves the loiter when its time is over may miss all of them.
     """
     distances, _ = approaches(aligned.track.position, circle.center)
-    turn_distance = requirements.setup.autopilot.turn_distance(math.pi, float(requirements.points[circle.first, 2]))
+    turn_distance = requirements.setup.autopilot.turns.distance(math.pi, float(requirements.points[circle.first, 2]))
     return bool(distances.min() <= circle.radius + turn_distance + WAYPOINT_PASS_MARGIN_M)
 
 

@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from flight.autopilots.autopilot import MissionChecks, MissionParts
+from flight.autopilots.parts import FeasibilityLimits, MissionParts
 from flight.mission.commands import PASSED_OVER, Treatment, support_of
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
@@ -50,19 +50,19 @@ C = Command
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
     """Run each check and return its finding, with the first item at fault."""
-    mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.mission_checks
+    mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.checks.feasibility
+    refuses = setup.autopilot.checks.dialect == "px4"
     checks = (
         ("checkMissionItemValidity", _check_validity(mission)),
         ("checkTakeoff", _check_takeoff(mission)),
         ("checkFixedWingLanding", _check_landing(mission)),
         ("checkFixedWindLandApproach", _check_approach(mission, origin, limits)),
-        ("checkTakeoffLandAvailable", _check_required_ends(mission, limits, setup.autopilot.refuses)),
+        ("checkTakeoffLandAvailable", _check_required_ends(mission, limits, refuses)),
         ("checkDistanceToFirstWaypoint", _check_first_distance(mission, origin)),
         ("checkDistancesBetweenWaypoints", _check_distances(mission, origin)),
         ("checkIfBelowHomeAltitude", _check_home_altitude(mission)),
         ("checkGeofence", _check_fence(setup)),
     )
-    refuses = setup.autopilot.refuses
     findings = [_check_finding(name, list(remarks), refuses) for name, remarks in checks]
     # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
@@ -107,7 +107,7 @@ def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
         for item in setup.mission.items
         if support_of(item.command).arduplane == Treatment.REFUSED != support_of(item.command).px4
     ]
-    if not refused_items or not setup.autopilot.refuses_as_arduplane:
+    if not refused_items or setup.autopilot.checks.dialect != "ardupilot":
         return []
     more_text = f" (+{len(refused_items) - 1} more)" if len(refused_items) > 1 else ""
     fault = message(f"unsupported command {command_name(refused_items[0].command)}", f"; PX4 accepts it{more_text}")
@@ -157,7 +157,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
 def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     """Yield a finding for each item or setting that changes the flight path but is not simulated."""
     remarks = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
-    if not setup.autopilot.follows_ground:
+    if not setup.autopilot.checks.follows_terrain:
         items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
         reason = f"the simulated {setup.autopilot.title} does not follow its height above terrain along the leg"
         remarks += [(seq, reason) for seq in items_above_terrain]
@@ -168,7 +168,7 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
             for item in setup.mission.items
             if item.command == C.DO_SET_HOME
         ]
-        if not setup.autopilot.reads_as_px4:
+        if setup.autopilot.checks.dialect != "px4":
             remarks += [
                 (
                     item.seq,
@@ -183,9 +183,9 @@ def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
         reason = f"NAV_LAND: the ground there slopes by {steepest_text}, so the touchdown is not judged"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
-    texts = setup.autopilot.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
+    texts = setup.autopilot.checks.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
     # The route notes a loiter that is flown with another radius.
-    unflown_radius = setup.autopilot.loiter_rules.unflown_note
+    unflown_radius = setup.autopilot.loiters.unflown_note
     if unflown_radius and unflown_radius in setup.route.notes and setup.source is None:
         texts = [*texts, unflown_radius]
     settings = [(None, text) for text in texts]
@@ -283,7 +283,7 @@ def _check_landing(mission: Mission) -> Iterator[_Remark]:
         yield REFUSED, seq[land_starts[0]], "invalid land start: no landing follows"
 
 
-def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) -> Iterator[_Remark]:
+def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimits) -> Iterator[_Remark]:
     max_angle = math.degrees(limits.landing_angle)
     for previous, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or previous.command not in PLACES | TAKEOFFS or not previous.has_position:
@@ -311,7 +311,7 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: MissionChecks) 
             yield REFUSED, item.seq, reason
 
 
-def _check_required_ends(mission: Mission, limits: MissionChecks, refuses: bool) -> Iterator[_Remark]:
+def _check_required_ends(mission: Mission, limits: FeasibilityLimits, refuses: bool) -> Iterator[_Remark]:
     missing_ends = missing_ends_text(mission, limits)
     if not missing_ends:
         yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ requires"

@@ -135,7 +135,7 @@ def _flown_command(requirements: RouteRequirements, leg: int) -> float:
     """Return the airspeed that the autopilot flies on a leg, m/s; it may differ from the command."""
     setup = requirements.setup
     command = setup.route.airspeed
-    flown_speeds = setup.autopilot.speeds_flown(command, setup.airspeed)
+    flown_speeds = setup.autopilot.speeds.flown(command, setup.airspeed)
     return float(requirements.route.airspeed[leg] * flown_speeds[leg] / command[leg])
 
 
@@ -196,7 +196,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
 def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:
     """Return a note if the autopilot does not accept a commanded speed (m/s)."""
     autopilot = requirements.setup.autopilot
-    limits = autopilot.speed_limits
+    limits = autopilot.speeds.limits
     if limits is None or limits.min <= command <= limits.max:
         return []
     range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"

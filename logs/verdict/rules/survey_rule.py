@@ -180,11 +180,11 @@ def _planned_finding(requirements: RouteRequirements, survey: Survey, line: Phot
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
     """Return the distance before the end of a line's straight run at which the turn begins, m."""
     setup, last = requirements.setup, line.ends
-    if setup.autopilot.follows_path or not 0 < last < requirements.legs:
+    if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
         return float(requirements.length_before[last])
     turn = abs(float(requirements.turns[last]))
-    mission_radius = float(setup.route.acceptance[last]) if setup.autopilot.reads_acceptance else 0.0
-    return mission_radius or setup.autopilot.turn_distance(turn, float(requirements.points[last, 2]))
+    mission_radius = float(setup.route.acceptance[last]) if setup.autopilot.turns.reads_acceptance else 0.0
+    return mission_radius or setup.autopilot.turns.distance(turn, float(requirements.points[last, 2]))
 
 
 def _clip_to_length(distance: float, length: float) -> float:

@@ -64,7 +64,7 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
     Return [] if the autopilot needs no acceleration.
     """
     setup = requirements.setup
-    trigger, acceleration = setup.autopilot.launch_trigger, launch.acceleration(setup.default_launch_speed)
+    trigger, acceleration = setup.autopilot.ground.launch_trigger, launch.acceleration(setup.default_launch_speed)
     if trigger is None or acceleration >= trigger[0]:
         return []
     fault = message(gentle_launch_text(acceleration, trigger), ": the motor never starts")

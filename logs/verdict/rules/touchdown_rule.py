@@ -207,7 +207,7 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) ->
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
     """Return the minimum height above ground before flare or touch-down, m, as in `_Landing.room`."""
     point_altitude = float(approach.point[2])
-    glide = requirements.setup.autopilot.landing_glide(
+    glide = requirements.setup.autopilot.ground.glide(
         approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
     )
     flare_distance = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope

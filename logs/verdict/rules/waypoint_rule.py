@@ -36,7 +36,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
     if requirements.setup.route.fly_over[i]:
         fact = "flown over"
-    elif not requirements.setup.autopilot.follows_path:
+    elif not requirements.setup.autopilot.turns.follows_path:
         fact = _turn_text(requirements, i, condition)
     elif offset > condition.radius + ROUNDING_M:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
@@ -56,7 +56,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         limit=condition.radius,
         source=condition.source,
         tolerance=ROUNDING_M,
-        margin=condition.radius - offset if requirements.setup.autopilot.follows_path else None,
+        margin=condition.radius - offset if requirements.setup.autopilot.turns.follows_path else None,
         unit="m",
         method="the fly-by arc",
     )
@@ -65,9 +65,9 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
 def _turn_text(requirements: RouteRequirements, i: int, condition: AcceptanceCondition) -> str:
     """Describe where an autopilot without fly-by arcs turns at a waypoint."""
     autopilot, turn_distance, unread_text = requirements.setup.autopilot, condition.radius, ""
-    if condition.source == "mission" and not autopilot.reads_acceptance:
+    if condition.source == "mission" and not autopilot.turns.reads_acceptance:
         turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
-        turn_distance = autopilot.turn_distance(turn, float(requirements.points[i, 2]))
+        turn_distance = autopilot.turns.distance(turn, float(requirements.points[i, 2]))
         unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
     return (
         f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before it, or once it is past it{unread_text}"
@@ -85,7 +85,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         distance, height_error = _closest_approach(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", height_error, "m"),)
         ok = distance <= max_distance
-        crossing = math.inf if ok or setup.autopilot.follows_path else _crossing_offset(requirements, aligned, i)
+        crossing = math.inf if ok or setup.autopilot.turns.follows_path else _crossing_offset(requirements, aligned, i)
         if crossing <= setup.corridor:
             ok = True
         reason = f"passed at {distance:.1f} m, {abs(height_error):.1f} m {'above' if height_error >= 0.0 else 'below'}"

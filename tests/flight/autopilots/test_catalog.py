@@ -1,9 +1,10 @@
 """The list of autopilots: every one can be told by its name, stored in a log and restored, and told from the others."""
 
 import math
+import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, get_args
 
 import numpy as np
 import pytest
@@ -16,19 +17,22 @@ from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.autopilot import Autopilot, AutopilotProgram, StoredAutopilot
 from flight.autopilots.catalog import (
     AUTOPILOTS,
+    Entry,
+    autopilot_names,
     autopilot_of_log,
     load_autopilot,
     program_autopilot,
     restore_autopilot,
     stored_name,
 )
+from flight.autopilots.parts import RtlSettings
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.px4 import parameters as px4_parameters
 from flight.autopilots.px4.autopilot import Px4
 from world.airfield import ReturnRequirements
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario, with_flight
+from world.scenario_tables import ArduPlaneVersion, Px4Version
 
 AEROSONDE = load_aircraft("aerosonde")
 GIVEN = {f"P{k}": float(k) for k in range(40)}
@@ -45,7 +49,8 @@ class Other(PlanflyGuidance):
 
 @pytest.fixture
 def listed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(catalog._SIMULATED, Other.name, Other)
+    monkeypatch.setattr(catalog, "AUTOPILOTS", (*AUTOPILOTS, Entry(Other.name, "other.Other")))
+    monkeypatch.setitem(sys.modules, "flight.autopilots.other", sys.modules[__name__])
 
 
 def tight(**flight: str) -> Scenario:
@@ -80,8 +85,7 @@ def test_what_a_scenario_asks_of_its_returns_and_a_file_denies_is_refused(tmp_pa
 @pytest.mark.parametrize(("lower", "file", "most"), [(3.5, "", -1.0), (2.5, "", 10.0), (3.5, "TECS_LAND_PMAX 7", 7.0)])
 def test_on_a_lower_field_the_nose_is_held_down_in_the_flare(lower: float, file: str, most: float) -> None:
     made = ArduPlane(ArduPilotParameters.of_text(f"RTL_AUTOLAND 2\n{file}\n", "mine.parm"))
-    asked = made.with_scenario_rtl_settings(None, None, lands=True, lower=lower)
-    assert isinstance(asked, ArduPlane)
+    asked = made.with_parameters(**made.returns.parameters_of(RtlSettings(lands=True, field_depth=lower)))
     assert asked.parameters.landing_pitch_max == pytest.approx(math.radians(most))
 
 
@@ -102,13 +106,20 @@ def test_a_field_is_as_much_lower_as_the_ground_is_there() -> None:
 def test_a_name_that_is_not_listed_is_one_line() -> None:
     with pytest.raises(ScenarioError) as refused:
         load_autopilot(tight(autopilot="ardupilott"), AEROSONDE)
-    laws = [kind.name for kind in AUTOPILOTS if not issubclass(kind, ProgramAutopilot)]
-    assert laws[:2] == ["ardupilot", "planfly"]
-    expected = " or ".join(f"'{name}'" for name in laws)
     assert str(refused.value) == (
-        f"tight: flight.autopilot: 'ardupilott': expected {expected}: did you mean 'ardupilot'?"
+        "tight: flight.autopilot: 'ardupilott': expected 'ardupilot' or 'px4' or 'planfly': did you mean 'ardupilot'?"
     )
     assert (refused.value.field, refused.value.value) == ("flight.autopilot", "ardupilott")
+
+
+@pytest.mark.usefixtures("listed")
+def test_the_names_of_the_command_line_are_listed_with_their_releases() -> None:
+    assert {entry.name: entry.releases for entry in AUTOPILOTS} == {
+        "ardupilot": get_args(ArduPlaneVersion),
+        "px4": get_args(Px4Version),
+        "planfly": (),
+    }
+    assert "other" in autopilot_names()
 
 
 @pytest.mark.usefixtures("listed")
@@ -144,23 +155,23 @@ def test_a_program_is_flown_in_the_place_of_its_law() -> None:
     kind = program_autopilot(Path("arduplane"))
     flown = kind.flying(ArduPlane(MINE), Path("arduplane"))
     assert flown == ArduPlaneSitl(MINE)
-    assert flown.law == ArduPlane(MINE)
-    assert all(kind.name == law.name for law in AUTOPILOTS if law is ArduPlane)
+    assert flown.model == ArduPlane(MINE)
+    assert kind.name == ArduPlane.name
 
 
 def test_a_log_says_who_wrote_it() -> None:
     flown, notes = autopilot_of_log("ArduPlane V4.3.7", {"WP_RADIUS": 60.0}, "a.BIN") or (None, ())
     assert flown is not None
-    assert (flown.acceptance_radius, flown.version) == (60.0, "4.6")
+    assert (flown.turns.acceptance_radius, flown.version) == (60.0, "4.6")
     assert notes == ("ArduPlane 4.3 flew it, and 4.6 is simulated",)
     assert autopilot_of_log("PX4 v1.14.0", {"WP_RADIUS": 60.0}, "a.ulg") is None
 
 
 def test_a_program_is_named_by_its_version_its_digest_and_what_was_changed() -> None:
     flown = ArduPlaneSitl(ArduPilotParameters.defaults(), PROGRAM)
-    assert flown.described("aerosonde") == (
+    assert flown.describe("aerosonde") == (
         "ArduPlane V4.6.0 (7fbc1660) (sha256 0826d539...), 40 parameters set for aerosonde, changed: P1 1, P2 2.5"
     )
-    assert replace(flown, program=replace(PROGRAM, changed={})).described("a").endswith("changed: none")
+    assert replace(flown, program=replace(PROGRAM, changed={})).describe("a").endswith("changed: none")
     # No more than eight by name.
-    assert replace(flown, program=replace(PROGRAM, changed=GIVEN)).described("a").endswith("P6 6, P7 7, +32 more")
+    assert replace(flown, program=replace(PROGRAM, changed=GIVEN)).describe("a").endswith("P6 6, P7 7, +32 more")

@@ -57,7 +57,7 @@ def test_a_first_leg_without_length_has_no_slope(make_setup: MakeSetup) -> None:
 def _records(*lines: str, autopilot: Autopilot = USUAL_ARDUPLANE) -> Records:
     """The waypoint records of a mission, as an autopilot flies it."""
     made = mission(*lines)
-    rules = RouteRules(autopilot.return_rules, autopilot.loiter_rules)
+    rules = RouteRules(autopilot.returns.rules, autopilot.loiters)
     return waypoint_records(make_route(made, ORIGIN, None, 25.0, False, rules=rules), made)
 
 

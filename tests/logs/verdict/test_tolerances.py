@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from flight.autopilots.autopilot import MissionChecks
+from flight.autopilots.parts import FeasibilityLimits
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from logs.verdict import tolerances
@@ -44,7 +44,7 @@ def test_more_turbulence_allows_no_less() -> None:
 
 def test_px4s_defaults_are_those_of_its_parameters() -> None:
     """FW_LND_ANG and MIS_DIST_1WP as PX4's reference has them, MIS_TKO_LAND_REQ as its planes."""
-    usual = MissionChecks()
+    usual = FeasibilityLimits()
     assert (tolerances.PX4_FIRST_WAYPOINT_DISTANCE_M, usual.requires) == (10_000.0, 2)
     assert math.degrees(usual.landing_angle + tolerances.PX4_LANDING_BUFFER_RAD) == pytest.approx(5.1)
-    assert Px4(Px4Parameters.defaults()).mission_checks == usual
+    assert Px4(Px4Parameters.defaults()).checks.feasibility == usual

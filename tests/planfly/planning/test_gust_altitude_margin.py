@@ -65,7 +65,7 @@ def plan_along(airframe: Airframe, scenario: Scenario, way: Any) -> Plan:
     ],
 )
 def test_a_downdraft_takes_what_is_not_climbed(climb: float, turbulence: Turbulence, sink: float) -> None:
-    assert PlanflyGuidance().gust_sink(climb, turbulence) == pytest.approx(sink, abs=0.1)
+    assert PlanflyGuidance().deviations.gust_sink(climb, turbulence) == pytest.approx(sink, abs=0.1)
 
 
 def test_who_keeps_it_otherwise_and_calm_air_are_left_as_they_were() -> None:
@@ -365,7 +365,7 @@ def test_an_updraft_lifts_those_who_keep_their_airspeed(
     sink: float, turbulence: Turbulence, rise: float, autopilot: str
 ) -> None:
     expected = 0.0 if autopilot == "planfly" else rise
-    found = load_airframe(band_of(300.0, autopilot)).autopilot.gust_rise(sink, turbulence)
+    found = load_airframe(band_of(300.0, autopilot)).autopilot.deviations.gust_rise(sink, turbulence)
     assert found == pytest.approx(expected, abs=0.3)
 
 

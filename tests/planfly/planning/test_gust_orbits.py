@@ -83,16 +83,18 @@ def test_circles_are_those_of_all_waypoints_by_what_is_in_hand(airframe_of_x8: A
     true_airspeed = limits.airspeed / math.sqrt((1.0 - 2.25577e-5 * 250.0) ** 4.2559)
     aside, along = 4.0 * math.cos(math.radians(20.0)), 4.0 * math.sin(math.radians(20.0))
     rate = slope * (math.sqrt(true_airspeed**2 - aside**2) + along)
-    climbing = airframe_of_x8.autopilot.altitude_miss_probability(climb - rate, sink, "moderate")
+    climbing = airframe_of_x8.autopilot.deviations.altitude_miss_probability(climb - rate, sink, "moderate")
     assert expected_orbits(plan, airframe_of_x8.autopilot, limits) == pytest.approx(climbing, rel=1e-3)
     down = plan_of(airframe_of_x8, way * [1.0, 1.0, -1.0] + [0.0, 0.0, 500.0])
-    sinking = airframe_of_x8.autopilot.altitude_miss_probability(climb, sink - rate, "moderate")
+    sinking = airframe_of_x8.autopilot.deviations.altitude_miss_probability(climb, sink - rate, "moderate")
     assert expected_orbits(down, airframe_of_x8.autopilot, limits) == pytest.approx(sinking, rel=1e-3)
     both = plan_of(airframe_of_x8, np.concatenate([way, [[8000.0, 0.0, 250.0]]]))
-    level = airframe_of_x8.autopilot.altitude_miss_probability(climb, sink, "moderate")
+    level = airframe_of_x8.autopilot.deviations.altitude_miss_probability(climb, sink, "moderate")
     assert expected_orbits(both, airframe_of_x8.autopilot, limits) == pytest.approx(climbing + level, rel=1e-3)
     # As a share of all, the wind is much more than that.
-    calm = airframe_of_x8.autopilot.altitude_miss_probability(climb - slope * true_airspeed, sink, "moderate")
+    calm = airframe_of_x8.autopilot.deviations.altitude_miss_probability(
+        climb - slope * true_airspeed, sink, "moderate"
+    )
     assert abs(climbing / calm - 1.0) > 3e-3
 
 

@@ -76,7 +76,7 @@ def check_climb(scenario: Scenario, airframe: Airframe, points: Floats, until: i
     up, least = ground, 0.7
     for k, (a, b) in enumerate(pairwise(points[: until + 1])):
         # ArduPlane commands equivalent airspeeds: the true one is higher up here.
-        speed = airframe.airspeed * airframe.autopilot.airspeed_factor(float(b[2]))
+        speed = airframe.airspeed * airframe.autopilot.speeds.true_airspeed_factor(float(b[2]))
         steepest, _ = heights_over_ground(scenario, airframe, course_of(a, b), float(b[2]), speed)
         up = min(up + least * steepest * math.dist(a[:2], b[:2]), max(float(b[2]), points[0, 2]))
         assert up >= b[2] - 0.5, f"leg {k} is not climbed at {least} of the steepest"
@@ -101,7 +101,7 @@ def check_landing(scenario: Scenario, airframe: Airframe, points: Floats, land: 
     run, height = math.dist(last[:2], point[:2]), float(last[2] - point[2])
     assert begin[2] == pytest.approx(last[2], abs=1e-3)
     tail = scenario.wind.along(course, float(point[2]))[0]
-    speed = airframe.autopilot.landing_airspeed(airframe.airspeed, tail, float(point[2]))
+    speed = airframe.autopilot.ground.airspeed(airframe.airspeed, tail, float(point[2]))
     _, steepest = heights_over_ground(scenario, airframe, course, float(point[2]), speed)
     assert height / run < steepest
     assert above(scenario, metres(last, point))[: int(run) - 60].min() > 0.0

@@ -40,7 +40,7 @@ def test_parameters_are_flown_with_and_saved() -> None:
     assert session.settings_json()["parameters"] == {"ROLL_LIMIT_DEG": 25.0, "WP_RADIUS": 45.0}
     # What they set is judged: turns are wider with less bank.
     assert session.judged.setup.limits.max_bank < 0.45
-    assert "the parameters of mine.param" in session.judged.setup.autopilot.described("aerosonde")
+    assert "the parameters of mine.param" in session.judged.setup.autopilot.describe("aerosonde")
     shown = session.settings_json()
     assert (shown["parameter_file"], shown["unused"]) == ("mine.param", "SERVO1_MIN")
     set_in(session, parameter="WP_RADIUS=60")

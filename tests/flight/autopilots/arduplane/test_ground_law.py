@@ -76,7 +76,7 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     """Slope within 0.2 degrees, flare within 2 m and 25 m; the touch-down later by the flare that 4.6.0-dev lacked."""
     flown, real = fly_kept(flight), kept(flight, "landing")
     approach, track = flown.approach, flown.track
-    glide = flown.setup.autopilot.landing_glide(
+    glide = flown.setup.autopilot.ground.glide(
         approach.start_altitude - approach.point[2], approach.length, approach.tail_wind, float(approach.point[2])
     )
     assert flown.flight.ended == "completed"
@@ -280,9 +280,9 @@ def test_each_release_flares_by_its_own_sink_rate(version: ArduPlaneVersion) -> 
     aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
     assert isinstance(setup.autopilot, ArduPlane)
     own = record(ARDUPLANE_GROUND)
-    setup.autopilot.in_release(version).from_ground(setup.ground_phases, aircraft, ()).initialise_records(
-        record(WORKSPACE), own
-    )
+    ground_law = setup.autopilot.in_release(version).ground.control_law
+    assert ground_law is not None
+    ground_law(setup.ground_phases, aircraft, ()).initialise(record(WORKSPACE), own)
     assert own.ground.flares_by_demand == (version == "4.7")
 
 

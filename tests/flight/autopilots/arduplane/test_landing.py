@@ -28,7 +28,7 @@ LANDINGS = {
 def test_slope_and_flare_are_those_of_the_real_one(name: str) -> None:
     height, run, wind, changed, slope, flare_height, flare_distance = LANDINGS[name]
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde")).changed(**changed))
-    glide = law.landing_glide(height, run, wind, FIELD)
+    glide = law.ground.glide(height, run, wind, FIELD)
     assert math.degrees(math.atan(glide.slope)) == pytest.approx(slope, abs=0.2)
     # On the steep one it began 25.02 m later than it was laid out.
     assert glide.flare_distance == pytest.approx(flare_distance, abs=25.1 if name == "steep" else 25.0)
@@ -40,7 +40,7 @@ def test_the_glide_ends_at_the_waypoint_and_the_flare_before_half_of_the_way() -
     law = ArduPlane(
         ArduPilotParameters.load(load_aircraft("aerosonde")).changed(LAND_FLARE_SEC=20.0, LAND_FLARE_ALT=30.0)
     )
-    glide = law.landing_glide(54.0, 200.0, 0.0, 0.0)
+    glide = law.ground.glide(54.0, 200.0, 0.0, 0.0)
     assert glide.flare_distance == 100.0
     assert glide.flare_height + glide.slope * 100.0 == pytest.approx(54.0)
 
@@ -59,7 +59,7 @@ def test_the_flare_is_as_high_as_its_seconds_of_sink_up_to_twice_its_height(
     changed: dict[str, float], aim: float
 ) -> None:
     law = ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde")).changed(TECS_LAND_ARSPD=20.0, **changed))
-    assert law.landing_glide(50.0, 1000.0, 0.0, 0.0).flare_height == pytest.approx(aim)
+    assert law.ground.glide(50.0, 1000.0, 0.0, 0.0).flare_height == pytest.approx(aim)
 
 
 @pytest.mark.parametrize(
@@ -68,4 +68,7 @@ def test_the_flare_is_as_high_as_its_seconds_of_sink_up_to_twice_its_height(
 def test_a_go_around_climbs_as_the_item_the_take_off_or_the_default_says(
     asked: float, takeoff: float, height: float
 ) -> None:
-    assert ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).go_around_height(asked, takeoff) == height
+    assert (
+        ArduPlane(ArduPilotParameters.load(load_aircraft("aerosonde"))).ground.go_around_height(asked, takeoff)
+        == height
+    )

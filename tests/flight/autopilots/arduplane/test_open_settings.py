@@ -4,7 +4,8 @@ import pytest
 
 from flight.autopilots.arduplane.open_settings import OPEN_SETTINGS, describe_open_settings
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.autopilot import MissionParts, StoredParameters
+from flight.autopilots.autopilot import StoredParameters
+from flight.autopilots.parts import MissionParts
 
 EVERYTHING = MissionParts(returns=True, has_return_path=True, takes_off=True, lands=True, enables_fence=True, wind=12.0)
 IN_THE_AIR = MissionParts(wind=12.0)

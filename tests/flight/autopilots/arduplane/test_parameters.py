@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft, load_aircraft
+from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import (
     ARDUPILOT_PARAMETERS,
     DEFINITIONS,
     ArduPilotParameters,
-    accepts_speed,
-    speeds_flown,
 )
 from flight.autopilots.autopilot import ParameterValue, StoredParameters
 from world.errors import ParameterError
@@ -148,12 +147,12 @@ PARAMETERS = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_
 
 @pytest.mark.parametrize(("airspeed", "taken"), [(17.99, False), (18.0, True), (31.0, True), (31.01, False)])
 def test_speeds_within_the_limits_are_taken(airspeed: float, taken: bool) -> None:
-    assert accepts_speed(airspeed, PARAMETERS) is taken
+    assert ArduPlane(PARAMETERS).speeds.flown(np.array([airspeed]), 25.0).tolist() == [airspeed if taken else 25.0]
 
 
 def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:
     commanded = np.array([17.0, 17.0, 20.0, 35.0, 31.0])
-    assert speeds_flown(commanded, 25.0, PARAMETERS).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]
+    assert ArduPlane(PARAMETERS).speeds.flown(commanded, 25.0).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]
 
 
 def parameters(**values: float) -> tuple[ArduPilotParameters, tuple[str, ...]]:

@@ -48,8 +48,8 @@ def test_a_parameter_file_selects_its_release(text: str, version: str, tmp_path:
     file.write_text(text, encoding="utf-8")
     table = FlightTable(params=str(file))
     made = ArduPlane.load(table, load_aircraft("aerosonde"), "a")
-    assert (made.version, made.parameter_notes) == (version, notes_of(text, file, version))
-    assert f"the simulated ArduPlane {version} with the parameters of" in made.described("aerosonde")
+    assert (made.version, made.checks.parameter_notes) == (version, notes_of(text, file, version))
+    assert f"the simulated ArduPlane {version} with the parameters of" in made.describe("aerosonde")
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,7 @@ def swift(flight: str) -> tuple[str, SwiftReturns]:
         up=float(row["amsl_m"]),
         **{f"velocity_{way}": float(row[f"velocity_{way}_mps"]) for way in ("east", "north", "up")},
     )
-    rules = ArduPlane(made).return_rules
+    rules = ArduPlane(made).returns.rules
     points = [
         ReturnPoint(east, north, HOME[2] + up, HOME[2], k) for k, (east, north, up) in enumerate(rally(flight), 1)
     ]

@@ -16,6 +16,7 @@ from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.autopilots.arduplane_sitl.ground_tick import find_phase
 from flight.autopilots.arduplane_sitl.process import person_parameters
+from flight.autopilots.parts import RtlSettings
 from flight.autopilots.sitl.exchange import motion_on_rail
 from flight.autopilots.sitl.flight import launch_rail
 from flight.autopilots.sitl.mission import uploaded_mission
@@ -75,7 +76,7 @@ def test_in_the_air_a_return_that_goes_on_to_land_is_sent_with_its_landing_seque
 
 def test_what_the_scenario_asks_of_its_returns_is_set() -> None:
     setup = circuit(RAIL, STRIP)
-    asked = setup.autopilot.with_scenario_rtl_settings(180.0, None, lands=True)
+    asked = setup.autopilot.with_parameters(**setup.autopilot.returns.parameters_of(RtlSettings(180.0, lands=True)))
     assert person_parameters(replace(setup, autopilot=asked)) == {"RTL_ALTITUDE": 180.0, "RTL_AUTOLAND": 1.0}
 
 

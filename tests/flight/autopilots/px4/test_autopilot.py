@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import MissionParts
 from flight.autopilots.catalog import load_autopilot
+from flight.autopilots.parts import MissionParts
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4_sitl.autopilot import Px4Sitl
@@ -25,9 +25,9 @@ def test_a_scenario_names_it_and_its_version(aerosonde: Aircraft) -> None:
     tight = load_scenario("tight")
     newest = load_autopilot(with_flight(tight, autopilot="px4"), aerosonde)
     older = load_autopilot(with_flight(tight, autopilot="px4", px4_version="1.16"), aerosonde)
-    assert newest.acceptance_radius == 10.0
-    assert older.acceptance_radius == pytest.approx(56.0)
-    assert "the simulated PX4 1.17 with its default parameters (NAV_ACC_RAD 10 m" in newest.described("aerosonde")
+    assert newest.turns.acceptance_radius == 10.0
+    assert older.turns.acceptance_radius == pytest.approx(56.0)
+    assert "the simulated PX4 1.17 with its default parameters (NAV_ACC_RAD 10 m" in newest.describe("aerosonde")
     with pytest.raises(ScenarioError, match='px4_version: only a key of autopilot = "px4", not of "planfly"'):
         with_flight(tight, px4_version="1.16")
 
@@ -50,21 +50,22 @@ def test_parameters_alone_are_of_the_autopilot_that_the_scenario_names(aerosonde
 def test_it_turns_earlier_in_thin_air_up_to_1_16(aerosonde: Aircraft) -> None:
     older, newer = (Px4(Px4Parameters.load(aerosonde, None, version)) for version in ("1.16", "1.17"))
     # 2.24 s of the true airspeed, which at 2,000 m is 1.1029 of the equivalent one (ISO 2533: 1.0066 kg/m^3).
-    assert older.turn_distance(1.0, 2000.0) == pytest.approx(56.0 * (1.2250 / 1.0066) ** 0.5, rel=1e-3)
-    assert newer.turn_distance(1.0, 2000.0) == 10.0
+    assert older.turns.distance(1.0, 2000.0) == pytest.approx(56.0 * (1.2250 / 1.0066) ** 0.5, rel=1e-3)
+    assert newer.turns.distance(1.0, 2000.0) == 10.0
 
 
 def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     made = Px4(
         Px4Parameters.of_text("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params")
     )
-    assert made.speeds_flown(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
-    assert made.speed_limits is not None
-    assert made.speed_limits.nearest
-    assert made.reads_as_px4
-    assert made.stated_airspeed == (25.0, "FW_AIRSPD_TRIM")
-    assert made.stated_bank == pytest.approx(np.radians(40.0))
-    assert (made.return_rules.height, made.return_rules.radius) == (100.0, 80.0)
+    assert made.speeds.flown(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
+    assert made.speeds.limits is not None
+    assert made.speeds.limits.nearest
+    assert made.checks.dialect == "px4"
+    assert made.stated_value(made.speeds.cruise_parameter) == 25.0
+    assert made.stated_value(made.turns.bank_parameter) == 40.0
+    assert made.turns.max_bank == pytest.approx(np.radians(40.0))
+    assert (made.returns.rules.height, made.returns.rules.radius) == (100.0, 80.0)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +80,7 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     ],
 )
 def test_where_it_returns_to_is_by_its_type(kind: str, name: str, up: float) -> None:
-    rules = Px4(Px4Parameters.of_text(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).return_rules
+    rules = Px4(Px4Parameters.of_text(f"RTL_RETURN_ALT 120\n{kind}\n", "a.params")).returns.rules
     home, rally = ReturnPoint(0.0, 0.0, 300.0), ReturnPoint(0.0, 4000.0, 450.0)
     target = choose_target(rules, (0.0, 1000.0, 800.0), home, [rally])
     assert (target.name, target.position[2]) == (name, up)
@@ -94,8 +95,8 @@ def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
     mission = MissionParts(returns=True, moves_payload=True)
     # It gets what begins with `FLYING`, and planfly's physics have no distance sensor.
     assert all(name.startswith(FLYING) for name in values)
-    assert [text.split()[0] for text in Px4Sitl(made).settings_not_flown(mission)] == [*others]
-    left = [text.split()[0] for text in Px4(made).settings_not_flown(mission)]
+    assert [text.split()[0] for text in Px4Sitl(made).checks.settings_not_flown(mission)] == [*others]
+    left = [text.split()[0] for text in Px4(made).checks.settings_not_flown(mission)]
     assert sorted(left) == sorted(values | others)
 
 
@@ -113,7 +114,7 @@ def test_a_predicted_breach_of_the_missions_fence_leaves_the_verdict_open(
 ) -> None:
     """`Navigator::geofence_breach_check` up to 1.17."""
     made = Px4(Px4Parameters.defaults().changed(**values))
-    assert [text.split()[0] for text in made.settings_not_flown(MissionParts(has_fence=has_fence))] == [
+    assert [text.split()[0] for text in made.checks.settings_not_flown(MissionParts(has_fence=has_fence))] == [
         "GF_PREDICT"
     ] * opens
 
@@ -129,7 +130,7 @@ def test_a_predicted_breach_of_the_missions_fence_leaves_the_verdict_open(
 )
 def test_a_critical_charge_leaves_the_mission_by_com_low_bat_act(values: dict[str, float], used: float | None) -> None:
     """`Failsafe::fromBatteryWarningActParam`: 2 lands and 3 returns at BAT_CRIT_THR."""
-    found = Px4(Px4Parameters.defaults().changed(**values)).battery_failsafes
+    found = Px4(Px4Parameters.defaults().changed(**values)).checks.battery_failsafes
     assert [one.used_charge for one in found] == pytest.approx([] if used is None else [used], nan_ok=True)
 
 
@@ -137,7 +138,7 @@ def test_a_return_of_type_3_may_be_to_the_missions_landing() -> None:
     """`RTL::findRtlDestination` counts it for types 1 and 3."""
     for kind, may in ((0, False), (1, True), (3, True), (5, False)):
         made = Px4(Px4Parameters.defaults().changed(RTL_TYPE=float(kind)))
-        assert made.return_rules.may_use_landing == may
+        assert made.returns.rules.may_use_landing == may
 
 
 def test_too_high_at_the_last_waypoint_it_circles_down_to_it(make_setup: MakeSetup, aerosonde: Aircraft) -> None:

@@ -86,5 +86,5 @@ def test_calmer_air_has_no_chance_of_it() -> None:
 
 def test_px4s_own_acceptance_counts() -> None:
     made = Px4(Px4Parameters.defaults().changed(NAV_FW_ALT_RAD=6.0))
-    assert made.altitude_miss_probability(100.0, 100.0, "moderate") == pytest.approx(2.0 * 0.0668072)
-    assert PlanflyGuidance().altitude_miss_probability(-5.0, -5.0, "moderate") == 0.0
+    assert made.deviations.altitude_miss_probability(100.0, 100.0, "moderate") == pytest.approx(2.0 * 0.0668072)
+    assert PlanflyGuidance().deviations.altitude_miss_probability(-5.0, -5.0, "moderate") == 0.0

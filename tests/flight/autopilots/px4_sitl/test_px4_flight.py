@@ -86,7 +86,7 @@ def test_px4s_link_flies_the_mission_to_its_end(fake_px4: MakeFake, tmp_path: Pa
     assert program is not None
     assert program.version == "PX4 1.16.0"
     # As the program says which release it is, that one's law is its law.
-    assert setup.autopilot.law.version == "1.16"
+    assert setup.autopilot.model.version == "1.16"
     assert program.parameters["CA_SV_CS_COUNT"] == 3.0
     assert program.parameters["FW_R_LIM"] == 30.0
     assert (program.changed, program.unused) == ({}, ())

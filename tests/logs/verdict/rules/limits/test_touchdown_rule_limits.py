@@ -141,7 +141,7 @@ def test_from_fifteen_metres_over_the_point_on_it_may_flare(more: float, ok: boo
     setup = flown_circuit().setup
     approach = setup.ground_phases.approach
     assert approach is not None
-    glide = setup.autopilot.landing_glide(approach.start_altitude, approach.length, approach.tail_wind, 0.0)
+    glide = setup.autopilot.ground.glide(approach.start_altitude, approach.length, approach.tail_wind, 0.0)
     before = glide.flare_distance + (15.0 - glide.flare_height) / glide.slope
     assert with_low_final(before + more, 2.0).ok is ok
 

@@ -1,0 +1,429 @@
+"""Define the parts of which an autopilot is composed; the defaults of a part mean that the autopilot has no such thing.
+
+An autopilot returns its parts from the properties of `flight.autopilots.autopilot.Autopilot`. A part contains values
+and functions, so that an autopilot states only what it has: `TurnRules(acceptance_radius=90.0)`.
+
+`flight.mission` defines two further parts, because they also lay out the route: `ReturnRules` and `LoiterRules`.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from aircraft.catalog import Aircraft
+from aircraft.contacts import Contact
+from aircraft.tracking import TrackingError
+from flight.dynamics.instructions import Code
+from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.mission.ground_ways import GroundPhases
+from flight.mission.return_path import USUAL_RULES, ReturnRules
+from world.arrays import Floats, Heights
+from world.kernels import Record, Records
+from world.scenario_tables import Navigation
+from world.wind import Turbulence
+
+# ----------------------------------------------------------------------
+# Control law.
+
+# One tick of the compiled loop on the block of a `flight.simulation.tick.Workspace`; returns a key of `ENDS`, or 0 to
+# fly on.
+Tick = Callable[[Floats, Heights], int]
+
+# A number of ticks, each followed by the steps of a compiled model.  The arguments are block, heights, frames, numbers,
+# code, contacts and frictions of a `flight.dynamics.compiled_model.CompiledModel`, and the number of ticks; returns the
+# status of the last tick.
+Loop = Callable[[Floats, Heights, Records, Floats, Code, Records, Records, int], int]
+
+
+def _initialise_nothing(guidance: Record, record: Record) -> None:
+    return
+
+
+def _transfer_nothing(previous_record: Record, record: Record, start: Floats) -> None:
+    return
+
+
+@dataclass(frozen=True)
+class ControlLaw:
+    """Compiled control law of an autopilot.
+
+    tick: compiled function for one tick.
+    loop: compiled simulation loop of the control law and the aircraft model; None if only JSBSim flies the autopilot.
+    memory: type of the law's own record, in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
+    initialise: initialises the records before the first tick; the arguments are a `GUIDANCE_MEMORY` record and a record
+        of the type ``memory``, or None.
+    transfer_state: starts another route at the aircraft's position, and keeps the state of the control law; the
+        arguments are the record on the previous route, the record for the new route after ``initialise``, and the
+        start (3,) of the route, m.
+    released_throttle: throttle (0..1) at the end of the rail, at the hand launch, or at rest on the runway, of a law
+        that takes off.
+    """
+
+    tick: Tick
+    loop: Loop | None = None
+    memory: np.dtype[np.record] | None = None
+    initialise: Callable[[Record, Record], None] = _initialise_nothing
+    transfer_state: Callable[[Record, Record, Floats], None] = _transfer_nothing
+    released_throttle: float = 0.0
+
+
+# ----------------------------------------------------------------------
+# Turns and speeds.
+
+
+def _turn_at_waypoint(turn: float, amsl: float) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True)
+class TurnRules:
+    """Rules by which an autopilot turns to the next leg; by default it follows the fly-by path.
+
+    acceptance_radius: default distance from a waypoint at which the autopilot turns to the next leg, m; None for an
+        autopilot that follows the fly-by path.  Any other autopilot flies from leg to leg, and has reached a waypoint
+        also if it passes the line across the leg there.
+    distance: returns the maximum distance before a waypoint at which the autopilot turns, m; the arguments are the turn
+        at the waypoint, rad, positive (pi at the mission's end), and its altitude, m AMSL.
+    reads_acceptance: True if the acceptance radius in a waypoint's item decides where the autopilot turns.
+    acceptance_limit: maximum acceptance radius that the autopilot reads from an item, m.
+    keeps_to_arcs: True if the radius of a turn follows from its distance to the waypoint.
+    max_bank: maximum bank that the autopilot demands, rad; inf if only the aircraft's limits apply.
+    bank_parameter: parameter of that bank; "" without such a parameter.
+    """
+
+    acceptance_radius: float | None = None
+    distance: Callable[[float, float], float] = _turn_at_waypoint
+    reads_acceptance: bool = True
+    acceptance_limit: float = math.inf
+    keeps_to_arcs: bool = True
+    max_bank: float = math.inf
+    bank_parameter: str = ""
+
+    @property
+    def follows_path(self) -> bool:
+        """True if the autopilot follows the fly-by path, and does not turn by an acceptance radius."""
+        return self.acceptance_radius is None
+
+
+class SpeedLimits(NamedTuple):
+    """Airspeeds (m/s) that an autopilot accepts from a mission, and the parameters that set them.
+
+    nearest: True if the autopilot flies the nearest limit for a command outside the limits, False if it ignores such a
+        command.
+    """
+
+    min: float
+    max: float
+    min_name: str
+    max_name: str
+    nearest: bool = False
+
+
+@dataclass(frozen=True)
+class SpeedRules:
+    """Rules by which an autopilot flies commanded airspeeds; by default they are true airspeeds without limits.
+
+    limits: limits of the airspeeds that the autopilot accepts from a mission, or None.
+    equivalent: True if commanded airspeeds are equivalent airspeeds, which at altitude are lower than true airspeeds;
+        the autopilot then takes over in level flight.
+    min_ground_speed: minimum ground speed until the mission sets another one, m/s; 0 for none.  The autopilot raises
+        its airspeed to keep this ground speed.
+    cruise_parameter: parameter of the cruise airspeed; "" without such a parameter.
+    """
+
+    limits: SpeedLimits | None = None
+    equivalent: bool = False
+    min_ground_speed: float = 0.0
+    cruise_parameter: str = ""
+
+    def true_airspeed_factor(self, amsl: float) -> float:
+        """Return the ratio of flown true airspeed to commanded airspeed, at an altitude (m AMSL)."""
+        return float(true_by_equivalent(amsl)) if self.equivalent else 1.0
+
+    def flown(self, commanded: Floats, cruise: float) -> Floats:
+        """Return the airspeed that the autopilot flies on each leg, (l,) m/s.
+
+        commanded: (l,) m/s.
+        cruise: airspeed until the autopilot accepts the first command, m/s.
+
+        >>> ignoring = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX"))
+        >>> ignoring.flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
+        [12.0, 15.0, 15.0, 10.0]
+        >>> clipping = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX", nearest=True))
+        >>> clipping.flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
+        [9.0, 15.0, 22.0, 10.0]
+        """
+        limits = self.limits
+        if limits is None:
+            return commanded
+        if limits.nearest:
+            return np.clip(commanded, limits.min, limits.max)
+        flown_speeds = []
+        current = cruise
+        for command in commanded.tolist():
+            current = command if limits.min <= command <= limits.max else current
+            flown_speeds.append(current)
+        return np.array(flown_speeds)
+
+
+# ----------------------------------------------------------------------
+# Return to launch.
+
+
+class RtlSettings(NamedTuple):
+    """A scenario's settings of the RTL.
+
+    altitude: height above home, m; None if not stated.
+    autoland: value of ArduPlane's RTL_AUTOLAND; None if not stated.
+    lands: True if the scenario's missions end with a landing sequence.
+    field_depth: depth of the landing field below home, m.
+    """
+
+    altitude: float | None = None
+    autoland: int | None = None
+    lands: bool = False
+    field_depth: float = 0.0
+
+
+def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
+    return {}
+
+
+@dataclass(frozen=True)
+class ReturnBehaviour:
+    """Behaviour of an autopilot in an RTL; by default that of ArduPlane with its default parameters.
+
+    rules: target, altitude, turn and loiter.
+    parameters_of: returns the parameters that a scenario's settings set, by name and in the autopilot's units.
+    """
+
+    rules: ReturnRules = USUAL_RULES
+    parameters_of: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
+
+
+# ----------------------------------------------------------------------
+# Take-off, landing and go-around.
+
+
+class LandingGlide(NamedTuple):
+    """Glide to a landing point: a straight line to the start of the flare, then the flare.
+
+    slope: m of altitude per m of distance.
+    flare_height: height of the start of the flare above the landing point, m; 0 if unknown.
+    flare_distance: distance of the start of the flare before the landing point, m.
+    """
+
+    slope: float
+    flare_height: float = 0.0
+    flare_distance: float = 0.0
+
+
+def straight_glide(height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
+    """Return the glide from the last waypoint before the landing point: straight and without a flare.
+
+    >>> straight_glide(50.0, 1000.0, 0.0, 0.0)
+    LandingGlide(slope=0.05, flare_height=0.0, flare_distance=0.0)
+    """
+    return LandingGlide(height / run)
+
+
+def _cruise_to_landing(cruise: float, tail_wind: float, amsl: float) -> float:
+    return cruise
+
+
+def _unknown_height(stated_height: float, takeoff_height: float) -> None:
+    return None
+
+
+@dataclass(frozen=True)
+class GroundRules:
+    """Rules of take-off, landing and go-around; by default the autopilot flies neither take-off nor landing.
+
+    control_law: returns the control law that also flies a take-off and a landing; None for an autopilot that flies
+        neither.  The arguments are the take-off and landing, the aircraft, and its contact points.
+    needs_both_ends: True if the autopilot flies them only in a mission that has both.
+    glide: returns the glide from the last waypoint before the landing point.  The arguments are height (m, positive)
+        and horizontal distance (m, positive) of that waypoint from the landing point, the tail wind (m/s, negative for
+        a head wind), and the altitude of the landing point (m AMSL).
+    airspeed: returns the true airspeed on that glide, m/s; the arguments are the cruise airspeed, m/s, the tail wind,
+        and the altitude of the landing point.
+    go_around_height: returns the height above home to which the autopilot climbs in a go-around, m, or None if unknown.
+        The arguments are the height that the landing item states, m (0 if it states none), and the height above home of
+        the take-off item, m (0 without a take-off).
+    launch_trigger: minimum launch acceleration that starts the motor, m/s^2, and its parameter; None without a minimum.
+    """
+
+    control_law: Callable[[GroundPhases, Aircraft, Sequence[Contact]], ControlLaw] | None = None
+    needs_both_ends: bool = False
+    glide: Callable[[float, float, float, float], LandingGlide] = straight_glide
+    airspeed: Callable[[float, float, float], float] = _cruise_to_landing
+    go_around_height: Callable[[float, float], float | None] = _unknown_height
+    launch_trigger: tuple[float, str] | None = None
+
+
+# ----------------------------------------------------------------------
+# Checks of missions and settings.
+
+
+class FeasibilityLimits(NamedTuple):
+    """Settings of PX4's feasibility checks; the defaults are those of its fixed wings.
+
+    landing_angle: FW_LND_ANG, rad.
+    requires: MIS_TKO_LAND_REQ: 0 nothing, 1 a takeoff, 2 a landing, 3 both, 4 and 5 both or neither.
+    stated: True if the user's file decides ``requires``.
+    """
+
+    landing_angle: float = math.radians(5.0)
+    requires: int = 2
+    stated: bool = False
+
+
+class BatteryFailsafe(NamedTuple):
+    """A failsafe that leaves the mission at a state of the battery.
+
+    parameter: name of the parameter of its threshold.
+    threshold: value of that parameter, mAh that remain or V.
+    used_charge: used charge at which it leaves the mission, mAh; NaN for a threshold of the voltage.
+    """
+
+    parameter: str
+    threshold: float
+    used_charge: float = math.nan
+
+
+class MissionParts(NamedTuple):
+    """Parts of a mission that decide which of an autopilot's settings change the flight.
+
+    returns: True if the mission returns to launch.
+    has_return_path: True if the mission marks a return path (DO_RETURN_PATH_START).
+    takes_off, lands: True if the take-off or the landing is flown from or to the ground.
+    loiters_to_land: True if the last item before a landing is a loiter.
+    has_fence: True if the mission carries a fence.
+    enables_fence: True if the mission switches the fence on (DO_FENCE_ENABLE).
+    throttled_airspeeds: airspeeds that the mission commands together with a throttle, m/s.
+    moves_payload: True if the mission commands a gripper, a winch or a gimbal, after which PX4 may wait.
+    wind: highest mean wind speed on the route, m/s.
+    """
+
+    returns: bool = False
+    has_return_path: bool = False
+    takes_off: bool = False
+    lands: bool = False
+    loiters_to_land: bool = False
+    has_fence: bool = False
+    enables_fence: bool = False
+    throttled_airspeeds: tuple[float, ...] = ()
+    moves_payload: bool = False
+    wind: float = 0.0
+
+
+PX4_DEFAULT_LIMITS = FeasibilityLimits()
+
+# Autopilot whose reading and refusals of mission items apply; "planfly" reads as ArduPlane and refuses nothing.
+MissionDialect = Literal["planfly", "ardupilot", "px4"]
+
+
+def _all_settings_flown(mission: MissionParts) -> list[str]:
+    return []
+
+
+@dataclass(frozen=True)
+class MissionChecks:
+    """Reading and checks of a mission, and settings that decide about it; by default nothing is refused.
+
+    dialect: "ardupilot" refuses missions with a command that ArduPlane refuses.  "px4" refuses missions that fail PX4's
+        feasibility checks; it reads only the value of a change of speed, goes back to its own airspeed for any value
+        that is not positive, and reads gates.
+    feasibility: settings of PX4's feasibility checks; PX4's defaults for another autopilot.
+    resets_jump_counters: True if an exhausted counter of a jump is reset, so that a later pass takes the jump again.
+    follows_terrain: True if the autopilot follows the ground along a leg to a height above terrain.
+    battery_failsafes: failsafes that leave the mission at a state of the battery.
+    settings_not_flown: describes the settings that change the flight path but are not simulated, in sentences without
+        full stop.
+    parameter_notes: notes on the parameter file, for the verdict.
+    """
+
+    dialect: MissionDialect = "planfly"
+    feasibility: FeasibilityLimits = PX4_DEFAULT_LIMITS
+    resets_jump_counters: bool = False
+    follows_terrain: bool = True
+    battery_failsafes: tuple[BatteryFailsafe, ...] = ()
+    settings_not_flown: Callable[[MissionParts], list[str]] = _all_settings_flown
+    parameter_notes: tuple[str, ...] = ()
+
+
+# ----------------------------------------------------------------------
+# Deviations from the plan.
+
+
+class Candidate(NamedTuple):
+    """A parameter that may cause a flight to fail.
+
+    name: the autopilot's name for the parameter.
+    step: increment of the autopilot's parameter reference, or a few increments.
+    far: value to try that is furthest from the present value, within the range of the reference.
+    unit: unit of step and value.
+    least: minimum value that may be suggested; the steps start there if the present value is lower.
+    """
+
+    name: str
+    step: float
+    far: float
+    unit: str
+    least: float = -math.inf
+
+
+class TrackingErrorFunction(Protocol):
+    """Function that returns the deviations from the legs, for which a plan reserves margins."""
+
+    def __call__(
+        self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
+    ) -> TrackingError | None:
+        """Return the deviations; None for an exact autopilot.
+
+        airspeed: commanded airspeed, m/s.
+        nav: accuracy of navigation.
+        fly_over: True if the autopilot flies over each waypoint before it turns.
+        turbulence: turbulence of the wind.
+        """
+
+
+def _exact(
+    airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
+) -> TrackingError | None:
+    return None
+
+
+def _never_off_altitude(climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
+    return 0.0
+
+
+def _no_displacement(reserve: float, turbulence: Turbulence) -> float:
+    return 0.0
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """Deviations of an autopilot from the plan; by default it is exact and holds its altitude in gusts.
+
+    tracking_error: returns the deviations from the legs.
+    gust_sink: returns the altitude loss in a downdraft with an exceedance probability of 1 %, m; 0 if the tracking
+        error includes it.  The arguments are the unused climb rate, m/s, and the turbulence.
+    gust_rise: returns the altitude gain in an updraft with that probability, m, by the unused sink rate; 0 if the
+        autopilot holds its altitude.
+    altitude_miss_probability: returns the probability that gusts make the autopilot circle at a waypoint, by the unused
+        climb and sink rates, m/s; 0 if it flies on.
+    altitude_parameter: altitude tolerance outside which the autopilot circles at a waypoint; "" if it flies on.
+    altitude_candidates, track_candidates: parameters that may cause an altitude or a track to fail.
+    """
+
+    tracking_error: TrackingErrorFunction = _exact
+    gust_sink: Callable[[float, Turbulence], float] = _no_displacement
+    gust_rise: Callable[[float, Turbulence], float] = _no_displacement
+    altitude_miss_probability: Callable[[float, float, Turbulence], float] = _never_off_altitude
+    altitude_parameter: str = ""
+    altitude_candidates: tuple[Candidate, ...] = ()
+    track_candidates: tuple[Candidate, ...] = ()
