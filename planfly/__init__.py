@@ -105,17 +105,17 @@ if TYPE_CHECKING:
     from planfly.api.reporting import figures as figures
     from planfly.api.reporting import foxglove_layout as foxglove_layout
     from planfly.api.reporting import report as report
-    from planfly.api.returning import ReturnsFound as ReturnsFound
+    from planfly.api.returning import ReturnsResult as ReturnsResult
     from planfly.api.returning import returns as returns
     from planfly.api.running import Round as Round
     from planfly.api.running import RunResult as RunResult
     from planfly.api.running import run as run
     from planfly.api.serving import serve as serve
-    from planfly.api.surveying import SurveyFound as SurveyFound
+    from planfly.api.surveying import SurveyResult as SurveyResult
     from planfly.api.surveying import survey as survey
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
     from planfly.campaigns.dispersions import SpreadError as SpreadError
-    from planfly.campaigns.find_winds import WindsFound as WindsFound
+    from planfly.campaigns.find_winds import WindsResult as WindsResult
     from planfly.campaigns.worker_pool import SchedulerError as SchedulerError
     from planfly.planning.paper import PaperTables as PaperTables
     from planfly.planning.paper import paper_tables as paper_tables
@@ -223,7 +223,7 @@ _HOMES = {
             "report",
         ),
         "planfly.api.returning": (
-            "ReturnsFound",
+            "ReturnsResult",
             "returns",
         ),
         "planfly.api.running": (
@@ -233,13 +233,13 @@ _HOMES = {
         ),
         "planfly.api.serving": ("serve",),
         "planfly.api.surveying": (
-            "SurveyFound",
+            "SurveyResult",
             "survey",
         ),
         "planfly.studio.open_studio": ("open_studio",),
         "planfly.campaigns.campaign_result": ("CampaignResult",),
         "planfly.campaigns.worker_pool": ("SchedulerError",),
-        "planfly.campaigns.find_winds": ("WindsFound",),
+        "planfly.campaigns.find_winds": ("WindsResult",),
         "planfly.campaigns.dispersions": ("SpreadError",),
         "planfly.workflow.imported_flights": ("ImportedFlight",),
         "planfly.planning.paper": (

@@ -32,7 +32,7 @@ from scipy.stats import chi2, norm
 from benchmarks.campaigns.sobol_samples import SOBOL_FLIGHTS, fly_sobol
 from planfly.campaigns.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.dispersions import default_dispersions
-from planfly.campaigns.find_winds import SEARCHED_QUANTITIES, WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.find_winds import SEARCHED_QUANTITIES, WindsGoal, WindsResult, find_winds, open_winds_store
 from planfly.campaigns.flight_requests import FlightRequest, FlyOne
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.statistics.decision import Estimator, Goal, Tally
@@ -85,7 +85,7 @@ def _count_outcomes(
     return flown
 
 
-def found_winds() -> WindsFound:
+def found_winds() -> WindsResult:
     """Find the boundaries of `planfly winds jacksboro-air --seed 1`."""
     base = demo(1)
     with tempfile.TemporaryDirectory() as name, open_winds_store(base, GOAL, Path(name), resume=False) as store:

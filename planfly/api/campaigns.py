@@ -11,8 +11,8 @@ from planfly.campaigns.campaign_result import CampaignResult, campaign_line, mak
 from planfly.campaigns.dispersions import Dispersions, default_dispersions, read_dispersions
 from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
-    WindsFound,
     WindsGoal,
+    WindsResult,
     find_winds,
     flight_limit,
     open_winds_store,
@@ -237,7 +237,7 @@ def winds(
     resume: bool = False,
     overwrite: bool = False,
     **options: Unpack[WindsOptions],
-) -> WindsFound:
+) -> WindsResult:
     """For each wind direction, find the strongest wind in which a mission is flyable with a given probability.
 
     target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.

@@ -60,7 +60,7 @@ class RemedyTrial:
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class ReturnsFound:
+class ReturnsResult:
     """Result of `planfly.returns`.
 
     setup: the flown mission, its aircraft and its autopilot.
@@ -163,7 +163,7 @@ class ReturnsFound:
         return (*notes, *glide_notes(self.glides))
 
     def __repr__(self) -> str:
-        return f"<ReturnsFound {self.setup.scenario.name}: {self.headline}>"
+        return f"<ReturnsResult {self.setup.scenario.name}: {self.headline}>"
 
 
 # Reason why the returns of a flight cannot be judged in another world, in messages.
@@ -182,7 +182,7 @@ def returns(
     out: str | Path | None = None,
     overwrite: bool = True,
     **options: Unpack[LogOptions],
-) -> ReturnsFound:
+) -> ReturnsResult:
     """Fly and judge returns to launch from points all along a flight, and find places in gliding range.
 
     what: a `Plan`, or the path of a plan.json, .waypoints or .plan, which is flown first; or a flight, which is a
@@ -258,11 +258,11 @@ def _check_request(
     return _ReturnsRequest(every, suggest, None if out is None else Path(out), overwrite, program, points)
 
 
-def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest) -> ReturnsFound:
+def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest) -> ReturnsResult:
     return _judge_flight(imported.setup, imported.track, request, imported.ended)
 
 
-def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsFound:
+def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResult:
     """Fly a mission, and judge the returns of its flight."""
     return_world(setup)  # Raises errors before the flight.
     with stage("flying the mission"):
@@ -270,7 +270,7 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsFound
     return _judge_flight(flight.setup, flight.track, request, flight.ended)
 
 
-def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsFound:
+def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
     world = return_world(setup)
     starts = return_starts(setup, track, request.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
@@ -282,7 +282,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
             program_returns = fly_by_program(world, starts, judged_returns, request.program, request.points, logs)
             judged_returns = program_returns.with_worse_results(judged_returns)
         with stage("gliding from there without the engine"):
-            result = ReturnsFound(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)
+            result = ReturnsResult(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)
         if request.suggest and not result.safe and result.returns.each:
             result = replace(result, suggested=_suggest_remedies(world, starts, result, request.every))
         if request.folder is None or not result.returns.each:
@@ -306,7 +306,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
 
 
 def _suggest_remedies(
-    world: ReturnWorld, starts: ReturnStarts, result: ReturnsFound, every: float
+    world: ReturnWorld, starts: ReturnStarts, result: ReturnsResult, every: float
 ) -> tuple[RemedyTrial, ...]:
     """Fly the returns again with each remedy, and return the remedies that help."""
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.

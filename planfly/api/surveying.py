@@ -47,7 +47,7 @@ from world.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class SurveyFound:
+class SurveyResult:
     """Result of `planfly.survey`.
 
     setup, track, verdict: setup, track and verdict of the flight.
@@ -112,7 +112,7 @@ class SurveyFound:
         return tuple(texts)
 
     def __repr__(self) -> str:
-        return f"<SurveyFound {self.setup.scenario.name}: {self.headline}>"
+        return f"<SurveyResult {self.setup.scenario.name}: {self.headline}>"
 
 
 # Reason why a flown survey cannot be judged in another world, in messages.
@@ -129,7 +129,7 @@ def survey(
     out: str | Path | None = None,
     overwrite: bool = True,
     **options: Unpack[MissionOptions],
-) -> SurveyFound:
+) -> SurveyResult:
     """Fly a survey, and report the usable part of each photo line and the overlap of the photos.
 
     what: the path of a .waypoints or .plan, which is flown; or a result of `planfly.fly`, or a flight log or its path.
@@ -197,7 +197,7 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
     return replace(setup, mission=replace(setup.mission, survey_plans=(*plans, SurveyPlan(None, 0.0, camera))))
 
 
-def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyFound:
+def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     """Fly a mission, measure its photo lines, and look for remedies if they are requested."""
     _check_has_survey(setup)
     airframe = airframe_of(setup)
@@ -214,7 +214,7 @@ def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyFound:
     return replace(result, remedies=trials.remedies, nearest=trials.nearest, kept=trials.kept)
 
 
-def _write_results(result: SurveyFound, out: str | Path | None, overwrite: bool) -> SurveyFound:
+def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool) -> SurveyResult:
     """Write the picture of the lines and the missions of the remedies if a folder is named; return the result."""
     if out is None:
         return result
@@ -258,14 +258,14 @@ def _check_has_survey(setup: FlightSetup) -> None:
         )
 
 
-def _judge_flown_survey(setup: FlightSetup, track: Track, end_reason: str) -> SurveyFound:
+def _judge_flown_survey(setup: FlightSetup, track: Track, end_reason: str) -> SurveyResult:
     """Judge and measure a flight that has already been flown."""
     _check_has_survey(setup)
     requirements = route_requirements(setup)
     return _measure_survey(requirements, track, judge_flight(setup, track, end_reason, requirements=requirements))
 
 
-def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyFound:
+def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyResult:
     setup, surveys = requirements.setup, requirements.surveys
     aligned = align_track(requirements, track) if len(track) else None
     lines = tuple(
@@ -273,4 +273,4 @@ def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verd
         for survey in surveys
     )
     overlaps = tuple(None if aligned is None else measure_overlap(requirements, aligned, survey) for survey in surveys)
-    return SurveyFound(setup, track, verdict, surveys, lines, overlaps)
+    return SurveyResult(setup, track, verdict, surveys, lines, overlaps)

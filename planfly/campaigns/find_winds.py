@@ -97,7 +97,7 @@ class CalmFailures:
 
 
 @dataclass(frozen=True, repr=False)
-class WindsFound:
+class WindsResult:
     """Boundary of each direction, and the flights from which it is estimated.
 
     flights: direction, wind speed, m/s, and True if flyable, of each flight.
@@ -120,7 +120,7 @@ class WindsFound:
     def __repr__(self) -> str:
         min_speed = min(boundary.estimate for boundary in self.boundaries)
         return (
-            f"<WindsFound {len(self.boundaries)} directions, {min_speed:.1f} m/s the lowest;"
+            f"<WindsResult {len(self.boundaries)} directions, {min_speed:.1f} m/s the lowest;"
             f" {len(self.flights)} flights>"
         )
 
@@ -144,7 +144,7 @@ def find_winds(
     store: WindsStore,
     advance: Advance | None = None,
     fly: FlyOne = fly_one,
-) -> WindsFound:
+) -> WindsResult:
     """Fly rounds of flights until each boundary is known accurately enough, or all flights are used.
 
     Flights in the table are not flown again. The winds of a round depend only on the earlier rounds, so the result is
@@ -237,12 +237,12 @@ class _Search:
         remaining = sum(max(0, MIN_FLIGHTS_PER_DIRECTION - len(self.directions[number].speeds)) for number in self.open)
         return min(remaining, self.goal.flights - len(self.flown))
 
-    def result(self) -> WindsFound:
+    def result(self) -> WindsResult:
         """Return the result of the search."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
         calm_failures = self._calm_failures(boundaries)
-        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm_failures)
+        return WindsResult(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm_failures)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
         """Return the failures in the weakest wind flown, for directions whose boundary is calm air; otherwise None."""

@@ -28,7 +28,7 @@ from planfly.campaigns.find_winds import (
     CALM_MPS,
     MIN_FLIGHTS_PER_DIRECTION,
     CalmFailures,
-    WindsFound,
+    WindsResult,
 )
 from planfly.campaigns.flight_row import STATION_COUNT, FlightRow, fly_one
 from planfly.campaigns.fly_campaign import open_store
@@ -117,7 +117,7 @@ def _render_page(template: str, **values: object) -> str:
     return page_template(template, "planfly.campaigns").render(colours=Markup(css_variables()), **values)
 
 
-def winds_page(name: str, figure: Figure, winds: WindsFound, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
+def winds_page(name: str, figure: Figure, winds: WindsResult, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
     """Return the page of a go/no-go chart. Changes the figure to the narrow layout."""
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
     page = _render_page(
@@ -340,7 +340,7 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
 WINDS_SCHEMA = "planfly.winds/1"
 
 
-def chart_directions(winds: WindsFound) -> list[ChartDirection]:
+def chart_directions(winds: WindsResult) -> list[ChartDirection]:
     """Return the directions of the go/no-go chart, with the flights in each."""
     directions = []
     for number, boundary in enumerate(winds.boundaries):
@@ -357,7 +357,7 @@ def chart_directions(winds: WindsFound) -> list[ChartDirection]:
     return directions
 
 
-def write_winds(folder: Path, base: CampaignBase, winds: WindsFound, command: str) -> None:
+def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: str) -> None:
     """Write ``winds.json``, ``winds.png`` and ``winds.html``."""
     goal, spokes = winds.goal, chart_directions(winds)
     wind = base.scenario.wind
@@ -425,7 +425,7 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
 
 
-def _unsettled_directions(winds: WindsFound) -> list[int]:
+def _unsettled_directions(winds: WindsResult) -> list[int]:
     """Return the directions with too few flights."""
     counts = Counter(direction for direction, _, _ in winds.flights)
     return [
@@ -435,7 +435,7 @@ def _unsettled_directions(winds: WindsFound) -> list[int]:
     ]
 
 
-def answer_state(winds: WindsFound) -> str:
+def answer_state(winds: WindsResult) -> str:
     """Return the state of the answer: "missed" in calm air, "undecided" with too few flights, otherwise ""."""
     calm = winds.calm
     if calm is not None and wilson(calm.flights - calm.failed_count, calm.flights)[1] < winds.goal.target:
@@ -443,7 +443,7 @@ def answer_state(winds: WindsFound) -> str:
     return "undecided" if calm is not None or _unsettled_directions(winds) else ""
 
 
-def _unsettled_lines(winds: WindsFound) -> list[str]:
+def _unsettled_lines(winds: WindsResult) -> list[str]:
     """Return a line about directions with too few flights, if there are any."""
     unsettled = _unsettled_directions(winds)
     if not unsettled:
@@ -456,7 +456,7 @@ def _unsettled_lines(winds: WindsFound) -> list[str]:
     ]
 
 
-def _lost_lines(winds: WindsFound) -> list[str]:
+def _lost_lines(winds: WindsResult) -> list[str]:
     """Return a line about flights that could not be flown, if there are any."""
     if not winds.lost:
         return []
@@ -470,7 +470,7 @@ def _lost_lines(winds: WindsFound) -> list[str]:
     ]
 
 
-def _lines_without_failures(winds: WindsFound) -> list[str]:
+def _lines_without_failures(winds: WindsResult) -> list[str]:
     """Return a line about directions without a failure, with the probability that is proved by these flights only."""
     max_speed, confidence = winds.goal.most, winds.goal.confidence
     counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
@@ -485,7 +485,7 @@ def _lines_without_failures(winds: WindsFound) -> list[str]:
     ]
 
 
-def _calm_lines(winds: WindsFound) -> list[str]:
+def _calm_lines(winds: WindsResult) -> list[str]:
     """Return lines about the rules that fail in calm air; empty if the mission flies in calm air."""
     calm = winds.calm
     if calm is None:
@@ -494,7 +494,7 @@ def _calm_lines(winds: WindsFound) -> list[str]:
     return [f"in {wind}, {calm.failed_count} of {calm.flights} flights fail", *failure_lines(calm.by_rule)]
 
 
-def _winds_answer(winds: WindsFound) -> str:
+def _winds_answer(winds: WindsResult) -> str:
     """Return the answer of a search in a line, with the lowest and the highest boundary."""
     directions, target = chart_directions(winds), winds.goal.target
     lowest_direction, highest_direction = (
@@ -519,7 +519,7 @@ def _winds_answer(winds: WindsFound) -> str:
     )
 
 
-def wind_lines(winds: WindsFound) -> list[str]:
+def wind_lines(winds: WindsResult) -> list[str]:
     """Summarise the result of a search in a few lines."""
     percent = f"{100 * winds.goal.confidence:g} %"
     return [

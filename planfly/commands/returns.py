@@ -27,7 +27,7 @@ from planfly.terminal.options import (
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
-    from planfly import ReturnsFound
+    from planfly import ReturnsResult
 
 # Maximum number of ranges of seconds that are listed.
 _MAX_LISTED_RANGES = 20
@@ -125,7 +125,7 @@ def returns(args: argparse.Namespace) -> int:
     return code
 
 
-def _json_answer(source: str, result: "ReturnsFound", code: int) -> object:
+def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
     from planfly.terminal.returns_answers import (
         CauseEntry,

@@ -19,7 +19,7 @@ from planfly.terminal.options import (
 from planfly.terminal.output import write_json_if_requested
 
 if TYPE_CHECKING:
-    from planfly import SurveyFound
+    from planfly import SurveyResult
 
 
 def survey_options(command_line: LineParser) -> None:
@@ -93,7 +93,7 @@ def survey(args: argparse.Namespace) -> int:
     return code
 
 
-def _json_answer(source: str, result: "SurveyFound", code: int) -> object:
+def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
     from logs.verdict.conditions import setup_conditions
     from planfly.terminal.survey_answers import (
         SurveyAnswer,

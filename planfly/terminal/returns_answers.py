@@ -10,7 +10,7 @@ from logs.verdict.returns.glides_text import glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import MARGIN
 from logs.verdict.returns.judge_returns import ReturnRange, SimulatedReturn
 from logs.verdict.returns.returns_text import headline, range_text
-from planfly.api.returning import RemedyTrial, ReturnsFound
+from planfly.api.returning import RemedyTrial, ReturnsResult
 from planfly.terminal.verdict_answers import STRICT
 from world.frames import to_geo
 
@@ -209,7 +209,7 @@ class ReturnsAnswer:
     notes: list[str]
 
 
-def suggestion_entry(answer: ReturnsFound, trial: RemedyTrial) -> ReturnSuggestion:
+def suggestion_entry(answer: ReturnsResult, trial: RemedyTrial) -> ReturnSuggestion:
     """Return a suggested remedy, with the numbers of safe and unsafe returns under it, for the JSON answer."""
     rally = None
     if trial.remedy.rally is not None:
@@ -228,7 +228,7 @@ def suggestion_entry(answer: ReturnsFound, trial: RemedyTrial) -> ReturnSuggesti
     )
 
 
-def program_entry(answer: ReturnsFound) -> ByProgram | None:
+def program_entry(answer: ReturnsResult) -> ByProgram | None:
     """Return the entry of the returns that the ArduPlane program flew, or None if the program was not used."""
     if answer.by_program is None:
         return None
@@ -264,7 +264,7 @@ def _round_to_tenths(value: float) -> float | None:
     return round(value, 1) if math.isfinite(value) else None
 
 
-def glides_entry(answer: ReturnsFound) -> GlidesEntry:
+def glides_entry(answer: ReturnsResult) -> GlidesEntry:
     """Return the entry of the glides without the engine."""
     glides = answer.glides
     entries = []
@@ -308,7 +308,7 @@ def glides_entry(answer: ReturnsFound) -> GlidesEntry:
     )
 
 
-def return_entry(answer: ReturnsFound, return_range: ReturnRange) -> ReturnEntry:
+def return_entry(answer: ReturnsResult, return_range: ReturnRange) -> ReturnEntry:
     """Return the entry of a range of returns."""
     worst_return, scenario, round_to_tenths = return_range.worst, answer.setup.scenario, _round_to_tenths
 

@@ -67,15 +67,15 @@ RESULTS = {
     *(
         "Predicted",
         "Reflown",
-        "ReturnsFound",
+        "ReturnsResult",
         "Round",
         "RunResult",
         "Scenario",
-        "SurveyFound",
+        "SurveyResult",
         "TimelineEntry",
         "Track",
         "Verdict",
-        "WindsFound",
+        "WindsResult",
         "WrittenReport",
     ),
 }

@@ -10,7 +10,7 @@ import planfly
 from planfly.api import campaigns
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
-from planfly.campaigns.find_winds import WindsFound, WindsGoal
+from planfly.campaigns.find_winds import WindsGoal, WindsResult
 from planfly.campaigns.flight_requests import FlyOne
 from planfly.campaigns.flight_row import FlightRow, fly_one
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
@@ -33,14 +33,14 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
     """What a search was asked; it finds that 8 m/s decide."""
     seen = []
 
-    def found(base: CampaignBase, goal: WindsGoal, _: object, store: WindsStore, __: object) -> WindsFound:
+    def found(base: CampaignBase, goal: WindsGoal, _: object, store: WindsStore, __: object) -> WindsResult:
         seen.append((base, goal))
         if not store.stored_flights():
             store.add(RequestedFlight(0, 0, 5.0, 0), made_row(base))
         directions = [Direction(goal.most, goal.target, no_numbers(), goal.confidence) for _ in range(goal.directions)]
         for draw, (number, speed, flyable) in enumerate(FLIGHTS):
             directions[number].add(speed, draw, frozenset() if flyable else frozenset({"slope"}))
-        return WindsFound(goal, tuple(one.boundary() for one in directions), FLIGHTS)
+        return WindsResult(goal, tuple(one.boundary() for one in directions), FLIGHTS)
 
     monkeypatch.setattr(campaigns, "find_winds", found)
     return seen
@@ -59,7 +59,7 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
     assert not {"wind_speed", "wind_from"} & {one.quantity.name for one in base.dispersions.varying}
     names = ["plan.json", "winds.html", "winds.json", "winds.png", "winds.sqlite"]
     assert sorted(file.name for file in out.iterdir()) == names
-    assert repr(found).startswith("<WindsFound 4 directions, ")
+    assert repr(found).startswith("<WindsResult 4 directions, ")
     assert repr(found).endswith(" 24 flights>")
     # It goes on with the plan and the flights that are there; another question is refused.
     plan = (out / "plan.json").read_bytes()

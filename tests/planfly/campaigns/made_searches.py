@@ -9,7 +9,7 @@ import pytest
 
 from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.campaign_base import CampaignBase
-from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.find_winds import WindsGoal, WindsResult, find_winds, open_winds_store
 from planfly.campaigns.flight_requests import FinishedFlight, FlightRequest, FlyOne
 from planfly.campaigns.tables import WINDS_DATABASE, WINDS_KIND, RequestedFlight, make_flight_row, parse_marginal_passes
 from planfly.campaigns.worker_pool import Workers
@@ -50,7 +50,7 @@ def flying_here() -> Iterator[None]:
 
 def searched(
     base: CampaignBase, folder: Path, goal: WindsGoal = GOAL, workers: int = 2, fly: FlyOne = made_flight
-) -> WindsFound:
+) -> WindsResult:
     """Search in a folder, or go on there."""
     folder.mkdir(exist_ok=True)
     resume = (folder / WINDS_DATABASE).exists()
@@ -71,7 +71,7 @@ def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], go
                 store.add(RequestedFlight(*values[:4]), row)
 
 
-def same(one: tuple[WindsFound, Path], other: tuple[WindsFound, Path]) -> bool:
+def same(one: tuple[WindsResult, Path], other: tuple[WindsResult, Path]) -> bool:
     """Whether two searches found the same, by the same table."""
     found, rows = zip(*((found, table(folder / WINDS_DATABASE)) for found, folder in (one, other)), strict=True)
     return bool(found[0] == found[1] and rows[0] == rows[1])

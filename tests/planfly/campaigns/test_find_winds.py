@@ -19,8 +19,8 @@ from planfly.campaigns.failure_counts import RuleFailures
 from planfly.campaigns.find_winds import (
     SEARCHED_QUANTITIES,
     CalmFailures,
-    WindsFound,
     WindsGoal,
+    WindsResult,
     _Search,
     find_winds,
     flight_limit,
@@ -60,7 +60,7 @@ def here() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def whole(wind_base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> tuple[WindsFound, Path]:
+def whole(wind_base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> tuple[WindsResult, Path]:
     """A search that was never stopped, for `FEWER`, and its folder."""
     folder = tmp_path_factory.mktemp("whole")
     with flying_here():
@@ -140,7 +140,7 @@ def test_how_narrowly_flights_passed_makes_the_boundary_surer(
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("seed", some((2, 0, 3, 1), 4))
 def test_what_was_stopped_anywhere_comes_out_the_same(
-    wind_base: CampaignBase, whole: tuple[WindsFound, Path], tmp_path: Path, seed: int
+    wind_base: CampaignBase, whole: tuple[WindsResult, Path], tmp_path: Path, seed: int
 ) -> None:
     count = len(whole[0].flights)
     # The last round that was begun has gaps; seed 0 has none at all, seed 1 all.

@@ -12,7 +12,7 @@ from logs.verdict.places import Place
 from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.failure_counts import RuleFailures
-from planfly.campaigns.find_winds import MIN_FLIGHTS_PER_DIRECTION, CalmFailures, WindsFound, WindsGoal
+from planfly.campaigns.find_winds import MIN_FLIGHTS_PER_DIRECTION, CalmFailures, WindsGoal, WindsResult
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report import (
@@ -114,7 +114,7 @@ def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase,
 # ----------------------------------------------------------------------
 # The go/no-go chart's files.
 
-FOUND = WindsFound(
+FOUND = WindsResult(
     WindsGoal(0.9, 0.95, 4, 20.0, 99),
     (*(WindBoundary(7.0 + k, 6.5 + k, 7.5 + k, False) for k in range(3)), WindBoundary(20.0, 18.0, 20.0, True)),
     ((0, 8.0, True), (0, 8.0, False), (1, 5.0, True), (2, 5.0, True), (3, 20.0, True)),
@@ -184,9 +184,9 @@ def test_what_flights_show_by_themselves_where_none_failed() -> None:
 def test_directions_for_which_flights_did_not_last_are_said() -> None:
     assert any("not settled: 4 of 4 directions" in line for line in wind_lines(FOUND))
     boundary = WindBoundary(7.0, 6.8, 7.3, False)
-    settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(MIN_FLIGHTS_PER_DIRECTION)))
+    settled = WindsResult(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(MIN_FLIGHTS_PER_DIRECTION)))
     assert not any("not settled" in line for line in wind_lines(settled))
-    fewer = WindsFound(FOUND.goal, (boundary,), settled.flights[1:])
+    fewer = WindsResult(FOUND.goal, (boundary,), settled.flights[1:])
     assert any("not settled: 1 of 1" in line for line in wind_lines(fewer))
 
 

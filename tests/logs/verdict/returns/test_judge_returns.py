@@ -22,7 +22,7 @@ from logs.verdict.returns.judge_returns import (
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
-from planfly.api.returning import ReturnsFound
+from planfly.api.returning import ReturnsResult
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
 from tests.soak import some
 from world.errors import MissionError
@@ -295,13 +295,13 @@ def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> N
     setup = hill_setup(tmp_path)
     guess = guessed(setup)
     world, starts = return_world(guess), planned_starts(guess, 20.0)
-    found = ReturnsFound(guess, judge_returns(world, starts, 20.0))
+    found = ReturnsResult(guess, judge_returns(world, starts, 20.0))
     assert all(math.isnan(one.energy_left) for one in found.returns.each)
     assert not found.returns.count("energy")
     assert any("the battery is guessed, so energy is not judged" in note for note in found.notes)
     stated = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
     known = guessed(stated)
-    found = ReturnsFound(known, judge_returns(return_world(known), starts, 20.0))
+    found = ReturnsResult(known, judge_returns(return_world(known), starts, 20.0))
     assert found.returns.count("energy")
     assert not any("battery" in note for note in found.notes)
 
