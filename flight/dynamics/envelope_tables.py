@@ -3,7 +3,7 @@
 import contextlib
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from aircraft.envelope import POWERS, TABLES, Envelope
 from aircraft.uncertainty import read_uncertainty
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import (
+    QUANTITIES,
     Trim,
     fastest_level_flight,
     full_throttle_climb,
@@ -23,14 +24,17 @@ from flight.dynamics.trim import (
     steady_flight,
 )
 from world.arrays import Floats
+from world.errors import FlightError
 from world.files import write_whole
 
 # Version of the file format; increase it with any change of the contents or of their computation.
-_SCHEMA_VERSION = 6
+_SCHEMA_VERSION = 7
 # Number of airspeeds in the grid.
 _AIRSPEED_COUNT = 11
 # Altitudes of the grid, m AMSL.
 _GRID_AMSL_M = np.arange(0.0, 9001.0, 1000.0)
+# Smallest change of an acceleration for which a command moves something, m/s^2 or rad/s^2; an engine settles to 1e-8.
+_MIN_RESPONSE = 1e-5
 # Names of all tables in the file.
 _TABLE_NAMES = (*TABLES, *POWERS)
 
@@ -82,8 +86,10 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     """Return the tables of `aircraft.envelope.Envelope` by name, with a trim at each grid point.
 
     The trims are in still standard atmosphere, at 45 degrees latitude, on a course due north.
+    Raises FlightError for a model whose elevator or throttle moves nothing, because it has no trims.
     """
     fdm = Fdm(aircraft, motor_braking=motor_braking)
+    _check_commands(fdm)
     airspeeds = _grid_airspeeds(aircraft)
     climb = np.full((airspeeds.size, _GRID_AMSL_M.size), math.nan)
     descent = climb.copy()
@@ -92,7 +98,7 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     for altitude_index, amsl in enumerate(_GRID_AMSL_M.tolist()):
         last_climb: Trim | None = None
         last_descent: Trim | None = None
-        last_level: Trim | None = None
+        level_trims: list[Trim] = []
         # From fast to slow, because the slowest airspeed may have no trim, and each trim starts from its neighbor.
         for airspeed_index in reversed(range(airspeeds.size)):
             airspeed = float(airspeeds[airspeed_index])
@@ -102,17 +108,10 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             if trim := idle_descent(fdm, airspeed, amsl, last_descent):
                 last_descent, descent[airspeed_index, altitude_index] = trim, -trim.climb
                 powers["power_idle"][airspeed_index, altitude_index] = _power(fdm, trim)
-            if trim := steady_flight(fdm, airspeed, amsl, near=last_level):
-                last_level, powers["power_level"][airspeed_index, altitude_index] = trim, _power(fdm, trim)
-        if trim := fastest_level_flight(fdm, amsl):
-            max_level_speed[altitude_index] = trim.airspeed
-        if trim := slowest_level_flight(fdm, amsl):
-            min_level_speed[altitude_index] = trim.airspeed
-    if np.isnan(min_level_speed).all():
-        # The wing stalls before the elevator reaches its stop: the slowest trim of the grid is the slowest flight.
-        is_level = np.isfinite(powers["power_level"])
-        has_level_flight = is_level.any(axis=0) & np.isfinite(max_level_speed)
-        min_level_speed = np.where(has_level_flight, airspeeds[is_level.argmax(axis=0)], math.nan)
+            if trim := steady_flight(fdm, airspeed, amsl, near=level_trims[-1] if level_trims else None):
+                level_trims.append(trim)
+                powers["power_level"][airspeed_index, altitude_index] = _power(fdm, trim)
+        min_level_speed[altitude_index], max_level_speed[altitude_index] = _level_speed_range(fdm, amsl, level_trims)
     # A trim is accurate to about 1e-11; nine decimals are the same on every machine.
     return {
         "airspeed": airspeeds,
@@ -123,6 +122,45 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
         "level_speed_max": max_level_speed.round(9),
         **{name: table.round(6) for name, table in powers.items()},
     }
+
+
+def _check_commands(fdm: Fdm) -> None:
+    """Raise FlightError if the elevator or the throttle of a model changes none of its accelerations."""
+    fdm.move_to(0.0)
+    values = fdm.first_guess()
+    for name, limit in (("elevator", fdm.surface_limits()[0]), ("throttle", 1.0)):
+        index = QUANTITIES.index(name)
+        accelerations = []
+        for command in (0.5 * limit, limit):
+            values[index] = command
+            accelerations.append(fdm.balance(values))
+        if float(np.abs(accelerations[1] - accelerations[0]).max()) < _MIN_RESPONSE:
+            property_name = fdm.aircraft.model.commands[index - QUANTITIES.index("elevator")].name
+            raise FlightError(
+                f"{fdm.aircraft.model_file}: {property_name}, the {name}'s command, moves nothing: no force and no"
+                " moment changes with it, so there is no level flight",
+                file=fdm.aircraft.model_file,
+                field=f"model.command.{name}",
+            )
+
+
+def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tuple[float, float]:
+    """Return the lowest and the highest airspeed of level flight at an altitude, m/s; NaN if no level flight is found.
+
+    level_trims: level flights at airspeeds of the grid, the fastest first.
+
+    A search may fail, or end at an airspeed below level flights of the grid, far from the fastest flight; it is then
+    repeated from the nearest level flight. If the wing stalls before the elevator reaches its stop, no search finds the
+    slowest flight, which is the slowest one of the grid.
+    """
+    slowest_trim, fastest_trim = slowest_level_flight(fdm, amsl), fastest_level_flight(fdm, amsl)
+    if level_trims:
+        if fastest_trim is None or fastest_trim.airspeed < level_trims[0].airspeed:
+            fastest_trim = fastest_level_flight(fdm, amsl, level_trims[0]) or level_trims[0]
+        slowest_trim = slowest_trim or slowest_level_flight(fdm, amsl, level_trims[-1]) or level_trims[-1]
+    if slowest_trim is None or fastest_trim is None:
+        return math.nan, math.nan
+    return slowest_trim.airspeed, fastest_trim.airspeed
 
 
 def _power(fdm: Fdm, trim: Trim) -> float:

@@ -421,6 +421,9 @@ def suggest_using_less_energy(
     energy = finding.planned if finding.flown is None else finding.flown
     if energy is None or finding.limit is None or finding.margin is None or energy <= finding.limit:
         return ()
+    if finding.planned is not None and finding.flown is not None and finding.flown >= requirements.setup.battery:
+        # The flight ended with an empty battery or tank; only the prediction covers the whole mission.
+        energy = np.fmax(finding.planned, finding.flown)
     ratio = energy / finding.limit
     envelope = requirements.setup.envelope
     storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"

@@ -10,6 +10,9 @@ from world.arrays import Floats
 
 # Largest step along the axis within one window, as a multiple of the median step.
 _MAX_STEP_RATIO = 5.0
+# Position of the centre of a label along the axis, as a fraction of its length; it keeps the text off the axis on a
+# telephone.
+_LABEL_FRACTION = 0.12
 
 
 def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Chart:
@@ -33,7 +36,8 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
             Layer("line", "flown", "flown", axis_values, flown_values),
         )
         top = float(np.nanmax([high, flown_values]))
-        share = Label(f"{100.0 * band.inside:.0f} % inside", float(axis_values[0]), top, "end", prefer=(1, -1))
+        left = float(axis_values[0] + _LABEL_FRACTION * (np.nanmax(axis_values) - axis_values[0]))
+        share = Label(f"{100.0 * band.inside:.0f} % inside", left, top, "end", prefer=(0, -1))
         panels.append(Panel(band.name, band.unit.replace("deg", "°"), layers, min_span=1.0, labels=(share,)))
     along_name, unit = ("time of the log", "s") if by_time else ("along the legs", "km")
     return Chart(title, along_name, unit, tuple(panels), page_height=170, print_height=1.3)

@@ -17,6 +17,7 @@ from aircraft.identification.performance import GRAVITY, Performance, fastest_le
 from aircraft.power_prior import EFFICIENCY_LOG_SD
 from aircraft.uncertainty import Draws, draws_text
 from flight.autopilots.arduplane.parameters import DEFINITIONS, ArduPilotParameters
+from flight.autopilots.parameter_set import AIRCRAFT_FILE
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
@@ -155,7 +156,7 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
             mission = identification_mission(aircraft, envelope, *home)
             files["identify.waypoints"] = waypoints_text(mission)
     return files | {
-        "ardupilot.parm": _parameter_file_text(identified.logs[-1]),
+        **_parameter_file(identified),
         "ardupilot.toml": _servo_file_text(identified.outputs),
         "posterior.toml": posterior_text(identified),
         "draws.csv": draws_text(identified.aircraft_draws()),
@@ -256,10 +257,15 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
     return others | law_parameters.by_origin("file")
 
 
-def _parameter_file_text(log: MotionLog) -> str:
+def _parameter_file(identified: Identified) -> dict[str, str]:
+    """Return ``ardupilot.parm`` and its text: the base's file for a log without parameters, if it has one."""
+    log, base_file = identified.logs[-1], identified.base.folder / AIRCRAFT_FILE
+    parameters = flown_parameters(log)
+    if not parameters:
+        return {AIRCRAFT_FILE: base_file.read_text(encoding="utf-8")} if base_file.is_file() else {}
     lines = [f"# As {Path(log.source).name} was flown: parameters of flying; those of its hardware are left out."]
-    lines += [f"{name} {value:.9g}" for name, value in sorted(flown_parameters(log).items())]
-    return "\n".join(lines) + "\n"
+    lines += [f"{name} {value:.9g}" for name, value in sorted(parameters.items())]
+    return {AIRCRAFT_FILE: "\n".join(lines) + "\n"}
 
 
 def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:

@@ -231,6 +231,9 @@ def _check_usable(log: MotionLog) -> None:
     air_series = ((log.airspeed, "airspeed"), (log.wind, "wind"))
     if missing := [series_names[name] for samples, name in air_series if len(samples.time) < 2]:
         raise LogError(f"{log.source}: no {'; no '.join(missing)}", file=log.source)
+    if np.ptp(log.airspeed.values) == 0.0:
+        message = f"{log.source}: the airspeed stays at {log.airspeed.values[0, 0]:.3g} m/s: expected that of a sensor"
+        raise LogError(message, file=log.source, field="airspeed")
     for number, function in _servo_functions(log).items():
         if function in _FLAPS:
             min_pulse, max_pulse = _pulse_range(log, number)

@@ -27,6 +27,8 @@ _SIDE_DIRECTIONS = {"north": (0.0, 1.0), "east": (1.0, 0.0), "south": (0.0, -1.0
 _TURN_STEPS = 40
 # Distance from a sphere's surface that a step aims at, m, as in the planner; the navigation error may be a third of it.
 _SPHERE_MARGIN_M = 15.0
+# Smallest share of a move of waypoints that is taken to move the nearest point of their legs.
+_MIN_MOVE_SHARE = 0.2
 
 
 def can_apply(suggestion: Suggestion) -> bool:
@@ -192,17 +194,36 @@ def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding)
 
 
 def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Move the waypoints near the sphere of a missile away from it."""
-    missile_position = edited.context.scenario.threats.position[change.place.index or 0]
+    """Move the waypoints near the sphere of a missile so that the nearest point of their legs moves away from it."""
+    missile = edited.context.scenario.threats.position[change.place.index or 0, :2]
     legs, points = violated_legs(edited.requirements, finding), edited.waypoint_positions()
-    offset = points[:, :2] - missile_position[:2]
-    distance = np.hypot(offset[:, 0], offset[:, 1])
-    for waypoint in sorted(edited.end_waypoints(legs), key=lambda end: float(distance[end]))[: edited.max_moves]:
-        if distance[waypoint] > 1.0:
-            edited.move_items(
-                [waypoint],
-                np.array([*((change.wanted + _SPHERE_MARGIN_M) * offset[waypoint] / distance[waypoint]), 0.0]),
-            )
+    if not legs:
+        return
+    distance = np.hypot(*(points[:, :2] - missile).T)
+    waypoints = sorted(edited.end_waypoints(legs), key=lambda end: float(distance[end]))[: edited.max_moves]
+    direction, leg, fraction = _nearest_point(missile, points[:, :2], legs)
+    # Share of a move of these waypoints by which the nearest point moves.
+    share = (1.0 - fraction) * (leg in waypoints) + fraction * (leg + 1 in waypoints)
+    offset = (change.wanted + _SPHERE_MARGIN_M) / max(share, _MIN_MOVE_SHARE) * direction
+    edited.move_items(waypoints, np.array([*offset, 0.0]))
+
+
+def _nearest_point(place: Floats, points: Floats, legs: Sequence[int]) -> tuple[Floats, int, float]:
+    """Return the direction (2,) from a place to the nearest point of legs, its leg, and the fraction of the leg there.
+
+    The direction is across the leg if the place is on it.
+    """
+    candidates = []
+    for leg in legs:
+        step = points[leg + 1] - points[leg]
+        fraction = float(np.clip((place - points[leg]) @ step / max(float(step @ step), 1.0), 0.0, 1.0))
+        away = points[leg] + fraction * step - place
+        candidates.append((math.hypot(*away), leg, fraction, away))
+    distance, leg, fraction, away = min(candidates, key=lambda candidate: candidate[0])
+    if distance < 1.0:
+        step = points[leg + 1] - points[leg]
+        away, distance = np.array([-step[1], step[0]]), max(math.hypot(*step), 1.0)
+    return away / distance, leg, fraction
 
 
 def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> None:

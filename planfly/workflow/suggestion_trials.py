@@ -5,6 +5,7 @@ finding is gone and no more findings fail than before.  A step that is too small
 missing part.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -33,6 +34,8 @@ _MAX_STEPS = 10
 _MAX_FAILED_FINDINGS = 40
 # Changes by a step, m, which are enlarged while the finding fails.
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
+# Changes of the energy carried or needed, as a ratio or a percentage.
+_ENERGY_KINDS = frozenset(("battery", "tank", "duration"))
 # Factor on the part that a step still lacks.
 _GROWTH_FACTOR = 1.5
 # Length added to the part that a step still lacks, m.
@@ -151,50 +154,45 @@ class SuggestionTrials:
         return self._flights_left >= 0 and is_improved(self.judged.verdict, trial.flight_verdict, finding)
 
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
-        """Yield a suggestion and then larger suggestions, each with its trial."""
-        judged_mission, grown_finding, total_suggestion = self.judged, finding, suggestion
+        """Yield a suggestion and then larger suggestions, each with its trial.
+
+        Each suggestion is applied to the unchanged mission in one step, as a reader of the verdict applies it.
+        """
         while True:
             if self.should_abort():
                 raise TrialAborted
             try:
-                mission, setup = self._changed_flight(judged_mission, grown_finding, suggestion)
+                mission, setup = self._changed_flight(finding, suggestion)
             except PlanflyError:
                 return
             new_trial = Trial(setup, self.context.airframe.aircraft, self.should_abort)
             trial = self._trials.setdefault((mission.items, setup.battery), new_trial)
-            yield total_suggestion, trial
+            yield suggestion, trial
             verdict = trial.flight_verdict if "flight_verdict" in vars(trial) else trial.geometry_verdict
-            missing_steps = _missing_steps(finding, total_suggestion, verdict)
-            if missing_steps is None:
+            larger_suggestion = _larger_suggestion(finding, suggestion, verdict)
+            if larger_suggestion is None:
                 return
-            grown_finding, suggestion = missing_steps
-            judged_mission, total_suggestion = (
-                JudgedMission(mission, trial.setup, trial.requirements, verdict),
-                _merge_steps(total_suggestion, suggestion),
-            )
+            suggestion = larger_suggestion
 
-    def _changed_flight(
-        self, judged_mission: JudgedMission, finding: Finding, suggestion: Suggestion
-    ) -> tuple[Mission, FlightSetup]:
+    def _changed_flight(self, finding: Finding, suggestion: Suggestion) -> tuple[Mission, FlightSetup]:
         """Apply a suggestion to mission and setup; a shorter duration is tried as a larger battery."""
-        setup = replace(judged_mission.setup, autopilot=judged_mission.setup.autopilot.model)
+        setup = replace(self.judged.setup, autopilot=self.judged.setup.autopilot.model)
         match suggestion:
             case (Change(what="battery" | "tank") as change,):
-                return judged_mission.mission, replace(setup, battery=change.wanted * setup.battery)
+                return self.judged.mission, replace(setup, battery=change.wanted * setup.battery)
             case (Change(what="duration") as change,):
-                return judged_mission.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
-        mission = apply_suggestion(self.context, judged_mission, finding, suggestion)
+                return self.judged.mission, replace(setup, battery=setup.battery / (1.0 - 0.01 * change.wanted))
+        mission = apply_suggestion(self.context, self.judged, finding, suggestion)
         return mission, self.context.setup(mission)
 
 
-def _missing_steps(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> tuple[Finding, Suggestion] | None:
-    """Return a finding that still fails after a suggestion of steps, and the steps that it needs; None if none fails.
+def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdict) -> Suggestion | None:
+    """Return a suggestion enlarged by what its finding still needs, or None if nothing is known to be missing.
 
-    If the finding itself is gone, another leg that fails the same rule is returned.
+    verdict: verdict on the mission with the suggestion.
+    If the finding itself is gone, the steps that another leg needs for the same rule are added.
     """
     kinds = {change.what for change in suggestion}
-    if not kinds <= _STEP_KINDS:
-        return None
     same_finding = [
         failed_finding for failed_finding in verdict.failed if finding_key(failed_finding) == finding_key(finding)
     ]
@@ -206,18 +204,35 @@ def _missing_steps(finding: Finding, suggestion: Suggestion, verdict: Verdict) -
     for failed_finding in (*same_finding, *same_rule_legs):
         for needed_suggestion in failed_finding.suggestions:
             if {change.what for change in needed_suggestion} == kinds:
-                steps = (
-                    replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in needed_suggestion
-                )
-                return failed_finding, tuple(steps)
+                if kinds <= _STEP_KINDS:
+                    return _merge_steps(suggestion, needed_suggestion)
+                if kinds <= _ENERGY_KINDS:
+                    return (_merge_energy_changes(suggestion[0], needed_suggestion[0]),)
     return None
 
 
-def _merge_steps(suggestion: Suggestion, further_steps: Suggestion) -> Suggestion:
-    """Add further steps to a suggestion, each to the step of the same kind at the same place."""
+def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion:
+    """Add the steps that are still needed, enlarged, to those of the same kind at the same place."""
+    further_steps = [replace(change, wanted=_GROWTH_FACTOR * change.wanted + _GROWTH_M) for change in needed_steps]
     steps: dict[object, Change] = {}
     for change in (*suggestion, *further_steps):
         key = change.what, change.place.kind, change.place.index
         previous_step = steps[key].wanted if key in steps else 0.0
         steps[key] = replace(change, wanted=float(round(previous_step + change.wanted)))
     return tuple(steps.values())
+
+
+def _merge_energy_changes(change: Change, needed_change: Change) -> Change:
+    """Return one change of the energy carried, or of the duration, for two changes after each other.
+
+    >>> from logs.verdict.places import FLIGHT
+    >>> battery, duration = Change("battery", FLIGHT, None, 1.5, "1"), Change("duration", FLIGHT, None, 40.0, "%")
+    >>> _merge_energy_changes(battery, replace(battery, wanted=1.01)).wanted
+    1.52
+    >>> _merge_energy_changes(duration, replace(duration, wanted=2.0)).wanted
+    42.0
+    """
+    if change.what == "duration":
+        remaining = (1.0 - 0.01 * change.wanted) * (1.0 - 0.01 * needed_change.wanted)
+        return replace(change, wanted=float(math.ceil(100.0 * (1.0 - remaining))))
+    return replace(change, wanted=math.ceil(100.0 * change.wanted * needed_change.wanted) / 100.0)

@@ -20,7 +20,7 @@ from planner.seeding.grids import (
     EXPECTED_COST_RATIO,
     KILL_COST,
     LAYERS_PER_STEP,
-    MAX_LATERAL_CELLS,
+    MAX_SIDE,
     GridRoute,
     distance_to_goal,
     find_obstacles,
@@ -122,13 +122,13 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
     """Return the tangents of a fraction of the climb and dive limits of each step at a height (m), (sideways, 2)."""
-    slopes, a, b = np.zeros((2 * MAX_LATERAL_CELLS + 1, 2)), np.zeros(3), np.zeros(3)
+    slopes, a, b = np.zeros((2 * MAX_SIDE + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
-    for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
+    for side in range(-MAX_SIDE, MAX_SIDE + 1):
         b[0], b[1] = position_of(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
-        slopes[side + MAX_LATERAL_CELLS, 0], slopes[side + MAX_LATERAL_CELLS, 1] = (
+        slopes[side + MAX_SIDE, 0], slopes[side + MAX_SIDE, 1] = (
             fraction * math.tan(climb),
             fraction * math.tan(dive),
         )
@@ -203,7 +203,7 @@ def _relax_stage(
             continue
         east, north = position_of(frame, (stage - 1) * step, grid.across[y])
         first_height = previous_columns[y].lowest if grid.follows else grid.floor
-        for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
+        for side in range(-MAX_SIDE, MAX_SIDE + 1):
             target = y + side
             if not 0 <= target < width or columns[target].lowest > columns[target].highest:
                 continue
@@ -214,10 +214,7 @@ def _relax_stage(
             if zones.required.shape[0] > 0:
                 leg = segment_between(east, north, to_east, to_north)
                 closed_heights = _closed_heights(zones, leg, lateral, previous_columns[y].ground)
-            climb, dive = (
-                slopes[side + MAX_LATERAL_CELLS, 0] * horizontal_length,
-                slopes[side + MAX_LATERAL_CELLS, 1] * horizontal_length,
-            )
+            climb, dive = slopes[side + MAX_SIDE, 0] * horizontal_length, slopes[side + MAX_SIDE, 1] * horizontal_length
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
                     continue
@@ -331,7 +328,7 @@ def continue_airspace_route(
             # No cell of the previous stage is reached, so the last stage cannot be reached either.
             last_stage = stages
             break
-        first, last = max(0, first - MAX_LATERAL_CELLS), min(width - 1, last + MAX_LATERAL_CELLS)
+        first, last = max(0, first - MAX_SIDE), min(width - 1, last + MAX_SIDE)
         for y in range(first, last + 1):
             _fill_column(data, frame, grid, along, grid.across[y], columns[stage, y])
         _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, price)

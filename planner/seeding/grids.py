@@ -204,7 +204,7 @@ def set_cell_costs(
 
 
 # Maximum lateral step, in cells, per stage.
-MAX_LATERAL_CELLS = 3
+MAX_SIDE = 3
 # A cell of a route: its indices across and among the layers.
 ROUTE_CELL = np.dtype([("across", np.int64), ("layer", np.int64)], align=True)
 # Maximum climb and descent of a step, in layers.
@@ -217,9 +217,9 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
     """Return `STEP_LAYERS` records (sideways, layers) of the climb and descent of each step by course and height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
-    step_layers = np.zeros((2 * MAX_LATERAL_CELLS + 1, layers.size), dtype=STEP_LAYERS)
+    step_layers = np.zeros((2 * MAX_SIDE + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
-    for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
+    for side in range(-MAX_SIDE, MAX_SIDE + 1):
         horizontal_length = step * math.sqrt(1.0 + (side * ratio) ** 2)
         b[0], b[1] = position_of(frame, step, side * ratio * step)
         a[0], a[1] = frame.east, frame.north
@@ -227,12 +227,8 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
             a[2] = layers[z]
             b[2] = layers[z]
             climb, dive = slope_limits(data, a, b)
-            step_layers[side + MAX_LATERAL_CELLS, z].climb = max(
-                0, math.floor(math.tan(climb) * horizontal_length / pitch)
-            )
-            step_layers[side + MAX_LATERAL_CELLS, z].sink = max(
-                0, math.floor(math.tan(dive) * horizontal_length / pitch)
-            )
+            step_layers[side + MAX_SIDE, z].climb = max(0, math.floor(math.tan(climb) * horizontal_length / pitch))
+            step_layers[side + MAX_SIDE, z].sink = max(0, math.floor(math.tan(dive) * horizontal_length / pitch))
     return step_layers
 
 
@@ -289,11 +285,11 @@ def relax_stage(
         first, last = spans[z].first, spans[z].last
         if first > last:
             continue
-        for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
+        for side in range(-MAX_SIDE, MAX_SIDE + 1):
             first_cell, end_cell = max(first, -side), min(last, width - 1 - side) + 1
             if first_cell >= end_cell:
                 continue
-            limit = step_layers[side + MAX_LATERAL_CELLS, z]
+            limit = step_layers[side + MAX_SIDE, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
@@ -316,7 +312,7 @@ def distance_to_goal(columns: int, home: int, remaining_stages: int, step: float
     """Fill the shortest horizontal distance from each position across to the destination, m."""
     for y in range(columns):
         offset = abs(y - home)
-        if offset > MAX_LATERAL_CELLS * remaining_stages:
+        if offset > MAX_SIDE * remaining_stages:
             out[y] = math.inf
             continue
         k = offset // remaining_stages if remaining_stages > 0 else 0
@@ -452,7 +448,7 @@ def continue_route(
         first, last = width, -1
         for z in range(layer_count):
             first, last = min(first, spans[z].first), max(last, spans[z].last)
-        first, last = max(0, first - MAX_LATERAL_CELLS), min(width - 1, last + MAX_LATERAL_CELLS)
+        first, last = max(0, first - MAX_SIDE), min(width - 1, last + MAX_SIDE)
         if first > last:
             last_stage = stages
             break

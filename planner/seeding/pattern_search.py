@@ -46,7 +46,7 @@ FIRST_STEP_ACROSS_FRACTION = 0.15
 # Initial step up, m.
 FIRST_STEP_UP_M = 25.0
 # Smallest step of a move, as a fraction of its initial step.
-MIN_STEP_FRACTION = 0.002
+MIN_SCALE = 0.002
 
 
 # Number of evaluations between two calls of `must_end`: some 20 ms at most.
@@ -296,9 +296,7 @@ def _continue_search(
                     evaluations,
                     False,
                 )
-            if evaluations >= max_evaluations or (
-                k < moves.shape[0] and abs(steps[k]) < MIN_STEP_FRACTION * initial_steps[k]
-            ):
+            if evaluations >= max_evaluations or (k < moves.shape[0] and abs(steps[k]) < MIN_SCALE * initial_steps[k]):
                 continue
             is_better = False
             for _ in range(2):

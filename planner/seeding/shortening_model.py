@@ -503,10 +503,8 @@ def _add_turns(
         number = first_number + count + 1 + i
         dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
         horizontal_length = max(1e-3, math.sqrt(dx * dx + dy * dy))
-        begin_tangent, end_tangent = (
-            math.tan(0.5 * min(MAX_TURN_RAD, turn[i])),
-            math.tan(0.5 * min(MAX_TURN_RAD, turn[i + 1])),
-        )
+        begin_tangent = math.tan(0.5 * min(MAX_TURN_RAD, turn[i]))
+        end_tangent = math.tan(0.5 * min(MAX_TURN_RAD, turn[i + 1]))
         needed_length = active.after[i] * begin_tangent + active.before[i + 1] * end_tangent + active.roll[i]
         slopes[:] = 0.0
         for axis, component in ((0, dx / horizontal_length), (1, dy / horizontal_length)):

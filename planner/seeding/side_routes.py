@@ -14,7 +14,7 @@ import numpy as np
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.problem import ProblemArrays, required_clearance
 from planner.seeding.grids import (
-    MAX_LATERAL_CELLS,
+    MAX_SIDE,
     ROUTE_CELL,
     SPAN,
     Grid,
@@ -87,11 +87,11 @@ def _relax_stage_back(
         first, last = spans[z].first, spans[z].last
         if first > last:
             continue
-        for side in range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1):
+        for side in range(-MAX_SIDE, MAX_SIDE + 1):
             first_cell, end_cell = max(first, -side), min(last, width - 1 - side) + 1
             if first_cell >= end_cell:
                 continue
-            limit = step_layers[side + MAX_LATERAL_CELLS, z]
+            limit = step_layers[side + MAX_SIDE, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
@@ -196,7 +196,7 @@ def continue_grid_costs(
             first, last = width, -1
             for z in range(layer_count):
                 first, last = min(first, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
-            first, last = max(0, first - MAX_LATERAL_CELLS), min(width - 1, last + MAX_LATERAL_CELLS)
+            first, last = max(0, first - MAX_SIDE), min(width - 1, last + MAX_SIDE)
             if first > last:
                 end = 2 * stages
                 break

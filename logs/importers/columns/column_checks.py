@@ -26,6 +26,15 @@ _FORCE_RANGE_MPS2 = (-20.0, -4.0)
 _CLEAR_ALIGNMENT = 0.7
 # Largest mean angle between heading and ground course, rad.
 _MAX_HEADING_DIFFERENCE_RAD = math.radians(50.0)
+# Quantities that must follow the change of the attitude.
+_ANGULAR_RATES = ("roll_rate", "pitch_rate", "yaw_rate")
+# Least correlation of an angular rate with the change of the attitude, if both move by `_MIN_RATE_SD_RAD_S`.
+_LEAST_RATE_CORRELATION = 0.3
+_MIN_RATE_SD_RAD_S = math.radians(1.0)
+# Largest ratio of the airspeed and that of ground velocity and heading; density and position error explain 1.2.
+_MAX_AIRSPEED_RATIO = 1.35
+# Least median airspeed in flight, m/s.
+_MIN_AIRSPEED_MPS = 2.0
 # Least range of a throttle that moves.
 _MIN_THROTTLE_RANGE = 0.01
 # Least range of the current, 5 to 95 %, that only a throttle changes, A.
@@ -60,6 +69,8 @@ def check_signs_and_units(log: ColumnLog) -> None:
         _check_heading(log, grid)
     if log.has("throttle", "current"):
         _check_throttle(log, grid)
+    if log.has("airspeed"):
+        _check_airspeed(log, grid)
 
 
 def _flying_grid(log: ColumnLog) -> Floats:
@@ -142,6 +153,11 @@ def _check_pair(log: ColumnLog, pair: _Pair) -> None:
         hint = "check sign and frame"
         message = f"{column} runs against {pair.partner} (correlation {correlation:.2f}): {hint}"
         raise LogError(f"{log.table_path}: {field}: {message}", file=log.table_path, field=field, allowed=hint)
+    both_move = min(float(values.std()), float(expected.std())) > _MIN_RATE_SD_RAD_S
+    if pair.quantity in _ANGULAR_RATES and both_move and correlation < _LEAST_RATE_CORRELATION:
+        hint = "check column and clock"
+        message = f"{column} does not follow {pair.partner} (correlation {correlation:.2f}): {hint}"
+        raise LogError(f"{log.table_path}: {field}: {message}", file=log.table_path, field=field, allowed=hint)
     if pair.exact and correlation > _CLEAR_CORRELATION:
         ratio = float(np.std(values) / np.std(expected))
         if not 1.0 / _MAX_RATIO <= ratio <= _MAX_RATIO:
@@ -159,6 +175,29 @@ def _check_force(log: ColumnLog, force: float) -> None:
         raise LogError.at(
             log.table_path, "columns.acceleration_down", f"{entry.column} is {force:.3g} m/s2 in flight", allowed
         )
+
+
+def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
+    """Raise LogError for an airspeed that is zero in flight, or not that of ground velocity and heading."""
+    airspeed, column = _on_grid(log.series("airspeed"), grid), log.column("airspeed")
+    if np.median(airspeed) < _MIN_AIRSPEED_MPS:
+        allowed = f"expected more than {_MIN_AIRSPEED_MPS:g} m/s: check column and unit"
+        shown = f"{column} is {np.median(airspeed):.3g} m/s in flight"
+        raise LogError.at(log.table_path, "columns.airspeed", shown, allowed)
+    if not log.has("yaw", "velocity_north", "velocity_east"):
+        return
+    direction = np.exp(1j * _on_grid(log.series("yaw"), grid, turning=True))
+    if abs(direction.mean()) > _CLEAR_ALIGNMENT:
+        return
+    # Ground velocity is a factor times the airspeed along the heading, plus the wind.
+    velocity = _on_grid(log.series("velocity_north"), grid) + 1j * _on_grid(log.series("velocity_east"), grid)
+    air = airspeed * direction
+    air, velocity = air - air.mean(), velocity - velocity.mean()
+    factor = float(np.real(np.vdot(air, velocity)) / np.real(np.vdot(air, air)))
+    if not 1.0 / _MAX_AIRSPEED_RATIO <= factor <= _MAX_AIRSPEED_RATIO:
+        hint = f"check unit ({log.unit('airspeed')}) and scale"
+        shown = f"{column} is {1.0 / factor:.3g} times the airspeed of ground velocity and heading"
+        raise LogError.at(log.table_path, "columns.airspeed", shown, hint)
 
 
 def _check_throttle(log: ColumnLog, grid: Floats) -> None:

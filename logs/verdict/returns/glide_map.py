@@ -26,7 +26,7 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
 from world.arrays import Codes, Flags, Floats
 from world.highest_ground import highest_in_cells
-from world.kernels import Record, Records, compiled, inner, record_dtype
+from world.kernels import Record, Records, compiled, inlined, inner, record_dtype
 from world.terrain import Terrain
 from world.wind import mean_wind_speed
 
@@ -396,24 +396,13 @@ def _settle_cells(
             _remove_from_band(k, b, band_heads, links)
             row, column = k // columns, k % columns
             altitude = flat_altitudes[k]
-            altitude_position = min(
-                slopes.shape[1] - 1.001, max(0.0, (altitude - slopes_first_altitude) / altitude_step)
-            )
-            altitude_index = int(altitude_position)
+            slope_position = min(slopes.shape[1] - 1.001, max(0.0, (altitude - slopes_first_altitude) / altitude_step))
             for step_index in range(step_records.shape[0]):
                 step = step_records[step_index]
                 i, j = row - step.north, column - step.east
                 if not (0 <= i < rows and 0 <= j < columns):
                     continue
-                altitude_loss = (
-                    cell
-                    * step.length
-                    * (
-                        slopes[step_index, altitude_index]
-                        + (altitude_position - altitude_index)
-                        * (slopes[step_index, altitude_index + 1] - slopes[step_index, altitude_index])
-                    )
-                )
+                altitude_loss = cell * step.length * _slope_at(slopes, step_index, slope_position)
                 if not altitude + altitude_loss < min_altitude[i, j]:
                     continue
                 start_altitude = _step_start_altitude(
@@ -424,12 +413,16 @@ def _settle_cells(
                 neighbour = i * columns + j
                 if min_altitude[i, j] <= max_altitude:
                     _remove_from_band(neighbour, int((min_altitude[i, j] - first_altitude) / band), band_heads, links)
-                min_altitude[i, j], destination[i, j], next_step[i, j] = (
-                    start_altitude,
-                    destination[row, column],
-                    step_index,
-                )
+                min_altitude[i, j], destination[i, j] = start_altitude, destination[row, column]
+                next_step[i, j] = step_index
                 _insert_into_band(neighbour, int((start_altitude - first_altitude) / band), band_heads, links)
+
+
+@inlined
+def _slope_at(slopes: Floats, step_index: int, position: float) -> float:
+    """Return the slope of a step at a fractional index among the altitudes."""
+    index = int(position)
+    return slopes[step_index, index] + (position - index) * (slopes[step_index, index + 1] - slopes[step_index, index])
 
 
 @inner

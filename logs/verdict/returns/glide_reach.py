@@ -112,17 +112,15 @@ def _fill_altitudes_left(
         bank = min(glider.bank, load_factor_roll_limit(speed, min_speed, MIN_ROLL_LIMIT_RAD))
         tan_bank = math.tan(bank)
         level_sink = -excess_power(excess_table, 0.0, speed, start.up, aircraft)
-        # The turn is flown at the same angle of attack: the load makes it faster, but no faster than the airspeed
-        # limit.
+        # The turn is flown at the same angle of attack: the load makes it faster, up to the airspeed limit.
         turn_speed = max(speed, min(speed / math.sqrt(math.cos(bank)), max_speed))
         turn_sink = aircraft.induced / turn_speed * tan_bank * tan_bank - excess_power(
             excess_table, 0.0, turn_speed, start.up, aircraft
         )
         step_duration = _TURN_STEP_RAD * turn_speed / (GRAVITY * tan_bank)
         # Height loss to the center of a neighbouring cell, whatever the course.
-        center_slope = -excess_power(excess_table, 0.0, min_speed, start.up, aircraft) / max(
-            1.0, 0.95 * min_speed - wind
-        )
+        sink = -excess_power(excess_table, 0.0, min_speed, start.up, aircraft)
+        center_slope = sink / max(1.0, 0.95 * min_speed - wind)
         for turn_sign in (-1.0, 1.0):
             yaw = math.atan2(air_east, air_north)
             state.east = start.east + ENGINE_FAILURE_REACTION_S * start.velocity_east

@@ -230,10 +230,9 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     slopes = glide_slopes(world.aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
 
     def search_from_cells(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        glide_altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
-        return *glide_altitudes_left(
-            rows, glide_altitudes, world.aircraft, environment, airspeed, bank
-        ), glide_altitudes.min_altitude
+        glides = search_glide_altitudes(grid, cells, slopes, max_altitude)
+        result = glide_altitudes_left(rows, glides, world.aircraft, environment, airspeed, bank)
+        return *result, glides.min_altitude
 
     site_results = [search_from_cells(np.array([grid.cell_at(site.east, site.north)])) for site in sites]
     altitudes_left = [site_result[0] for site_result in site_results]
@@ -242,21 +241,13 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     is_known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     glides = []
     for k, row in enumerate(rows):
-        site_altitudes_left = tuple(float(altitudes[k]) for altitudes in altitudes_left)
+        site_altitudes = tuple(float(altitudes[k]) for altitudes in altitudes_left)
+        flat_altitude = float(flat_altitudes_left[k])
         flat_position = cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NO_POSITION
         start = (float(row["east"]), float(row["north"]), float(row["up"]))
-        reach = _best_reach(site_altitudes_left, float(flat_altitudes_left[k])) if is_known[k] else "unknown"
-        glides.append(
-            Glide(
-                float(starts.time[k]),
-                start,
-                own_returns[k],
-                site_altitudes_left,
-                float(flat_altitudes_left[k]),
-                flat_position,
-                reach,
-            )
-        )
+        reach = _best_reach(site_altitudes, flat_altitude) if is_known[k] else "unknown"
+        time, own_return = float(starts.time[k]), own_returns[k]
+        glides.append(Glide(time, start, own_return, site_altitudes, flat_altitude, flat_position, reach))
     site_min_altitudes = np.minimum.reduce([site_result[2] for site_result in site_results])
     return Glides(
         tuple(glides),

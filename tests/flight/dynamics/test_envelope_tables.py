@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -10,9 +11,12 @@ import numpy as np
 import pytest
 
 import flight.dynamics.envelope_tables
-from aircraft.catalog import load_aircraft, model_hash
+from aircraft.catalog import load_aircraft, model_hash, read_aircraft
 from aircraft.envelope import Envelope
-from flight.dynamics.envelope_tables import cache_file, load_envelope
+from flight.dynamics.envelope_tables import _level_speed_range, cache_file, compute_tables, load_envelope
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import Trim
+from world.errors import FlightError
 
 AEROSONDE = load_aircraft("aerosonde")
 
@@ -201,3 +205,39 @@ def test_unwritable_cache_is_left_alone(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(flight.dynamics.envelope_tables, "user_cache_dir", lambda name: str(tmp_path / "file" / name))
     monkeypatch.setattr(flight.dynamics.envelope_tables, "compute_tables", lambda *_: tables)
     _assert_equal(envelope, load_envelope(AEROSONDE))
+
+
+def level_trim(airspeed: float) -> Trim:
+    return Trim(airspeed, 0.0, *(0.0,) * 6, throttle=0.5)
+
+
+@pytest.mark.parametrize("missed", [level_trim(12.0), None])
+def test_a_search_that_misses_the_range_of_level_flight_starts_again_inside_it(
+    missed: Trim | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A search for the fastest flight that ends at 12 m/s, or nowhere, although the grid has level flight at 28 m/s."""
+    for name, first, again in (("fastest", missed, level_trim(34.0)), ("slowest", None, level_trim(9.0))):
+        found = {False: first, True: again}
+        monkeypatch.setattr(
+            flight.dynamics.envelope_tables, name, lambda _fdm, _amsl, near=None, found=found: found[near is not None]
+        )
+    assert _level_speed_range(Fdm(AEROSONDE), 0.0, [level_trim(28.0), level_trim(12.0)]) == (9.0, 34.0)
+
+
+def test_without_a_search_that_succeeds_the_grid_states_the_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("fastest", "slowest"):
+        monkeypatch.setattr(flight.dynamics.envelope_tables, name, lambda *_: None)
+    assert _level_speed_range(Fdm(AEROSONDE), 0.0, [level_trim(28.0), level_trim(12.0)]) == (12.0, 28.0)
+    assert all(math.isnan(speed) for speed in _level_speed_range(Fdm(AEROSONDE), 0.0, []))
+
+
+@pytest.mark.parametrize("name", ["elevator", "throttle"])
+def test_a_command_that_moves_nothing_is_the_stated_reason(name: str, tmp_path: Path) -> None:
+    aircraft = read_aircraft(Path(shutil.copytree(AEROSONDE.folder, tmp_path / "aerosonde")))
+    command = {"elevator": "command/elevator-rad", "throttle": "command/throttle-norm"}[name]
+    text = aircraft.model_file.read_text()
+    assert text.count(f"<input> {command} </input>") == 1
+    aircraft.model_file.write_text(text.replace(f"<input> {command} </input>", "<input> command/rudder-rad </input>"))
+    with pytest.raises(FlightError, match=f"{command}, the {name}'s command, moves nothing: no force") as caught:
+        compute_tables(aircraft, False)
+    assert str(caught.value).startswith(f"{aircraft.model_file}: ")

@@ -72,6 +72,11 @@ def test_the_folder_of_an_old_log_has_its_speeds_and_its_bank() -> None:
     assert "TRIM_ARSPD_CM" not in made["ardupilot.parm"]
 
 
+def test_a_log_without_parameters_flies_with_those_of_the_base() -> None:
+    """A table of columns has no parameters; an empty file would be refused by every command that flies."""
+    assert files(flown({}))["ardupilot.parm"] == (BASE.folder / "ardupilot.parm").read_text(encoding="utf-8")
+
+
 def test_no_mission_is_made_of_a_log_that_does_not_say_where_it_flew() -> None:
     assert "identify.waypoints" not in files(flown(PARAMETERS))
 

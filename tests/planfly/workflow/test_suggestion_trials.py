@@ -12,6 +12,7 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.places import Change, Place, Suggestion
 from logs.verdict.verdict import Verdict
 from planfly.workflow import suggestion_trials
+from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.mission_context import MissionContext
 from planfly.workflow.suggestion_trials import (
     MAX_TRIAL_FLIGHTS,
@@ -131,3 +132,5 @@ def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
     assert after[first.rule, first.place] == first.suggestions[:1]
     for one in SuggestionTrials(context, judged).find_passing():
         assert is_improved(judged.verdict, context.judge(one.setup.mission).verdict, one.finding)
+        # As a reader applies it, who knows nothing of the smaller steps that were tried before.
+        assert one.setup.mission.items == apply_suggestion(context, judged, one.finding, one.suggestion).items

@@ -14,7 +14,7 @@ from planner.seeding.grids import (
     COARSE_GROWTH_STEPS,
     COARSE_STEP_M,
     KILL_COST,
-    MAX_LATERAL_CELLS,
+    MAX_SIDE,
     OBSTACLE,
     ROUTE_CELL,
     Grid,
@@ -200,7 +200,7 @@ def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
     out = np.empty(columns)
     distance_to_goal(columns, home, left, step, 1.0, out)
     for y in range(columns):
-        ways = itertools.product(range(-MAX_LATERAL_CELLS, MAX_LATERAL_CELLS + 1), repeat=left)
+        ways = itertools.product(range(-MAX_SIDE, MAX_SIDE + 1), repeat=left)
         lengths = [sum(step * math.hypot(1.0, side) for side in way) for way in ways if y + sum(way) == home]
         assert out[y] == pytest.approx(min(lengths, default=math.inf)), y
 
@@ -255,7 +255,7 @@ def way_cost(problem: Problem, points: Floats, floor: float) -> float:
     total = 0.0
     for before, after in itertools.pairwise(points):
         run = math.hypot(*(after - before)[:2])
-        if abs(after[1] - before[1]) > (MAX_LATERAL_CELLS + 1e-9) * step or abs(after[2] - before[2]) > most * run:
+        if abs(after[1] - before[1]) > (MAX_SIDE + 1e-9) * step or abs(after[2] - before[2]) > most * run:
             return math.inf
         if after[2] < floor and after is not points[-1]:
             return math.inf
@@ -284,7 +284,7 @@ def test_route_is_the_cheapest_of_all(plain: Problem, stages: int, aside: int) -
     for inner in itertools.product(cells, repeat=stages - 1):
         ends = [(0.0, data.start[2])], [(0.0, data.destination[2])]
         points = np.column_stack([along, np.array([*ends[0], *inner, *ends[1]])])
-        if np.abs(np.diff(points[:, 1])).max() <= 1.01 * MAX_LATERAL_CELLS * step:
+        if np.abs(np.diff(points[:, 1])).max() <= 1.01 * MAX_SIDE * step:
             costs.append(way_cost(plain, points, floor))
     assert way_cost(plain, route.points, floor) == pytest.approx(route.cost, rel=1e-9)
     assert route.cost == pytest.approx(min(costs), rel=1e-9)

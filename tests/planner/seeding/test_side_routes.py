@@ -13,7 +13,7 @@ from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding import side_routes as side_routes_module
 from planner.seeding.grids import (
     KILL_COST,
-    MAX_LATERAL_CELLS,
+    MAX_SIDE,
     Grid,
     cheapest_route,
     find_obstacles,
@@ -73,7 +73,7 @@ def all_ways(data: ProblemArrays) -> list[tuple[float, tuple[tuple[int, int], ..
             (total + dear[to] * math.hypot(step, step * (to[0] - way[-1][0]), 300.0 * (to[1] - way[-1][1])), (*way, to))
             for total, way in ways
             for to in (places if stage < GRID.stages else [end])
-            if abs(to[0] - way[-1][0]) <= MAX_LATERAL_CELLS
+            if abs(to[0] - way[-1][0]) <= MAX_SIDE
         ]
     return ways
 

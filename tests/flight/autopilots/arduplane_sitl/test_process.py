@@ -71,6 +71,11 @@ def test_a_persons_of_their_hardware_are_left_out(name: str) -> None:
     assert (found.changed, found.unused) == ({}, (name,))
 
 
+def test_a_program_flies_without_an_airspeed_sensor_where_the_file_says_so() -> None:
+    given = [autopilot_parameters(setup_at(), AEROSONDE, SERVOS, own).given for own in ({}, {"ARSPD_USE": 0.0})]
+    assert [values["ARSPD_USE"] for values in given] == [1.0, 0.0]
+
+
 def test_a_persons_file_is_read_by_present_names_and_units(tmp_path: Path) -> None:
     file = tmp_path / "mine.parm"
     file.write_text("LIM_ROLL_CD 3500\nTRIM_ARSPD_CM 2400\nRLL_RATE_P,0.2\nSERVO3_MAX 1900\n", encoding="utf-8")

@@ -72,6 +72,13 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
             '"ve", unit = "m/s", sign = -1',
             "velocity_east: ve runs against the change of",
         ),
+        ('"r", unit = "deg/s"', '"ail", unit = "deg/s"', "yaw_rate: ail does not follow the change of .* check column"),
+        ('"tas", unit = "m/s"', '"tas", unit = "m/s", scale = 0', "airspeed: tas is 0 m/s in flight: expected more"),
+        (
+            '"tas", unit = "m/s"',
+            '"tas", unit = "m/s", scale = 1.944',
+            r"airspeed: tas is 1\.9. times the airspeed",
+        ),
         ('"thr", unit = "%"', '"thr", unit = "%", sign = -1, offset = -100', "throttle: thr runs against the current"),
         ('"thr", unit = "%"', '"thr", unit = "%", scale = 0', "throttle: thr stays at 0 .* current goes from 4"),
     ],

@@ -15,10 +15,12 @@ from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
+from logs.verdict.findings import make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.energy import air_angle, predicted_energy
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
+from logs.verdict.suggestions import suggest_using_less_energy
 from tests.logs.verdict.judging import failing, judge, of
 from tests.synthetic import bank_radius, fly_path, make_scenario, make_setup
 from world.scenario import Scenario
@@ -90,6 +92,17 @@ def test_a_battery_with_less_than_its_reserve_left_fails(setup: FlightSetup) -> 
     verdict = judge(small, fly_path(small))
     assert failing(verdict) == {("energy", FLIGHT)}
     assert of(verdict, "energy").limit == pytest.approx(24.0)
+
+
+@pytest.mark.parametrize(("flown", "ratio"), [(12.0, 1.25), (9.9, 1.04), (12.5, 1.57)])
+def test_a_flight_that_ends_with_an_empty_battery_needs_what_is_predicted(flown: float, ratio: float) -> None:
+    """The battery has 12.5 Wh, and 9.6 Wh are the limit; only an empty battery leaves the prediction of 15 Wh."""
+    finding = make_finding(
+        "energy", FLIGHT, ok=False, reason="", planned=15.0, flown=flown, limit=9.6, margin=9.6 - flown
+    )
+    requirements = route_requirements(replace(real_setup(), battery=12.5))
+    [[_], [battery]] = suggest_using_less_energy(requirements, None, finding)
+    assert (battery.what, battery.wanted) == ("battery", ratio)
 
 
 def test_a_guessed_battery_is_not_judged() -> None:
