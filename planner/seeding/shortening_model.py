@@ -510,18 +510,10 @@ def _add_turns(
         for axis, component in ((0, dx / horizontal_length), (1, dy / horizontal_length)):
             slopes[1, axis] = -(1.0 - SETTLING_FRACTION) * component
             slopes[2, axis] = (1.0 - SETTLING_FRACTION) * component
-        _add_turn_derivatives(
-            before_derivatives[i],
-            after_derivatives[i],
-            -0.5 * active.after[i] * (1.0 + begin_tangent * begin_tangent),
-            slopes[:3],
-        )
-        _add_turn_derivatives(
-            before_derivatives[i + 1],
-            after_derivatives[i + 1],
-            -0.5 * active.before[i + 1] * (1.0 + end_tangent * end_tangent),
-            slopes[1:],
-        )
+        begin_slope = -0.5 * active.after[i] * (1.0 + begin_tangent * begin_tangent)
+        _add_turn_derivatives(before_derivatives[i], after_derivatives[i], begin_slope, slopes[:3])
+        end_slope = -0.5 * active.before[i + 1] * (1.0 + end_tangent * end_tangent)
+        _add_turn_derivatives(before_derivatives[i + 1], after_derivatives[i + 1], end_slope, slopes[1:])
         remaining_length = (1.0 - SETTLING_FRACTION) * horizontal_length - needed_length
         values[number] = remaining_length - min(SETTLING_LENGTH_M, needed_length) - active.turn_margin
         merit += _add_constraint(values[number], i - 1, 4, multipliers[number], penalty, model)
