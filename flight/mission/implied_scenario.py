@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flight.mission.items import Mission
-from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
+from flight.mission.itinerary import Itinerary, Position, RoutePoint, make_itinerary
 from flight.mission.placing import HIGHEST, PlacedMission, on_map, place_stops, rally_stops
 from world.arrays import Floats
 from world.errors import MissionError, TerrainError
@@ -65,7 +65,7 @@ def implied_scenario(
     area, flown_box = _area_and_flown_box(mission, itinerary, origin)
     terrain, table, area = _load_terrain(terrain_path, origin, area, flown_box)
     placed_mission = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
-    max_altitude = max(float(placed_stop.position[2]) for placed_stop in placed_mission.stops)
+    max_altitude = max(placed_stop.place[2] for placed_stop in placed_mission.stops)
     if terrain is not None:
         max_altitude = max(max_altitude, float(np.nanmax(terrain.heights)))
     spec = ScenarioFile(
@@ -76,14 +76,14 @@ def implied_scenario(
         area=AreaTable(
             east_m=area[0].tolist(), north_m=area[1].tolist(), ceiling_amsl_m=min(max_altitude + AREA_BUFFER, HIGHEST)
         ),
-        start=_raised_above_ground(placed_mission.stops[0].position, terrain),
-        destination=_raised_above_ground(placed_mission.stops[-1].position, terrain),
+        start=_raised_above_ground(placed_mission.stops[0].place, terrain),
+        destination=_raised_above_ground(placed_mission.stops[-1].place, terrain),
         flight=flight,
     )
     return ImpliedScenario(from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
 
 
-def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOrigin:
+def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin:
     """Return the map origin of a mission without a scenario: home, or the first position of the mission.
 
     stops: stops of the mission's itinerary.
@@ -155,8 +155,9 @@ def _position_text(lats: Floats, lons: Floats) -> str:
     return f"latitude {lats.min():.4f}..{lats.max():.4f}, longitude {lons.min():.4f}..{lons.max():.4f}"
 
 
-def _raised_above_ground(point: Floats, terrain: Terrain | None) -> EndTable:
-    east, north, amsl = (float(value) for value in point)
+def _raised_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
+    """Return a position, raised to 1 m above the ground if it is lower."""
+    east, north, amsl = position
     if terrain is not None:
         amsl = max(amsl, float(terrain.height(east, north)) + 1.0)
     return EndTable(east_m=east, north_m=north, amsl_m=amsl)

@@ -32,6 +32,8 @@ from flight.mission.items import (
 )
 from world.errors import MissionError
 
+# East, north, up, m.
+Position = tuple[float, float, float]
 # Maximum number of stops of an unrolled mission.
 MAX_STOPS = 10_000
 # Maximum number of items passed while a mission is unrolled.
@@ -160,8 +162,11 @@ class Gate(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class ItineraryStop:
-    """A position to fly to.
+class RoutePoint:
+    """A position to fly to: a stop of a mission's itinerary, and each waypoint of the route that belongs to the stop.
+
+    The position is None until `flight.mission.placing` has placed the stop on the map; a loiter then becomes several
+    points.
 
     item: seq of the mission item, -1 for a stop without an item.
     command: MAV_CMD of the item.
@@ -175,6 +180,9 @@ class ItineraryStop:
     min_ground_speed: ground speed for which ArduPlane raises its airspeed on that leg, m/s; 0 or less for none, NaN for
         the autopilot's default.
     home_up: altitude of home on that leg, m AMSL; NaN if the mission's home does not state it.
+    stop: number of the stop in flying order; all points of a loiter have the same.
+    position: east, north, up, m AMSL, or None.
+    arc: radius of the turn there, m, 0 for the radius at the bank limit.
     """
 
     item: int
@@ -190,6 +198,20 @@ class ItineraryStop:
     gates: tuple[Gate, ...] = ()
     min_ground_speed: float = math.nan
     home_up: float = math.nan
+    stop: int = -1
+    position: Position | None = None
+    arc: float = 0.0
+
+    def at(self, position: Position, arc: float = 0.0) -> "RoutePoint":
+        """Return the point at a position on the map, with the radius of the turn there, m."""
+        return replace(self, position=position, arc=arc)
+
+    @property
+    def place(self) -> Position:
+        """Position on the map; raises ValueError for a stop that has not been placed."""
+        if self.position is None:
+            raise ValueError(f"item {self.item} is not placed on the map")
+        return self.position
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,13 +230,13 @@ class Itinerary:
     passes_exhausted_jump: True if a jump is passed again after its last repeat, where ArduPlane 4.7 takes it again.
     """
 
-    stops: tuple[ItineraryStop, ...]
+    stops: tuple[RoutePoint, ...]
     home: Home
     has_home: bool
     takeoff: MissionItem | None
     notes: tuple[str, ...]
     endless: int = -1
-    landing: ItineraryStop | None = None
+    landing: RoutePoint | None = None
     px4_notes: tuple[str, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
     px4_open_items: tuple[OpenItem, ...] = ()
@@ -433,11 +455,11 @@ class _ItineraryBuilder:
         # Dictionaries as ordered sets.
         self.open_items: dict[OpenItem, None] = {}
         self.px4_open_items: dict[OpenItem, None] = {}
-        self.stops: list[ItineraryStop] = []
+        self.stops: list[RoutePoint] = []
         self.takeoff: MissionItem | None = None
         self.gates: list[Gate] = []
         self.has_ended = False
-        self.landing: ItineraryStop | None = None
+        self.landing: RoutePoint | None = None
         self.has_home = mission.home is not None
         self.first_home = self.home = mission.home or _first_position(mission)
 
@@ -552,12 +574,12 @@ class _ItineraryBuilder:
             self._note_not_flown(item, as_px4=False)
             self._note_not_flown(item, as_px4=True)
 
-    def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
+    def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> RoutePoint:
         lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, loiter_of(item), item.alt, item.frame
         gates, self.gates = tuple(self.gates), []
         if self.home is not self.first_home and frame in OVER_HOME:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
-        return ItineraryStop(
+        return RoutePoint(
             *(item.seq, item.command, lat, lon, alt, frame),
             *(self.airspeed, acceptance, loiter, self.px4_airspeed, gates),
             min_ground_speed=self.min_ground_speed,

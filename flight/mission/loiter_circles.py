@@ -12,8 +12,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from flight.mission.items import TAKEOFFS, Notes
-from flight.mission.itinerary import MAX_STOPS, ItineraryStop, Loiter
-from world.arrays import Floats
+from flight.mission.itinerary import MAX_STOPS, Loiter, RoutePoint
 from world.errors import MissionError
 
 # Maximum course change at a corner of the polygon, rad: the corners are then 8 % of the radius outside the circle.
@@ -106,30 +105,6 @@ class LoiterRules:
 USUAL_LOITERS = LoiterRules()
 
 
-class PlacedStop(NamedTuple):
-    """A stop of the itinerary on the map.
-
-    position: (3,) east, north, up, m.
-    """
-
-    stop: ItineraryStop
-    position: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class RoutePoint:
-    """One waypoint of a route.
-
-    stop: its stop of the itinerary.
-    position: east, north, up, m.
-    arc: radius of the turn there, m, 0 for the radius at the bank limit.
-    """
-
-    stop: ItineraryStop
-    position: tuple[float, float, float]
-    arc: float = 0.0
-
-
 class UnjoinedStop(NamedTuple):
     """A stop that is not at its stated position in the route, because no tangent joins it to a circle.
 
@@ -150,7 +125,7 @@ class Node:
     turn: radius of the circle, m, positive to the right, 0 for a point.
     """
 
-    stop: ItineraryStop
+    stop: RoutePoint
     east: float
     north: float
     up: float
@@ -163,7 +138,7 @@ class Node:
 
 def lay_out_waypoints(
     source: str,
-    stops: list[PlacedStop],
+    stops: list[RoutePoint],
     notes: Notes,
     own_radius: OwnRadius,
     slopes: SpiralSlopes,
@@ -185,22 +160,20 @@ def lay_out_waypoints(
     nodes = _make_nodes(source, stops, notes, own_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
-    up = float(stops[0].position[2])
+    up = stops[0].place[2]
     for index, node in enumerate(nodes):
         if node.turn == 0.0:
             up = node.up
-            points.append(RoutePoint(node.stop, (node.east, node.north, up)))
+            points.append(node.stop.at((node.east, node.north, up)))
             continue
         entry_course = courses[index - 1] if index else (courses[index] if index < len(courses) else 0.0)
         exit_course = courses[index] if index < len(courses) else None
-        leg_length = (
-            math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
-        )
+        leg_length = math.hypot(node.east - points[-1].place[0], node.north - points[-1].place[1]) if points else 0.0
         min_radius = own_radius(node.stop.airspeed, node.up) if rules.exits_on_heading else 0.0
         corners = _corners_around(source, node, entry_course, exit_course, up, leg_length, min_radius, slopes, rules)
         if not index:
-            corners.insert(0, RoutePoint(node.stop, (*on_rim(node, entry_course), corners[0].position[2])))
-        up = corners[-1].position[2]
+            corners.insert(0, node.stop.at((*on_rim(node, entry_course), corners[0].place[2])))
+        up = corners[-1].place[2]
         points += corners
         if len(points) > MAX_STOPS:
             item = f"item {node.stop.item}"
@@ -211,7 +184,7 @@ def lay_out_waypoints(
 
 def _make_nodes(
     source: str,
-    stops: list[PlacedStop],
+    stops: list[RoutePoint],
     notes: Notes,
     own_radius: OwnRadius,
     rules: LoiterRules,
@@ -224,10 +197,10 @@ def _make_nodes(
     If the take-off is inside the first circle, the flight starts on that circle, without the take-off.
     """
     nodes: list[Node] = []
-    for stop, (east, north, up) in stops:
-        node = Node(stop, float(east), float(north), float(up))
+    for stop in stops:
+        node = Node(stop, *stop.place)
         if stop.loiter is not None:
-            node = replace(node, turn=_signed_radius(source, stop, stop.loiter, float(up), notes, own_radius, rules))
+            node = replace(node, turn=_signed_radius(source, stop, stop.loiter, node.up, notes, own_radius, rules))
             while (
                 nodes
                 and nodes[-1].turn == 0.0
@@ -267,13 +240,13 @@ def _make_nodes(
     return nodes
 
 
-def _note_omitted_stop(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
+def _note_omitted_stop(stop: RoutePoint, circle: RoutePoint, notes: Notes) -> None:
     text = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
     notes.add(text if stop.item >= 0 else f"home {text}", stop.item if stop.item >= 0 else None)
 
 
 def _signed_radius(
-    source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius, rules: LoiterRules
+    source: str, stop: RoutePoint, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius, rules: LoiterRules
 ) -> float:
     """Return the signed radius of a loiter, m."""
     radius, stated_radius = rules.radius_of(loiter), abs(loiter.radius)
@@ -334,7 +307,7 @@ def circle_corners(node: Node, entry_course: float, sweep: float) -> list[tuple[
     entry_course: course at which the circle is joined, rad.
     sweep: angle that is flown around it, rad.
 
-    >>> point = ItineraryStop(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
+    >>> point = RoutePoint(1, 16, 0.0, 0.0, 0.0, 0, 25.0)
     >>> [(round(e), round(n)) for e, n in circle_corners(Node(point, 100.0, 0.0, 0.0, 100.0), 0.0, math.pi / 2.0)]
     [(0, 41), (59, 100)]
     """
@@ -408,9 +381,7 @@ def _corners_around(
     points = []
     for index, (east, north) in enumerate(corners):
         fraction = 1.0 if len(corners) == 1 else index / (len(corners) - 1)
-        points.append(
-            RoutePoint(node.stop, (east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius)
-        )
+        points.append(node.stop.at((east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius))
     if exit_course is None and sweep > 0.0:
-        points.append(RoutePoint(node.stop, (*on_rim(node, entry_course + turn_sign * sweep), node.up)))
+        points.append(node.stop.at((*on_rim(node, entry_course + turn_sign * sweep), node.up)))
     return points

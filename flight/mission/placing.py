@@ -21,14 +21,14 @@ from flight.mission.items import (
 )
 from flight.mission.itinerary import (
     Itinerary,
-    ItineraryStop,
     Loiter,
     OpenItem,
+    Position,
+    RoutePoint,
     loiter_of,
     make_itinerary,
     pass_by_distance,
 )
-from flight.mission.loiter_circles import PlacedStop
 from flight.mission.return_path import LandingStart, ReturnPoint
 from world.arrays import Floats
 from world.errors import MissionError
@@ -60,7 +60,7 @@ class PlacedLanding(NamedTuple):
     """
 
     start: LandingStart
-    stops: tuple[PlacedStop, ...]
+    stops: tuple[RoutePoint, ...]
     ground: float
     notes: tuple[str, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
@@ -84,7 +84,7 @@ class PlacedMission:
     mission: Mission
     origin: GeoOrigin
     itinerary: Itinerary
-    stops: tuple[PlacedStop, ...]
+    stops: tuple[RoutePoint, ...]
     notes: tuple[str, ...]
     takeoff_ground: float
     landing_ground: float
@@ -270,7 +270,7 @@ def _is_navigation_target(item: MissionItem) -> bool:
 
 
 def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> tuple[float, float, float]:
-    stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
+    stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
     east, north = on_map(heights.source, (stop,), origin)[0].tolist()
     return east, north, heights.amsl(stop, east, north, heights.home_amsl())
 
@@ -297,13 +297,13 @@ def landing_positions(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, f
     positions = []
     for item in mission.items:
         if item.command in LANDINGS and item.has_position:
-            stop = ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
+            stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
             east, north = on_map(mission.source, (stop,), origin)[0].tolist()
             positions.append((item.seq, float(east), float(north)))
     return tuple(positions)
 
 
-def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
+def rally_stops(mission: Mission) -> tuple[RoutePoint, ...]:
     """Return a mission's rally points as stops; ignore a point at 0, 0, as ArduPlane does.
 
     >>> from flight.mission.items import Frame, MissionItem
@@ -312,7 +312,7 @@ def rally_stops(mission: Mission) -> tuple[ItineraryStop, ...]:
     [(36.5, 90.0)]
     """
     return tuple(
-        ItineraryStop(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
+        RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
         for item in mission.rally
         if item.has_position
     )
@@ -341,35 +341,32 @@ def _place_return_points(
 
 def _place_stops(
     source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
-) -> list[PlacedStop]:
+) -> list[RoutePoint]:
     """Return the stops on the map; successive stops at the same position are merged."""
     notes = heights.notes
     map_positions = on_map(source, itinerary.stops, origin)
-    placed_stops: list[PlacedStop] = []
-    for stop, (east, north) in zip(itinerary.stops, map_positions, strict=True):
-        previous_altitude = float(placed_stops[-1].position[2]) if placed_stops else math.nan
-        placed_stop = PlacedStop(
-            stop, np.array([east, north, heights.amsl(stop, float(east), float(north), previous_altitude)])
-        )
-        is_loiter_or_return = stop.loiter is not None or bool(placed_stops and placed_stops[-1].stop.loiter is not None)
+    placed_stops: list[RoutePoint] = []
+    for stop, (east, north) in zip(itinerary.stops, map_positions.tolist(), strict=True):
+        previous_altitude = placed_stops[-1].place[2] if placed_stops else math.nan
+        placed_stop = stop.at((east, north, heights.amsl(stop, east, north, previous_altitude)))
+        is_loiter_or_return = stop.loiter is not None or bool(placed_stops and placed_stops[-1].loiter is not None)
         is_loiter_or_return = is_loiter_or_return or stop.command == Command.NAV_RETURN_TO_LAUNCH
         if (
             placed_stops
             and not is_loiter_or_return
-            and math.dist(placed_stops[-1].position[:2], placed_stop.position[:2]) < SAME_PLACE
+            and math.dist(placed_stops[-1].place[:2], placed_stop.place[:2]) < SAME_PLACE
         ):
             if vertical_legs and _is_vertical(placed_stops[-1], placed_stop):
-                placed_stops.append(PlacedStop(stop, _offset_vertical_leg(placed_stops, placed_stop.position)))
+                placed_stops.append(stop.at(_offset_vertical_leg(placed_stops, placed_stop.place[2])))
                 continue
-            placed_stops[-1] = PlacedStop(
-                _merge_stops(source, placed_stops[-1], placed_stop, notes), placed_stops[-1].position
-            )
+            merged_stop = _merge_stops(source, placed_stops[-1], placed_stop, notes)
+            placed_stops[-1] = merged_stop.at(placed_stops[-1].place)
         else:
             placed_stops.append(placed_stop)
     return placed_stops
 
 
-def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> Floats:
+def on_map(source: str, stops: tuple[RoutePoint, ...], origin: GeoOrigin) -> Floats:
     """Return east and north of each stop, (n, 2) m.
 
     Raises MissionError, which names the item, if a stop is beyond the maximum extent of the map.
@@ -401,7 +398,7 @@ class _Heights:
         self.home = home
         self._home_amsl: float | None = None
 
-    def amsl(self, stop: ItineraryStop, east: float, north: float, previous_altitude: float) -> float:
+    def amsl(self, stop: RoutePoint, east: float, north: float, previous_altitude: float) -> float:
         """Return the altitude of a stop, m AMSL.
 
         previous_altitude: altitude of the previous stop, m AMSL; NaN for the first stop.
@@ -422,7 +419,7 @@ class _Heights:
             raise MissionError.at(self.source, _stop_name(stop), altitude, allowed, shown=f"{altitude:.1f} m AMSL")
         return altitude
 
-    def _ground_below(self, stop: ItineraryStop, east: float, north: float) -> float:
+    def _ground_below(self, stop: RoutePoint, east: float, north: float) -> float:
         terrain = self.terrain
         ground = math.nan if terrain is None else float(terrain.height(east, north))
         if math.isnan(ground):
@@ -487,46 +484,43 @@ class _Heights:
         return ground
 
 
-def _is_vertical(previous: PlacedStop, new: PlacedStop) -> bool:
+def _is_vertical(previous: RoutePoint, new: RoutePoint) -> bool:
     """Return True if a stop is straight above or below the previous stop, and is not a take-off."""
-    return abs(float(new.position[2] - previous.position[2])) >= SAME_PLACE and new.stop.command not in TAKEOFFS
+    return abs(new.place[2] - previous.place[2]) >= SAME_PLACE and new.command not in TAKEOFFS
 
 
-def _offset_vertical_leg(stops: list[PlacedStop], point: Floats) -> Floats:
-    """Return the last position, moved by `VERTICAL_STEP` m along its course and to the altitude of ``point``.
+def _offset_vertical_leg(stops: list[RoutePoint], up: float) -> Position:
+    """Return the last position, moved by `VERTICAL_STEP` m along its course and to the altitude ``up``, m AMSL.
 
     Without a course the last position is moved to the east.
     """
     course = math.pi / 2.0
     if len(stops) > 1:
-        course = float(leg_courses(np.array([stops[-2].position, stops[-1].position]))[0])
-    east, north, _ = stops[-1].position
-    return np.array([east + VERTICAL_STEP * math.sin(course), north + VERTICAL_STEP * math.cos(course), point[2]])
+        course = float(leg_courses(np.array([stops[-2].place, stops[-1].place]))[0])
+    east, north, _ = stops[-1].place
+    return east + VERTICAL_STEP * math.sin(course), north + VERTICAL_STEP * math.cos(course), up
 
 
-def _merge_stops(source: str, previous: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
+def _merge_stops(source: str, previous: RoutePoint, new: RoutePoint, notes: Notes) -> RoutePoint:
     """Merge a stop with the previous stop at the same position, and return the merged stop."""
-    previous_stop, new_stop = previous.stop, new.stop
-    climb = float(new.position[2] - previous.position[2])
+    climb = new.place[2] - previous.place[2]
     if abs(climb) >= SAME_PLACE:
         direction = "above" if climb > 0.0 else "below"
-        if new_stop.command not in TAKEOFFS:
+        if new.command not in TAKEOFFS:
             raise MissionError(
-                f"{source}: {_stop_name(new_stop)}: {abs(climb):.1f} m straight {direction}"
-                f" {_stop_name(previous_stop)}:"
+                f"{source}: {_stop_name(new)}: {abs(climb):.1f} m straight {direction}"
+                f" {_stop_name(previous)}:"
                 " no fixed wing flies that; two places must be identical, or at least 1 m apart over the ground",
                 file=source,
-                field=_stop_name(new_stop),
+                field=_stop_name(new),
             )
-        notes.add(
-            f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", new_stop.item
-        )
+        notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", new.item)
     else:
-        notes.add(f"at the place of {_stop_name(previous_stop)}: merged with it", new_stop.item)
-    return previous_stop if previous_stop.item >= 0 else new_stop
+        notes.add(f"at the place of {_stop_name(previous)}: merged with it", new.item)
+    return previous if previous.item >= 0 else new
 
 
-def _stop_name(stop: ItineraryStop) -> str:
+def _stop_name(stop: RoutePoint) -> str:
     if stop.command == Command.NAV_RALLY_POINT:
         return f"rally point {stop.item + 1}"
     return f"item {stop.item}" if stop.item >= 0 else "home"

@@ -14,12 +14,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from flight.mission.itinerary import UNLIMITED, ItineraryStop
-from flight.mission.loiter_circles import CORNER, Node, RoutePoint, circle_corners, is_joined, on_rim, tangent_course
+from flight.mission.itinerary import UNLIMITED, Position, RoutePoint
+from flight.mission.loiter_circles import CORNER, Node, circle_corners, is_joined, on_rim, tangent_course
 from world.geometry import wrap
-
-# East, north, up, m.
-Position = tuple[float, float, float]
 
 
 class ReturnPoint(NamedTuple):
@@ -287,7 +284,7 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
 
 def rtl_waypoints(
     previous_points: Sequence[RoutePoint],
-    stop: ItineraryStop,
+    stop: RoutePoint,
     target: ReturnTarget,
     rules: ReturnRules,
     ability: ReturnAbility,
@@ -305,10 +302,8 @@ def rtl_waypoints(
     which then lasts `flight.mission.itinerary.UNLIMITED` s.  A climb before the turn does not depend on the altitude of
     the target.
     """
-    start = previous_points[-1].position
-    course = (
-        _course(previous_points[-2].position, start) if len(previous_points) > 1 else _course(start, target.position)
-    )
+    start = previous_points[-1].place
+    course = _course(previous_points[-2].place, start) if len(previous_points) > 1 else _course(start, target.position)
     radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
     circle = Node(stop, *target.position, radius)
     dive = min(ability.dive, rules.sink / ability.airspeed)
@@ -503,7 +498,7 @@ class _ReturnBuilder:
             target_altitude = self._circle.up if on_circle else self._slope_altitude(east, north)
             altitude = max(min(altitude, target_altitude), altitude - self._dive_slope * distance)
         self._position = (east, north, altitude)
-        self.points.append(RoutePoint(self._stop, self._position, arc))
+        self.points.append(self._stop.at(self._position, arc))
 
     def _slope_altitude(self, east: float, north: float) -> float:
         """Return the altitude of the slope to the target at a point; for a step, the target's altitude."""

@@ -1,7 +1,7 @@
 """Lay out the route of a mission as the aircraft flies it, with waypoints, airspeeds and unrolled jumps."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, OVER_TERRAIN, PLACES, Command, Mission, Notes, command_name
-from flight.mission.itinerary import NEVER_REACHED, Itinerary, ItineraryStop, OpenItem, loiter_of
+from flight.mission.itinerary import NEVER_REACHED, Itinerary, OpenItem, RoutePoint, loiter_of
 from flight.mission.loiter_circles import (
     PLAIN_SLOPE,
     USUAL_LOITERS,
     LoiterRules,
     OwnRadius,
-    PlacedStop,
-    RoutePoint,
     SpiralSlopes,
     UnjoinedStop,
     lay_out_waypoints,
@@ -433,60 +431,60 @@ def route_through_stops(
     mission, notes = placed_mission.mission, Notes()
     return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
     all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else placed_mission.stops
-    placed_stops = [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in all_stops]
+    read = partial(_read_stops, default_airspeed, reads_as_px4)
+    placed_stops = read(all_stops, 0)
     return_stop = placed_stops.pop() if placed_mission.itinerary.returns else None
     direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
     if direct_landing is not None:
-        placed_stops += [_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in direct_landing.stops]
+        placed_stops += read(direct_landing.stops, len(all_stops))
     lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
     points, unjoined = lay_out(placed_stops)
     _note_circles(placed_mission.itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
     if return_stop is not None and direct_landing is None:
-        return_fields, landing = _append_return(placed_mission, return_stop.stop, points, return_rules, limits, notes)
+        return_fields, landing = _append_return(placed_mission, return_stop, points, return_rules, limits, notes)
         if landing is not None:
-            points += lay_out([_with_airspeed(stop, default_airspeed, reads_as_px4) for stop in landing.stops])[0]
+            points += lay_out(read(landing.stops, len(all_stops)))[0]
     _check_point_count(mission.source, len(points))
-    stops = [point.stop for point in points]
-    waypoints, arcs = np.array([point.position for point in points]), np.array([point.arc for point in points])
-    airspeed = np.array([stop.airspeed for stop in stops[1:]])
-    acceptance = np.minimum([stop.acceptance for stop in stops], acceptance_limit)
+    waypoints, arcs = np.array([point.place for point in points]), np.array([point.arc for point in points])
+    airspeed = np.array([point.airspeed for point in points[1:]])
+    acceptance = np.minimum([point.acceptance for point in points], acceptance_limit)
     is_missed = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
-    _note_cruise_speed(mission, default_airspeed, stops[1], notes)
+    _note_cruise_speed(mission, default_airspeed, points[1], notes)
     return Route(
         waypoints=waypoints,
         airspeed=airspeed,
         acceptance=acceptance,
         fly_over=(arcs == 0.0) & (fly_over | is_missed),
-        items=np.array([stop.item for stop in stops], dtype=np.int64),
-        started=_start_text(placed_mission.itinerary, stops[0], placed_mission.origin, waypoints),
+        items=np.array([point.item for point in points], dtype=np.int64),
+        started=_start_text(placed_mission.itinerary, points[0], placed_mission.origin, waypoints),
         notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),
         arcs=arcs,
-        stops=np.cumsum([False, *(a is not b for a, b in pairwise(stops))]),
-        straight_to=-1 if landing is None else [stop.item for stop in stops].index(landing.stops[0].stop.item),
+        stops=np.cumsum([False, *(a.stop != b.stop for a, b in pairwise(points))]),
+        straight_to=-1 if landing is None else [point.item for point in points].index(landing.stops[0].item),
         endless=placed_mission.itinerary.endless,
         takeoff_ground=placed_mission.takeoff_ground,
         landing_ground=placed_mission.landing_ground if landing is None else landing.ground,
-        **_columns_with_nan(stops, placed_mission.home_up),
+        **_columns_with_nan(points, placed_mission.home_up),
         unjoined=unjoined if loiter_rules.steers_to_center else (),  # An autopilot that flies on tangents omits these.
         open_items=_open_items(placed_mission.itinerary, landing, reads_as_px4),
         **return_fields,
     )
 
 
-def _columns_with_nan(stops: list[ItineraryStop], home_up: float) -> dict[str, Any]:
+def _columns_with_nan(points: list[RoutePoint], home_up: float) -> dict[str, Any]:
     """Return the columns of `ROUTE_COLUMNS_WITH_NAN`.
 
     home_up: altitude of home for a stop that states none, m AMSL.
     """
     return {
-        "above_ground": np.array([_height_above_ground(stop) for stop in stops]),
-        "min_ground_speed": np.array([stop.min_ground_speed for stop in stops]),
-        "home_up": np.array([home_up if math.isnan(stop.home_up) else stop.home_up for stop in stops]),
+        "above_ground": np.array([_height_above_ground(point) for point in points]),
+        "min_ground_speed": np.array([point.min_ground_speed for point in points]),
+        "home_up": np.array([home_up if math.isnan(point.home_up) else point.home_up for point in points]),
     }
 
 
-def _height_above_ground(stop: ItineraryStop) -> float:
+def _height_above_ground(stop: RoutePoint) -> float:
     """Return the height above ground held on the leg to a stop, m; NaN for a straight leg."""
     return stop.alt if stop.frame in OVER_TERRAIN and stop.command in PLACES else math.nan
 
@@ -514,13 +512,13 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
 
 
 def _lay_out_waypoints(
-    source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[PlacedStop]
+    source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[RoutePoint]
 ) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
     return lay_out_waypoints(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
 
 
 def _find_direct_landing(
-    placed_mission: PlacedMission, stops: list[PlacedStop], rules: ReturnRules, notes: Notes
+    placed_mission: PlacedMission, stops: list[RoutePoint], rules: ReturnRules, notes: Notes
 ) -> PlacedLanding | None:
     """Return the landing sequence to which the mission's RTL flies directly, or None.
 
@@ -528,7 +526,7 @@ def _find_direct_landing(
     """
     if not placed_mission.itinerary.returns or rules.lands != "straight" or not stops:
         return None
-    east, north, up = stops[-1].position.tolist()
+    east, north, up = stops[-1].place
     landing = _find_landing(placed_mission, (east, north, up), notes)
     if landing is None:
         return None
@@ -559,14 +557,14 @@ def _landing_choice_text(placed_mission: PlacedMission) -> str:
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
 
-def _note_circles(itinerary: Itinerary, placed_stops: list[PlacedStop], loiters: LoiterRules, notes: Notes) -> None:
+def _note_circles(itinerary: Itinerary, placed_stops: list[RoutePoint], loiters: LoiterRules, notes: Notes) -> None:
     """Note the parts of the autopilot's loiters that are not simulated.
 
     placed_stops: stops of the mission, without an RTL.
     """
-    final_stop = placed_stops[-1].stop
+    final_stop = placed_stops[-1]
     if loiters.unflown_note and (
-        itinerary.returns or any(placed_stop.stop.loiter is not None for placed_stop in placed_stops)
+        itinerary.returns or any(placed_stop.loiter is not None for placed_stop in placed_stops)
     ):
         notes.add(loiters.unflown_note)
     if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and final_stop.loiter is None:
@@ -577,7 +575,7 @@ def _note_circles(itinerary: Itinerary, placed_stops: list[PlacedStop], loiters:
 
 def _append_return(
     placed_mission: PlacedMission,
-    stop: ItineraryStop,
+    stop: RoutePoint,
     points: list[RoutePoint],
     rules: ReturnRules,
     limits: Limits | None,
@@ -588,7 +586,7 @@ def _append_return(
     The landing sequence is None if the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside
     the allowed range.
     """
-    source, start = placed_mission.mission.source, points[-1].position
+    source, start = placed_mission.mission.source, points[-1].place
     home, *rally = placed_mission.return_points
     target = choose_target(rules, start, home, rally)
     target_altitude = target.position[2]
@@ -629,7 +627,7 @@ def _append_return(
     return {"return_from": start_index, "return_to": circle}, landing
 
 
-def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[PlacedStop]:
+def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoint]:
     """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed.
 
     Each gate is placed where its plane cuts the leg, because an aircraft on the leg passes the gate there. The plane is
@@ -637,31 +635,28 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[PlacedSto
     """
     placed_stops = list(placed_mission.stops[:1])
     for next_stop in placed_mission.stops[1:]:
-        stop, previous, last_fraction = next_stop.stop, placed_stops[-1], 0.0
-        for index, gate in enumerate(stop.gates):
-            next_airspeed = stop.gates[index + 1].airspeed if index + 1 < len(stop.gates) else stop.px4_airspeed
+        previous, gates, last_fraction = placed_stops[-1], next_stop.gates, 0.0
+        for index, gate in enumerate(gates):
+            next_airspeed = gates[index + 1].airspeed if index + 1 < len(gates) else next_stop.px4_airspeed
             if gate.airspeed == next_airspeed or (math.isnan(gate.airspeed) and math.isnan(next_airspeed)):
                 continue
-            if not all(
-                leg_end.stop.loiter is None and leg_end.stop.command in PLACES for leg_end in (previous, next_stop)
-            ):
+            if not all(leg_end.loiter is None and leg_end.command in PLACES for leg_end in (previous, next_stop)):
                 text = "CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"
                 notes.add(text, gate.item)
                 continue
-            fraction = _gate_fraction(
-                previous.position, next_stop.position, to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg)
-            )
-            gate_position = previous.position + fraction * (next_stop.position - previous.position)
+            start, end = np.array(previous.place), np.array(next_stop.place)
+            fraction = _gate_fraction(start, end, to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg))
+            east, north, up = (start + fraction * (end - start)).tolist()
             is_apart = (
-                min(math.dist(gate_position[:2], leg_end.position[:2]) for leg_end in (placed_stops[-1], next_stop))
+                min(math.dist((east, north), leg_end.place[:2]) for leg_end in (placed_stops[-1], next_stop))
                 >= SAME_PLACE
             )
             if last_fraction < fraction < 1.0 and is_apart:
                 last_fraction = fraction
                 gate_stop = replace(
-                    stop, item=gate.item, command=int(Command.CONDITION_GATE), px4_airspeed=gate.airspeed, gates=()
+                    next_stop, item=gate.item, command=int(Command.CONDITION_GATE), px4_airspeed=gate.airspeed, gates=()
                 )
-                placed_stops.append(PlacedStop(gate_stop, gate_position))
+                placed_stops.append(gate_stop.at((east, north, up)))
         placed_stops.append(next_stop)
     return placed_stops
 
@@ -677,20 +672,25 @@ def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
     return 1.0 - float(gate_to_end @ gate_to_end) / length_along_normal if length_along_normal > 0.0 else 0.0
 
 
-def _with_airspeed(placed_stop: PlacedStop, default_airspeed: float, as_px4: bool) -> PlacedStop:
-    """Return a placed stop with the airspeed that the autopilot reads from the mission, or the default, m/s."""
-    stated_airspeed = placed_stop.stop.px4_airspeed if as_px4 else placed_stop.stop.airspeed
-    return PlacedStop(
-        replace(placed_stop.stop, airspeed=default_airspeed if math.isnan(stated_airspeed) else stated_airspeed),
-        placed_stop.position,
-    )
+def _read_stops(
+    default_airspeed: float, as_px4: bool, stops: Sequence[RoutePoint], first_number: int
+) -> list[RoutePoint]:
+    """Return placed stops, numbered, with the airspeed that the autopilot reads from the mission, or the default, m/s.
+
+    first_number: number of the first stop.
+    """
+    stated_airspeeds = [stop.px4_airspeed if as_px4 else stop.airspeed for stop in stops]
+    return [
+        replace(stop, stop=number, airspeed=default_airspeed if math.isnan(airspeed) else airspeed)
+        for number, (stop, airspeed) in enumerate(zip(stops, stated_airspeeds, strict=True), first_number)
+    ]
 
 
 # Relative difference beyond which a ground station's speed estimate is probably for another aircraft.
 FAR_SPEED = 0.2
 
 
-def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: ItineraryStop, notes: Notes) -> None:
+def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: RoutePoint, notes: Notes) -> None:
     """Note a cruiseSpeed other than the airspeed (m/s), if that is the airspeed to the first stop."""
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
@@ -739,7 +739,7 @@ def _make_spiral_slopes(limits: Limits | None) -> SpiralSlopes:
     return slopes
 
 
-def _start_text(itinerary: Itinerary, first_stop: ItineraryStop, origin: GeoOrigin, waypoints: Floats) -> str:
+def _start_text(itinerary: Itinerary, first_stop: RoutePoint, origin: GeoOrigin, waypoints: Floats) -> str:
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
     lat, lon = first_stop.lat_deg, first_stop.lon_deg
     if first_stop.loiter is not None:

@@ -73,7 +73,7 @@ class MissionContext:
         that it states, NaN if unknown.
         """
         placed = self.place_mission(mission) if placed is None else placed
-        heights = {stop.stop.item: float(stop.position[2]) for stop in reversed(placed.stops)}
+        heights = {stop.item: stop.place[2] for stop in reversed(placed.stops)}
         items = [mission.items[k] for k in movable_indices(mission)]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [
@@ -100,7 +100,7 @@ class MissionContext:
 
     def reached_items(self, mission: Mission) -> frozenset[int]:
         """Return the numbers of the items that a flight reaches."""
-        return frozenset(stop.stop.item for stop in self.place_mission(mission).stops)
+        return frozenset(stop.item for stop in self.place_mission(mission).stops)
 
     def to_geographic(self, east: float, north: float) -> tuple[float, float]:
         """Return latitude and longitude of a map position, degrees."""

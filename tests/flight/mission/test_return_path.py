@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Command
-from flight.mission.itinerary import UNLIMITED, ItineraryStop
-from flight.mission.loiter_circles import RoutePoint
+from flight.mission.itinerary import UNLIMITED, RoutePoint
 from flight.mission.return_path import (
     USUAL_RULES,
     ReturnAbility,
@@ -24,7 +23,7 @@ from world.frames import to_geo
 
 HOME = ReturnPoint(0.0, 0.0, 300.0)
 RALLY = [ReturnPoint(0.0, 4000.0, 400.0, 300.0), ReturnPoint(3000.0, 6000.0, 500.0)]
-STOP = ItineraryStop(7, int(Command.NAV_RETURN_TO_LAUNCH), 0.0, 0.0, math.nan, 0, 25.0)
+STOP = RoutePoint(7, int(Command.NAV_RETURN_TO_LAUNCH), 0.0, 0.0, math.nan, 0, 25.0)
 ABLE = ReturnAbility(lambda a, b, up: 100.0, 120.0, 0.1, 0.08, math.radians(30.0), 25.0)
 
 
@@ -100,12 +99,12 @@ def laid(
     """Waypoints (n, 3) from 500 m up at the origin, flown to on a course (degrees), and their arcs (n,)."""
     back = math.radians(course)
     before = [
-        RoutePoint(STOP, (-1000.0 * math.sin(back), -1000.0 * math.cos(back), 500.0)),
-        RoutePoint(STOP, (0.0, 0.0, 500.0)),
+        STOP.at((-1000.0 * math.sin(back), -1000.0 * math.cos(back), 500.0)),
+        STOP.at((0.0, 0.0, 500.0)),
     ]
     there = ReturnTarget(target, "home", "", math.hypot(*target[:2]), base)
     points = rtl_waypoints(before, STOP, there, rules, ABLE)
-    return np.array([(0.0, 0.0, 500.0), *(p.position for p in points)]), np.array([0.0, *(p.arc for p in points)])
+    return np.array([(0.0, 0.0, 500.0), *(p.place for p in points)]), np.array([0.0, *(p.arc for p in points)])
 
 
 @pytest.mark.parametrize("course", [-170.0, -90.0, -30.0, -2.0, 0.0, 2.0, 30.0, 90.0, 170.0])
@@ -284,9 +283,9 @@ def test_a_height_that_is_never_flown_is_refused() -> None:
 
 def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     rules = ReturnRules(holds_height=True)
-    begin = [RoutePoint(STOP, (0.0, 9000.0, 900.0)), RoutePoint(STOP, (0.0, 8000.0, 900.0))]
-    target = choose_target(rules, begin[-1].position, HOME, ())
-    ups = [point.position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
+    begin = [STOP.at((0.0, 9000.0, 900.0)), STOP.at((0.0, 8000.0, 900.0))]
+    target = choose_target(rules, begin[-1].place, HOME, ())
+    ups = [point.place[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
     # Level until the circle about home, down to 100 m over it there.
     assert (ups[0], ups[-1]) == (900.0, 400.0)
     assert rtl_note(target, rules, 900.0).startswith(
