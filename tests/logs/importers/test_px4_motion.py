@@ -296,7 +296,5 @@ def test_the_same_flight_gives_the_same_aircraft(tmp_path: Path) -> None:
     )
     assert found.with_current
     off = np.abs(found.values - expected.values) / flown.estimate.sds
-    # The log does not show adverse yaw and rudder power: their final values are the prior's.
-    shown = flown.estimate.of_log() > 0.5
-    assert shown.sum() >= 16
-    assert off[shown].max() < 0.8
+    # Of pulses at 25 Hz on a grid of 50 Hz, one may fall a row later.
+    assert off.max() < 0.8
