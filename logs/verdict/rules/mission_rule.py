@@ -20,12 +20,14 @@ from flight.autopilots.parts import FeasibilityLimits, MissionParts
 from flight.mission.commands import PASSED_OVER, Treatment, support_of
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
+    FENCES,
     LANDINGS,
     OVER_HOME,
     OVER_TERRAIN,
     PLACES,
     TAKEOFFS,
     Command,
+    Frame,
     Mission,
     MissionItem,
     command_name,
@@ -53,7 +55,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.checks.feasibility
     refuses = setup.autopilot.checks.dialect == "px4"
     checks = (
-        ("checkMissionItemValidity", _check_validity(mission)),
+        ("checkMissionItemValidity", _check_validity(mission, refuses)),
         ("checkTakeoff", _check_takeoff(mission)),
         ("checkFixedWingLanding", _check_landing(mission)),
         ("checkFixedWindLandApproach", _check_approach(mission, origin, limits)),
@@ -230,7 +232,23 @@ def _flown_items(mission: Mission) -> list[MissionItem]:
     return [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
 
 
-def _check_validity(mission: Mission) -> Iterator[_Remark]:
+# Commands that PX4 accepts in a frame with coordinates.  It accepts all others only in `Frame.MISSION`
+# (`parse_mavlink_mission_item` of its mission manager).  Mission Planner writes frame 3 for every command.
+_PX4_LOCATED_COMMANDS = frozenset(
+    {C.NAV_WAYPOINT, C.NAV_LOITER_UNLIM, C.NAV_LOITER_TIME, C.NAV_LOITER_TO_ALT, C.NAV_ROI, C.DO_SET_ROI}
+    | {C.DO_SET_ROI_LOCATION, C.CONDITION_GATE, C.COMPONENT_ARM_DISARM, C.DO_AUTOTUNE_ENABLE}
+    | TAKEOFFS
+    | LANDINGS
+    | FENCES
+)
+
+
+def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
+    """Yield the items that PX4 refuses at upload.
+
+    refuses: True if PX4 is to fly; a command without coordinates in a frame with coordinates is only then reported,
+        because every file of Mission Planner has such commands.
+    """
     for item in mission.items:
         name, support = command_name(item.command), support_of(item.command)
         if support.px4 == Treatment.REFUSED:
@@ -243,6 +261,12 @@ def _check_validity(mission: Mission) -> Iterator[_Remark]:
                 REFUSED,
                 item.seq,
                 f"{name} in frame {item.frame}, above terrain, which PX4 rejects and ArduPlane accepts",
+            )
+        elif refuses and item.frame != Frame.MISSION and item.command not in _PX4_LOCATED_COMMANDS:
+            yield (
+                REFUSED,
+                item.seq,
+                f"{name} in frame {item.frame}: PX4 accepts this command only in frame {int(Frame.MISSION)}",
             )
     if mission.items and mission.items[0].command == C.NAV_LAND:
         yield REFUSED, mission.items[0].seq, "starts with landing"

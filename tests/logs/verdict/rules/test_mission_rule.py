@@ -139,6 +139,17 @@ LANDING = (*GOOD, wp(1500, 0, 100), wp(0, 0, 0, command=21))
 WHOLE = "".join(f"PARAMETER_{k} 1\n" for k in range(400))
 
 
+@pytest.mark.parametrize(("line", "accepted"), [("2 178 0 20 -1 0 0 0 0", True), ("3 178 0 20 -1 0 0 0 0", False)])
+def test_px4_takes_a_command_without_a_place_in_frame_2_only(line: str, accepted: bool) -> None:
+    """PX4's `parse_mavlink_mission_item` answers MAV_MISSION_UNSUPPORTED; Mission Planner writes frame 3."""
+    lines = (*GOOD[:2], line, GOOD[2])
+    verdict = judge_geometry(replace(setup_of(*lines), autopilot=Px4(Px4Parameters.defaults())))
+    (found,) = [item for item in verdict.findings if item.check == "checkMissionItemValidity"]
+    assert found.ok is accepted
+    assert accepted or (found.place.item == 3 and "DO_CHANGE_SPEED in frame 3" in found.reason)
+    assert of("checkMissionItemValidity", *lines).ok is True  # ArduPlane takes both.
+
+
 @pytest.mark.parametrize(
     ("text", "lines", "ok", "words"),
     [
