@@ -6,6 +6,7 @@ distance that the finding requires.  Suggestions about the aircraft, such as a l
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import product
 
 import numpy as np
 
@@ -54,9 +55,11 @@ def apply_suggestion(
     if not can_apply(suggestion):
         raise MissionError(f"{source}: this suggestion does not change its items", field="suggestion")
     missions = []
-    # Away from a missile, try to move a single waypoint first, because each moved waypoint may fail elsewhere.
-    for max_moves in (1, None) if any(change.what == "distance" for change in suggestion) else (None,):
-        edited_mission = _EditedMission(context, judged_mission, max_moves)
+    # Away from a missile, try a single waypoint and all waypoints, because each moved waypoint may fail elsewhere; both
+    # in the direction of the nearest point, and each in its own direction, for a path that bends around the missile.
+    is_away_from_missile = any(change.what == "distance" for change in suggestion)
+    for max_moves, radially in product((1, None), (False, True)) if is_away_from_missile else ((None, False),):
+        edited_mission = _EditedMission(context, judged_mission, max_moves, radially)
         for change in suggestion:
             _CHANGE_FUNCTIONS[change.what](edited_mission, change, finding)
         if not edited_mission.is_changed:
@@ -72,9 +75,10 @@ def apply_suggestion(
 class _EditedMission:
     """Mission whose items are moved one by one."""
 
-    def __init__(self, context: MissionContext, judged: JudgedMission, max_moves: int | None) -> None:
+    def __init__(self, context: MissionContext, judged: JudgedMission, max_moves: int | None, radially: bool) -> None:
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
-        self.requirements, self.max_moves, self.is_changed = judged.requirements, max_moves, False
+        self.requirements, self.max_moves, self.radially = judged.requirements, max_moves, radially
+        self.is_changed = False
 
     def item_index(self, waypoint: int) -> int | None:
         """Return the index of a waypoint's item in the mission's list, or None if the waypoint has no item."""
@@ -199,8 +203,14 @@ def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Fin
     legs, points = violated_legs(edited.requirements, finding), edited.waypoint_positions()
     if not legs:
         return
-    distance = np.hypot(*(points[:, :2] - missile).T)
+    offsets = points[:, :2] - missile
+    distance = np.hypot(*offsets.T)
     waypoints = sorted(edited.end_waypoints(legs), key=lambda end: float(distance[end]))[: edited.max_moves]
+    if edited.radially:
+        for waypoint in waypoints:
+            scale = (change.wanted + _SPHERE_MARGIN_M) / max(float(distance[waypoint]), 1.0)
+            edited.move_items([waypoint], np.array([*(scale * offsets[waypoint]), 0.0]))
+        return
     direction, leg, fraction = _nearest_point(missile, points[:, :2], legs)
     # Share of a move of these waypoints by which the nearest point moves.
     share = (1.0 - fraction) * (leg in waypoints) + fraction * (leg + 1 in waypoints)

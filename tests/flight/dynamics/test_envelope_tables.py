@@ -216,7 +216,10 @@ def test_a_search_that_misses_the_range_of_level_flight_starts_again_inside_it(
     missed: Trim | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A search for the fastest flight that ends at 12 m/s, or nowhere, although the grid has level flight at 28 m/s."""
-    for name, first, again in (("fastest", missed, level_trim(34.0)), ("slowest", None, level_trim(9.0))):
+    for name, first, again in (
+        ("fastest_level_flight", missed, level_trim(34.0)),
+        ("slowest_level_flight", None, level_trim(9.0)),
+    ):
         found = {False: first, True: again}
         monkeypatch.setattr(
             flight.dynamics.envelope_tables, name, lambda _fdm, _amsl, near=None, found=found: found[near is not None]
@@ -225,7 +228,7 @@ def test_a_search_that_misses_the_range_of_level_flight_starts_again_inside_it(
 
 
 def test_without_a_search_that_succeeds_the_grid_states_the_range(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("fastest", "slowest"):
+    for name in ("fastest_level_flight", "slowest_level_flight"):
         monkeypatch.setattr(flight.dynamics.envelope_tables, name, lambda *_: None)
     assert _level_speed_range(Fdm(AEROSONDE), 0.0, [level_trim(28.0), level_trim(12.0)]) == (12.0, 28.0)
     assert all(math.isnan(speed) for speed in _level_speed_range(Fdm(AEROSONDE), 0.0, []))

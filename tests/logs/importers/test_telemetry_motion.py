@@ -50,7 +50,7 @@ def write(path: Path, *, autopilot: int = 3, without: tuple[str, ...] = ()) -> P
         vehicle.servo_output_raw_send(micros % 2**32, 0, *pulses)
         vehicle.servo_output_raw_send(micros % 2**32, 1, *[1000] * 8)
         if "VFR_HUD" not in without:
-            vehicle.vfr_hud_send(22.0, SPEED, 45, 60, 500.0, 0.5)
+            vehicle.vfr_hud_send(22.0 + 1e-4 * (k % 2), SPEED, 45, 60, 500.0, 0.5)
         if k % 10 == 0:
             vehicle.heartbeat_send(1, autopilot, 81, 10, 4)
             vehicle.sys_status_send(0, 0, 0, 0, 24_000, 1250, 80, 0, 0, 0, 0, 0, 0)

@@ -288,10 +288,12 @@ def test_a_mission_comes_back_from_its_data() -> None:
     assert mission_from_data(mission_data(mission), mission) == mission
 
 
-@pytest.mark.parametrize(("rule", "by"), [("clearance", -90.0), ("threat", 150.0)])
-def test_a_suggestion_applied_mends_its_finding(rule: str, by: float) -> None:
+@pytest.mark.parametrize(
+    ("rule", "by", "seed", "items"), [("clearance", -90.0, 5, 12), ("threat", 120.0, 9, 14), ("threat", 200.0, 9, 14)]
+)
+def test_a_suggestion_applied_mends_its_finding(rule: str, by: float, seed: int, items: int) -> None:
     """At once, though a path that goes round a corner moves by less than its waypoint."""
-    session = drawn_session(5, 12)
+    session = drawn_session(seed, items)
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=by))
     findings = session.judged.verdict.findings
     number, item = next((n, i) for n, i in enumerate(findings) if i.rule == rule and i.suggestions)
