@@ -314,11 +314,11 @@ def test_a_wind_that_leaves_no_way_is_refused(airspeed: float, wind: tuple[float
 TRIMS = """
 from aircraft.catalog import load_aircraft
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.trim import linearise, straight
+from flight.dynamics.trim import linearise, steady_flight
 for name, airspeed in (("aerosonde", 25.0), ("aerosonde", 31.0), ("c172x", 50.0)):
     model = Fdm(load_aircraft(name))
     for climb in (-0.03, 0.0, 0.05):
-        found = straight(model, airspeed, 500.0, climb)
+        found = steady_flight(model, airspeed, 500.0, climb)
         print(found, [matrix.tobytes().hex() for matrix in linearise(model, found)])
 """
 
