@@ -32,8 +32,8 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     scenario = plan.scenario
     problem = make_problem(scenario, limits_for(find_algorithm(plan.algorithm, scenario.name), limits))
     min_kill_distance = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN)
-    while (shorter := _drop_one_waypoint(problem, plan.waypoints, min_kill_distance)) is not None:
-        waypoints, certificate = shorter
+    while (shorter_path := _drop_one_waypoint(problem, plan.waypoints, min_kill_distance)) is not None:
+        waypoints, certificate = shorter_path
         violations, objectives = paper_scores(problem.certified, waypoints[None])
         plan = replace(
             plan,
@@ -57,9 +57,9 @@ def _drop_one_waypoint(
     lengths = np.linalg.norm(legs, axis=1)
     detours = lengths[:-1] + lengths[1:] - np.linalg.norm(chords, axis=1)
     for i in 1 + np.argsort(detours, kind="stable"):
-        remaining = np.delete(waypoints, i, axis=0)
-        certificate = certify(problem, remaining)
-        violations, _ = paper_scores(problem.certified, remaining[None])
+        remaining_waypoints = np.delete(waypoints, i, axis=0)
+        certificate = certify(problem, remaining_waypoints)
+        violations, _ = paper_scores(problem.certified, remaining_waypoints[None])
         if certificate.ok and certificate.kill_distance >= min_kill_distance and not violations.any():
-            return remaining, certificate
+            return remaining_waypoints, certificate
     return None

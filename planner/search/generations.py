@@ -108,9 +108,11 @@ def _is_stagnant(best_scores: list[Floats]) -> bool:
     """Return True if the last generations gained almost nothing."""
     if len(best_scores) <= STALLED_GENERATIONS:
         return False
-    earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
-    has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
-    return bool(has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN)
+    earlier_scores, latest_scores = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
+    has_same_violations = (
+        np.array_equal(earlier_scores[:LENGTH], latest_scores[:LENGTH]) and earlier_scores[KILL] == latest_scores[KILL]
+    )
+    return bool(has_same_violations and earlier_scores[LENGTH] - latest_scores[LENGTH] < MIN_GAIN)
 
 
 # --- Single waypoints ---
@@ -276,16 +278,16 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
     """Evaluate whole paths through some of the best candidates, and repair one path as long as no path is feasible."""
-    chosen = set()
+    candidate_chains = set()
     for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:
             if chains.cost[i, k] < math.inf:
-                chosen.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
-    if not chosen:
+                candidate_chains.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
+    if not candidate_chains:
         search.evaluate(_as_vectors(rows[:, :1]))
         return
     intervals = np.arange(len(rows))
-    vectors = np.array([rows[intervals, list(candidate_numbers)].ravel() for candidate_numbers in sorted(chosen)])
+    vectors = np.array([rows[intervals, list(chain)].ravel() for chain in sorted(candidate_chains)])
     search.evaluate(vectors)
     if not search.archive.is_feasible():
         search.improve(search.archive.vectors[0], REPAIR_EVALUATIONS)

@@ -103,11 +103,11 @@ def _score_samples(task: _Task) -> None:
     paper_scores(task.problem.certified, task.path[None])
 
 
-def _choose(task: _Task) -> None:
+def _score_front(task: _Task) -> None:
     data = task.problem.search
     front_values(data, make_energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
     covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)
 
 
 _PARTS = (_score, _certify, _shorten, _find_route, _find_side_routes, _score_samples)
-_CALLS = {**dict(zip(PARTS, _PARTS, strict=True)), FRONT: _choose}
+_CALLS = {**dict(zip(PARTS, _PARTS, strict=True)), FRONT: _score_front}

@@ -185,12 +185,12 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
         raise ScenarioError.at(scenario.name, "planner.budget", settings.budget, f"{allowed}")
     threats = scenario.threats
     for field, end in (("start", scenario.start), ("destination", scenario.destination)):
-        outside = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius
-        inside = np.flatnonzero((threats.kill_radius > 0.0) & (outside <= 0.0))
-        if inside.size:
-            missile = int(inside[0])
+        distances = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius
+        indices = np.flatnonzero((threats.kill_radius > 0.0) & (distances <= 0.0))
+        if indices.size:
+            missile = int(indices[0])
             raise ScenarioError(
-                f"{scenario.name}: {field}: {-outside[missile]:.0f} m inside the kill radius of"
+                f"{scenario.name}: {field}: {-distances[missile]:.0f} m inside the kill radius of"
                 f" {threats.names[missile]} "
                 f"({threats.kill_radius[missile]:.0f} m): no path from there is safe",
                 file=scenario.name,

@@ -126,8 +126,8 @@ class Archive:
         if self.is_feasible():
             if len(self.scores) == ARCHIVE_SIZE:
                 last = self.scores[-1]
-                shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
-                is_kept &= shorter | (scores[:, KILL] < last[KILL])
+                is_shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
+                is_kept &= is_shorter | (scores[:, KILL] < last[KILL])
             if not is_kept.any():
                 return
         elif is_kept.any():
@@ -257,10 +257,12 @@ class Search:
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
         """Improve a vector (d,) by a pattern search, archive the result, and return the best scores (8,)."""
-        limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
-        if limit < 2:
+        evaluation_limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
+        if evaluation_limit < 2:
             return np.asarray(self.evaluate(vector[None])[0])
-        vectors, evaluations = search_patterns(self.problem.search, self.encoding, vector, int(limit), self.should_stop)
+        vectors, evaluations = search_patterns(
+            self.problem.search, self.encoding, vector, int(evaluation_limit), self.should_stop
+        )
         scores = self.evaluate(vectors)
         # The pattern search has already included these vectors in its evaluations.
         self.evaluations += evaluations - len(vectors)
@@ -286,9 +288,9 @@ class Search:
         if data.legs_hold_turns:
             attempts += [(margin, True, 0.0) for margin in CORNER_MARGINS]
         attempts += [(EXTRA_MARGINS[-1], False, slope_margin) for slope_margin in SLOPE_MARGINS]
-        first, certificate = path, None
+        first_path, certificate = path, None
         for extra_margin, corners_too, slope_margin in attempts:
-            path = first if corners_too else path
+            path = first_path if corners_too else path
             if slope_margin > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
                 return False
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:

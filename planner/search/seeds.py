@@ -68,7 +68,7 @@ def starting_vectors(
     is_retry: True if an earlier attempt has failed; then, among zones, grids that are no finer than another grid are
     skipped, and only the best routes are followed.
     """
-    encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
+    encoding, space, waypoint_count = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
         return np.empty((0, encoding.lower.size))
     frame, starts = rotated_frame(space.start, space.destination), list(search.archive.vectors[:1])
@@ -79,15 +79,15 @@ def starting_vectors(
     effort_factor = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
     is_among_zones = is_limited(airspace)
     # Among zones `search_other_sides` does not apply: the first attempt follows all routes.
-    max_followed = math.inf if is_among_zones else MAX_FOLLOWED
+    max_route_count = math.inf if is_among_zones else MAX_FOLLOWED
     if search.can_shorten and search.algorithm.optimiser == "waypoints":
-        max_followed = 0
+        max_route_count = 0
     for index, route in enumerate(_list_routes(search, grids, is_retry) if search.algorithm.seeded else ()):
-        if search.must_end() or search.first_safe_found() or (index >= max_followed and search.best_is_safe()):
+        if search.must_end() or search.first_safe_found() or (index >= max_route_count and search.best_is_safe()):
             break
         if is_among_zones and is_retry and index >= MAX_FOLLOWED_AGAIN:
             break
-        path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
+        path = fit_waypoints(search.problem.search, frame, route.points, waypoint_count)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
         improved_scores.append(search.improve(starts[-1], SEED_SEARCH * effort_factor))
     if not starts:
@@ -107,7 +107,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     candidates, scores = [], []
-    shortens_routes = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
+    should_shorten = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
     is_among_zones = is_limited(data.airspace)
     routes = (
         airspace_routes(data, frame, span, grids, search.pause, finer_only=is_retry)
@@ -115,14 +115,14 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
         else grid_routes(data, frame, span, grids, search.pause)
     )
     for route in routes:
-        if shortens_routes and search.has_safe():
+        if should_shorten and search.has_safe():
             search.shorten(resample(frame.restore(route.points), encoding.waypoints))
             if search.must_end():
                 break
             continue
         candidates.append(route)
-        path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK_FIT)
-        vectors = rotated_vectors(space, encoding, path[None])
+        fitted_path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK_FIT)
+        vectors = rotated_vectors(space, encoding, fitted_path[None])
         scores.append(search.evaluate(vectors)[0])
         if not search.first_safe_found():
             scores[-1] = search.improve(vectors[0], QUICK_SEARCH)
@@ -189,8 +189,8 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     frame, straight_length = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     tried_paths: list[Floats] = []
-    for stages, shrink, ratio in grids:
-        grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=SPREAD, ratio=ratio)
+    for stage_count, shrink, ratio in grids:
+        grid = optimistic_grid(data, frame, span, stage_count, shrink=shrink, spread=SPREAD, ratio=ratio)
         bound = straight_length * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
             if search.must_end():
@@ -291,10 +291,10 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
             break
         try:
-            route, expanded = lattice_route(data, frame, step_fraction * step, search.pause, remaining_states)
+            route, expanded_count = lattice_route(data, frame, step_fraction * step, search.pause, remaining_states)
         except SearchEnded:
             break
-        remaining_states -= expanded
+        remaining_states -= expanded_count
         if not len(route):
             continue
         is_safe = search.meets_goal(best[1])
