@@ -365,9 +365,9 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
     if not missiles:
         return [f"no path exists: the ground blocks every path below {ceiling}"]
     names = [problem.scenario.threats.names[k] for k in missiles[:MAX_CLOSING]]
-    others_text = f" and {len(missiles) - MAX_CLOSING} more" if len(missiles) > MAX_CLOSING else ""
+    others = f" and {len(missiles) - MAX_CLOSING} more" if len(missiles) > MAX_CLOSING else ""
     return [
-        f"no path exists: {', '.join(names)}{others_text} block every path between ground, {ceiling} and the edges of the"
+        f"no path exists: {', '.join(names)}{others} block every path between ground, {ceiling} and the edges of the"
         " map;"
         " without any one of them a path may exist"
     ]
@@ -383,11 +383,9 @@ def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     if not scenario.zones:
         return []
     records = zone_records(scenario.zones)
-    counts = [
-        max(2, math.ceil(math.dist(leg_start, leg_end) / ZONE_PITCH)) for leg_start, leg_end in itertools.pairwise(path)
-    ]
+    counts = [max(2, math.ceil(math.dist(a, b) / ZONE_PITCH)) for a, b in itertools.pairwise(path)]
     legs = zip(path[:-1], path[1:], counts, strict=True)
-    points = np.concatenate([np.linspace(leg_start, leg_end, count) for leg_start, leg_end, count in legs])
+    points = np.concatenate([np.linspace(a, b, count) for a, b, count in legs])
     ground = np.full(len(points), math.nan)
     if scenario.terrain is not None:
         ground = scenario.terrain.height(points[:, 0], points[:, 1])

@@ -32,8 +32,8 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
     scenario = plan.scenario
     problem = make_problem(scenario, limits_for(find_algorithm(plan.algorithm, scenario.name), limits))
     min_kill_distance = min(plan.certificate.kill_distance, CERTIFIED_KILL_MARGIN)
-    while (shorter_path := _drop_one_waypoint(problem, plan.waypoints, min_kill_distance)) is not None:
-        waypoints, certificate = shorter_path
+    while (shorter := _drop_one_waypoint(problem, plan.waypoints, min_kill_distance)) is not None:
+        waypoints, certificate = shorter
         violations, objectives = paper_scores(problem.certified, waypoints[None])
         plan = replace(
             plan,

@@ -108,11 +108,9 @@ def _is_stagnant(best_scores: list[Floats]) -> bool:
     """Return True if the last generations gained almost nothing."""
     if len(best_scores) <= STALLED_GENERATIONS:
         return False
-    earlier_scores, latest_scores = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
-    has_same_violations = (
-        np.array_equal(earlier_scores[:LENGTH], latest_scores[:LENGTH]) and earlier_scores[KILL] == latest_scores[KILL]
-    )
-    return bool(has_same_violations and earlier_scores[LENGTH] - latest_scores[LENGTH] < MIN_GAIN)
+    earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
+    has_same_violations = np.array_equal(earlier[:LENGTH], latest[:LENGTH]) and earlier[KILL] == latest[KILL]
+    return bool(has_same_violations and earlier[LENGTH] - latest[LENGTH] < MIN_GAIN)
 
 
 # --- Single waypoints ---

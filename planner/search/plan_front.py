@@ -240,11 +240,11 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
     problem = make_problem(scenario, limits_for(algorithm, limits))
     aircraft = problem.search.aircraft
     energy = make_energy_cost(limits.envelope, aircraft)
-    minimises_energy = energy is not None and scenario.planner.objective != "time"
-    travel = energy if energy is not None and minimises_energy else make_time_cost(aircraft)
+    by_energy = energy is not None and scenario.planner.objective != "time"
+    travel = energy if energy is not None and by_energy else make_time_cost(aircraft)
     frame = rotated_frame(problem.space.start, problem.space.destination)
     scored = _with_margins(problem, MARGINS[0])
-    return FrontTask(problem, scored, frame, energy, "energy" if minimises_energy else "time", travel)
+    return FrontTask(problem, scored, frame, energy, "energy" if by_energy else "time", travel)
 
 
 def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:

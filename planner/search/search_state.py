@@ -288,9 +288,9 @@ class Search:
         if data.legs_hold_turns:
             attempts += [(margin, True, 0.0) for margin in CORNER_MARGINS]
         attempts += [(EXTRA_MARGINS[-1], False, slope_margin) for slope_margin in SLOPE_MARGINS]
-        first_path, certificate = path, None
+        first, certificate = path, None
         for extra_margin, corners_too, slope_margin in attempts:
-            path = first_path if corners_too else path
+            path = first if corners_too else path
             if slope_margin > 0.0 and not (certificate and self._violates_only_slopes(certificate)):
                 return False
             if self._evaluation_budget() - self.evaluations < MAX_MODELS:

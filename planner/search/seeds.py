@@ -79,11 +79,11 @@ def starting_vectors(
     effort_factor = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
     is_among_zones = is_limited(airspace)
     # Among zones `search_other_sides` does not apply: the first attempt follows all routes.
-    max_route_count = math.inf if is_among_zones else MAX_FOLLOWED
+    max_followed = math.inf if is_among_zones else MAX_FOLLOWED
     if search.can_shorten and search.algorithm.optimiser == "waypoints":
-        max_route_count = 0
+        max_followed = 0
     for index, route in enumerate(_list_routes(search, grids, is_retry) if search.algorithm.seeded else ()):
-        if search.must_end() or search.first_safe_found() or (index >= max_route_count and search.best_is_safe()):
+        if search.must_end() or search.first_safe_found() or (index >= max_followed and search.best_is_safe()):
             break
         if is_among_zones and is_retry and index >= MAX_FOLLOWED_AGAIN:
             break
@@ -189,8 +189,8 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     frame, straight_length = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     tried_paths: list[Floats] = []
-    for stage_count, shrink, ratio in grids:
-        grid = optimistic_grid(data, frame, span, stage_count, shrink=shrink, spread=SPREAD, ratio=ratio)
+    for stages, shrink, ratio in grids:
+        grid = optimistic_grid(data, frame, span, stages, shrink=shrink, spread=SPREAD, ratio=ratio)
         bound = straight_length * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
             if search.must_end():
