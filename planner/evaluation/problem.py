@@ -440,7 +440,7 @@ def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTabl
 
 
 def _map_edges(bounds: Floats) -> dict[str, float]:
-    """Return the edges of a map with these bounds (2, 2) by name."""
+    """Return the edges of a map with these bounds (2, 2), keyed by name."""
     (west, east), (south, north) = bounds.tolist()
     return {"west": west, "east": east, "south": south, "north": north}
 
