@@ -185,10 +185,10 @@ class _Site:
             )
         return slopes[0], slopes[1]
 
-    def min_path_length(self, height_change: float, phase: int) -> float:
-        """Return the length of the shortest path that gains (phase 0) or loses (phase 1) a height, m."""
+    def min_path_length(self, height_change: float, is_descent: bool) -> float:
+        """Return the length of the shortest path that gains a height, or with `is_descent` loses it, m."""
         altitude = float(max(self.scenario.start[2], self.scenario.destination[2]))
-        max_slope = max(self.slopes(course, altitude)[phase] for course in np.arange(8) * (math.pi / 4.0))
+        max_slope = max(self.slopes(course, altitude)[is_descent] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_chain(self, chain: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
@@ -310,7 +310,7 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     if not launches:
         return None, reason
     best_rejected = _BestRejected()
-    for laps in _list_lap_counts(site, start_altitude - home_altitude, 0):
+    for laps in _list_lap_counts(site, start_altitude - home_altitude, False):
         for _, course, points in sorted(_list_departures(site, launches, laps), key=lambda path: path[0]):
             outcome = _make_departure(site, course, points, takeoff_altitude)
             if isinstance(outcome, ClimbOut):
@@ -349,7 +349,7 @@ def _make_departure(
         altitudes = climb_altitudes(
             points,
             float(site.home[2]),
-            partial(_scale_slope, site, slope_factor, 0, top_altitude),
+            partial(_scale_slope, site, slope_factor, False, top_altitude),
             takeoff_altitude,
             goal_altitude,
         )
@@ -434,7 +434,7 @@ def _list_departures(
     next_course = float(leg_courses(site.plan.waypoints[:2])[0]) if start_course is None else start_course
     end, home = (float(first_waypoint[0]), float(first_waypoint[1])), (float(site.home[0]), float(site.home[1]))
     next_point = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
-    min_length = site.min_path_length(float(first_waypoint[2] - site.home[2]), 0) + math.dist(end, next_point)
+    min_length = site.min_path_length(float(first_waypoint[2] - site.home[2]), False) + math.dist(end, next_point)
     for course, takeoff_end, first_leg_end in launches:
         tailwind = site.scenario.wind.along(course, float(site.home[2]))[0]
         for corners in candidate_chains(first_leg_end, course, end, next_course, site.turn_radius, laps):
@@ -451,10 +451,10 @@ def _list_departures(
                 )
 
 
-def _list_lap_counts(site: _Site, height_change: float, phase: int) -> list[int]:
-    """Return the lap counts to try for gaining (phase 0) or losing (phase 1) a height, m, fewest first."""
+def _list_lap_counts(site: _Site, height_change: float, is_descent: bool) -> list[int]:
+    """Return the lap counts to try for gaining a height, or with `is_descent` losing it, m, fewest first."""
     max_laps = math.ceil(
-        site.min_path_length(height_change, phase) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
+        site.min_path_length(height_change, is_descent) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
     )
     return list(range(min(MAX_LAPS, max_laps) + 1))
 
@@ -609,11 +609,11 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     glide_start = (float(final.final_waypoints[1, 0]), float(final.final_waypoints[1, 1]))
     best_rejected = _BestRejected()
     point_above = np.array([final.point[0], final.point[1], final_altitude])
-    phase = int(final_altitude < end_altitude)
+    is_descent = final_altitude < end_altitude
     extra_length = math.dist(previous_points[-1], start) + math.dist(end, glide_start)
     extra_length += sum(math.dist(leg_start, leg_end) for leg_start, leg_end in pairwise(previous_points))
-    min_length = site.min_path_length(end_altitude - final_altitude, phase) + extra_length
-    for laps in _list_lap_counts(site, end_altitude - final_altitude, phase):
+    min_length = site.min_path_length(end_altitude - final_altitude, is_descent) + extra_length
+    for laps in _list_lap_counts(site, end_altitude - final_altitude, is_descent):
         paths = [
             [start, *corners, end]
             for corners in candidate_chains(start, course, end, final.course, site.turn_radius, laps)
@@ -657,13 +657,13 @@ def _approach_altitudes(
 ) -> Floats:
     """Return the altitudes of a path between two altitudes at a fraction of its slope limits, (n,) m AMSL."""
     top_altitude = max(start_altitude, end_altitude)
-    climb, dive = (partial(_scale_slope, site, slope_factor, phase, top_altitude) for phase in (0, 1))
+    climb, dive = (partial(_scale_slope, site, slope_factor, is_descent, top_altitude) for is_descent in (False, True))
     return descent_altitudes(points, start_altitude, climb, dive, end_altitude)
 
 
-def _scale_slope(site: _Site, factor: float, phase: int, altitude: float, course: float) -> float:
-    """Return a fraction of the climb slope (phase 0) or dive slope (phase 1) on a course, m per m."""
-    return factor * site.slopes(course, altitude)[phase]
+def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
+    """Return a fraction of the climb slope, or with `is_descent` of the dive slope, on a course, m per m."""
+    return factor * site.slopes(course, altitude)[is_descent]
 
 
 def _min_go_around_height(site: _Site, final: _Final) -> float | None:
