@@ -137,13 +137,13 @@ def add_airspace_violations(
     path: Floats,
     legs: Records,
     corners: Records,
-    flown: Records,
+    flown_corners: Records,
     lags: Records,
     violations: Record,
 ) -> None:
     """Add zone penetration (bounds) and excess height (terrain) of a path (w, 3) to a `VIOLATIONS` record, m x km.
 
-    legs, corners, flown, lags: measurements of the path.
+    legs, corners, flown_corners, lags: measurements of the path.
     """
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
@@ -151,7 +151,7 @@ def add_airspace_violations(
     last_leg = legs.shape[0] - 1
     across = float(data.tracking.across)
     for i in range(last_leg + 1):
-        offset_before, offset_after = float(flown[i].fly_by_offset), float(flown[i + 1].fly_by_offset)
+        offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if has_max_height:
             violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)

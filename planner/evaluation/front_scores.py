@@ -18,11 +18,11 @@ from world.geometry import window_exposure
 from world.kernels import Record, compiled, inner
 from world.terrain import TILE, pixel_height
 
-_LENGTH = 0
-_EXPOSURE = 1
-_CLEARANCE = 2
-_TIME = 3
-_ENERGY = 4
+_LENGTH_COLUMN = 0
+_EXPOSURE_COLUMN = 1
+_CLEARANCE_COLUMN = 2
+_TIME_COLUMN = 3
+_ENERGY_COLUMN = 4
 TIME_COST = LENGTH_COST._replace(length=0.0, time=1.0)
 
 
@@ -58,12 +58,12 @@ def _fill(data: ProblemArrays, time_cost: TravelCost, energy_cost: TravelCost, p
             start, end = path[i], path[i + 1]
             dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
             seconds = leg_cost(time_cost, data.aircraft, start, end)
-            out[n, _LENGTH] += math.sqrt(dx * dx + dy * dy + dz * dz)
-            out[n, _EXPOSURE] += seconds * _mean_detection(data, start, dx, dy, dz)
+            out[n, _LENGTH_COLUMN] += math.sqrt(dx * dx + dy * dy + dz * dz)
+            out[n, _EXPOSURE_COLUMN] += seconds * _mean_detection(data, start, dx, dy, dz)
             min_height = _min_height(data, start, dx, dy, dz, min_height)
-            out[n, _TIME] += seconds
-            out[n, _ENERGY] += leg_cost(energy_cost, data.aircraft, start, end)
-        out[n, _CLEARANCE] = min_height
+            out[n, _TIME_COLUMN] += seconds
+            out[n, _ENERGY_COLUMN] += leg_cost(energy_cost, data.aircraft, start, end)
+        out[n, _CLEARANCE_COLUMN] = min_height
 
 
 @inner

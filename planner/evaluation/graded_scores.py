@@ -123,16 +123,22 @@ def score_legs(
 
     objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
     """
-    legs, corners, flown, extents, lags = scratch.legs, scratch.corners, scratch.flown, scratch.extents, scratch.lags
+    legs, corners, flown_corners, extents, lags = (
+        scratch.legs,
+        scratch.corners,
+        scratch.flown,
+        scratch.extents,
+        scratch.lags,
+    )
     aircraft = data.aircraft
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
     add_leg_violations(data, limits, path, legs, corners, True, violations)
     if data.tracking.has_error:
         measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
-        _measure_tracked_corners(corners, flown, extents)
+        _measure_tracked_corners(corners, flown_corners, extents)
     else:
-        _measure_arcs(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
+        _measure_arcs(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown_corners, extents)
     length = 0.0
     for i in range(legs.shape[0]):
         length += legs[i].length
@@ -174,14 +180,14 @@ def score_missiles(
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
-    legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
+    legs, corners, flown_corners, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
     terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
     count, has_error = path.shape[0], data.tracking.has_error
     length, kill_sum = 0.0, 0.0
     for i in range(count - 1):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
-        gap_distance = max(flown[i].missile_distance, flown[i + 1].missile_distance)
+        gap_distance = max(flown_corners[i].missile_distance, flown_corners[i + 1].missile_distance)
         lag = lags[i]
         exposure, at_beginning, at_end = kill_density(
             missiles,
@@ -202,7 +208,7 @@ def score_missiles(
         kill_sum += exposure * legs[i].length
         length += legs[i].length
     for i in range(1, count - 1):
-        vertical_drop, lateral_offset = flown[i].blend_deviation, flown[i].fly_by_offset
+        vertical_drop, lateral_offset = flown_corners[i].blend_deviation, flown_corners[i].fly_by_offset
         min_height = min(terrain_legs[i - 1].height_at_end, terrain_legs[i].height_at_beginning)
         is_near_ground = min_height < vertical_drop + required.steepest_loss * lateral_offset
         is_near_missile = (
@@ -216,7 +222,7 @@ def score_missiles(
             below, above = _max_lag_near(lags[i], legs[i], corners[i])
             extra_height, missile_margin = below + slope_bounds.steepest * lateral_offset, margin + lateral_offset
         else:
-            vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
+            vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown_corners[i].radius)
             below, above, extra_height, missile_margin = 0.0, 0.0, 0.0, margin
         if is_near_ground:
             violations.terrain += _corner_depth(heights, slope_bounds, to_pixel, required, extra_height, vertices)

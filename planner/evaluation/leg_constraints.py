@@ -74,25 +74,25 @@ def copy_point(source: Record, target: Record, size: int) -> None:
 
 
 @inlined
-def subtract_points(end: Record, begin: Record, size: int, out: Record) -> None:
+def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
     """Fill the step from one point of each path to another."""
     for b in range(size):
-        out.east[b] = end.east[b] - begin.east[b]
-        out.north[b] = end.north[b] - begin.north[b]
-        out.up[b] = end.up[b] - begin.up[b]
-        out.column[b] = end.column[b] - begin.column[b]
-        out.row[b] = end.row[b] - begin.row[b]
+        out.east[b] = end.east[b] - start.east[b]
+        out.north[b] = end.north[b] - start.north[b]
+        out.up[b] = end.up[b] - start.up[b]
+        out.column[b] = end.column[b] - start.column[b]
+        out.row[b] = end.row[b] - start.row[b]
 
 
 @inlined
-def divide_legs(begin: Record, step: Record, fraction: float, size: int, out: Record) -> None:
+def divide_legs(start: Record, step: Record, fraction: float, size: int, out: Record) -> None:
     """Fill the point of each path's leg at this fraction of the step from its beginning."""
     for b in range(size):
-        out.east[b] = begin.east[b] + fraction * step.east[b]
-        out.north[b] = begin.north[b] + fraction * step.north[b]
-        out.up[b] = begin.up[b] + fraction * step.up[b]
-        out.column[b] = begin.column[b] + fraction * step.column[b]
-        out.row[b] = begin.row[b] + fraction * step.row[b]
+        out.east[b] = start.east[b] + fraction * step.east[b]
+        out.north[b] = start.north[b] + fraction * step.north[b]
+        out.up[b] = start.up[b] + fraction * step.up[b]
+        out.column[b] = start.column[b] + fraction * step.column[b]
+        out.row[b] = start.row[b] + fraction * step.row[b]
 
 
 @inlined

@@ -193,7 +193,7 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
     outside_index = columns * rows
     east, north, up = block.point.east, block.point.north, block.point.up
-    index, first, count = block.index, block.first, block.count
+    index, first_entries, entry_counts = block.index, block.first, block.count
     for b in range(size):
         column, row = (east[b] - west) * per_metre, (north[b] - south) * per_metre
         is_inside = (column >= 0.0) & (row >= 0.0) & (column < columns) & (row < rows)
@@ -202,8 +202,8 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
     for b in range(size):
         cell, z = cells[np.uintp(index[b])], up[b]
         first_entry, entry_count, min_altitude, max_altitude = cell.first, cell.count, cell.lowest, cell.highest
-        first[b] = first_entry
-        count[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
+        first_entries[b] = first_entry
+        entry_counts[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
 
 
 @inlined
@@ -215,19 +215,19 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection
-    first, count, active = block.first, block.count, block.active
+    first_entries, entry_counts, active = block.first, block.count, block.active
     # Unsigned: numba checks signed indices for wrap-around.
     one = np.uintp(1)
     open_paths = np.uintp(0)
     for b in range(size):
         active[open_paths] = b
-        open_paths += one if count[b] > 0 else np.uintp(0)
+        open_paths += one if entry_counts[b] > 0 else np.uintp(0)
     round_number = 0
     while open_paths > 0:
         remaining_paths = np.uintp(0)
         for entry in range(open_paths):
             path = np.uintp(active[np.uintp(entry)])
-            sphere = spheres[np.uintp(units[np.uintp(first[path] + round_number)])]
+            sphere = spheres[np.uintp(units[np.uintp(first_entries[path] + round_number)])]
             dx, dy = east[path] - sphere.east, north[path] - sphere.north
             dz = up[path] - sphere.up
             distance2 = dx * dx + dy * dy + dz * dz
@@ -239,7 +239,7 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
                 sphere.detection_scale4 * inverse4 * (1.0 if distance2 <= sphere.detection_radius2 else 0.0)
             )
             active[remaining_paths] = np.int64(path)
-            remaining_paths += one if count[path] > round_number + 1 else np.uintp(0)
+            remaining_paths += one if entry_counts[path] > round_number + 1 else np.uintp(0)
         open_paths = remaining_paths
         round_number += 1
 

@@ -173,7 +173,7 @@ def plan_front(
         return Front((default_plan,) if default.safe else (), count, task.fourth, default_plan, reference, 0)
     size = max(MIN_ARCHIVE_SIZE, SOLUTIONS_PER_PLAN * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
-    evaluations = _search(task, search, path, progress, stop, generations)
+    evaluations = _run_generations(task, search, path, progress, stop, generations)
     front_plans, unsafe_count = _certify_distinct(
         task, search, count, default_plan, replace(default, evaluations=evaluations), finish
     )
@@ -332,7 +332,7 @@ def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
 # --- The search ---
 
 
-def _search(
+def _run_generations(
     task: FrontTask,
     search: FrontSampling,
     default: Floats,

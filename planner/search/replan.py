@@ -104,7 +104,7 @@ def replan(
 
 
 def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
-    """Raise MissionError if the ends of a plan differ from the scenario's ends.
+    """Check that a plan has the ends of a scenario. Raises MissionError if its ends differ.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -129,7 +129,7 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
 
 
 def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
-    """Raise MissionError if the new plan would begin within a missile's kill radius, or where it violates a zone."""
+    """Check the first waypoint of the new plan. Raises MissionError if it is in a kill radius or violates a zone."""
     threats = scenario.threats
     depths = threats.kill_radius - np.sqrt(((threats.position - old_plan.waypoints[leg]) ** 2).sum(axis=1))
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1

@@ -303,7 +303,10 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         path, certificate, is_shortened = _search_along(search, route)
         if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
             return (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
-        if not is_safe and (certificate.ok, certificate.kill_distance) > (best[1].ok, best[1].kill_distance):
+        if not is_safe and (certificate.ok, certificate.kill_distance) > (
+            best[1].ok,
+            best[1].kill_distance,
+        ):
             best = path, certificate
     return best
 

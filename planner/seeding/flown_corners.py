@@ -185,7 +185,7 @@ def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point:
 @inner
 def corner_point(
     data: ProblemArrays,
-    previous: Floats,
+    previous_waypoint: Floats,
     waypoint: Floats,
     next_waypoint: Floats,
     radius: float,
@@ -196,10 +196,13 @@ def corner_point(
 
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
     """
-    length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
-    ux, uy = (waypoint[0] - previous[0]) / length_in, (waypoint[1] - previous[1]) / length_in
+    length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
+    ux, uy = (waypoint[0] - previous_waypoint[0]) / length_in, (waypoint[1] - previous_waypoint[1]) / length_in
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_out, (next_waypoint[1] - waypoint[1]) / length_out
-    slope_in, slope_out = (waypoint[2] - previous[2]) / length_in, (next_waypoint[2] - waypoint[2]) / length_out
+    slope_in, slope_out = (
+        (waypoint[2] - previous_waypoint[2]) / length_in,
+        (next_waypoint[2] - waypoint[2]) / length_out,
+    )
     cross = ux * vy - uy * vx
     turn = min(MAX_TURN, math.atan2(abs(cross), ux * vx + uy * vy))
     if data.tracking.has_error:

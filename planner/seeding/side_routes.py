@@ -50,21 +50,21 @@ PASSING = np.dtype(
 class GridCosts(NamedTuple):
     """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf above the bound.
 
-    reached: cost from the start; parents: the previous cell, as layer x width + across.
-    remaining: cost to the destination; successors: the next cell.
+    start_costs: costs from the start; parents: the previous cell, as layer x width + across.
+    goal_costs: costs to the destination; successors: the next cell.
     """
 
-    reached: Floats
+    start_costs: Floats
     parents: Codes
-    remaining: Floats
+    goal_costs: Floats
     successors: Codes
 
 
 @inner
 def _relax_stage_back(
-    remaining: Floats,
+    goal_costs: Floats,
     price: Floats,
-    previous_remaining: Floats,
+    previous_goal_costs: Floats,
     successors: Codes,
     spans: Records,
     step_layers: Records,
@@ -76,10 +76,10 @@ def _relax_stage_back(
 
     spans: `SPAN` records (layers,) of the cells before it that are within the bound.
     """
-    layer_count, width = remaining.shape
-    flat_remaining, flat_previous, flat_successors, flat_price = (
-        remaining.ravel(),
-        previous_remaining.ravel(),
+    layer_count, width = goal_costs.shape
+    flat_goal_costs, flat_previous, flat_successors, flat_price = (
+        goal_costs.ravel(),
+        previous_goal_costs.ravel(),
         successors.ravel(),
         price.ravel(),
     )
@@ -97,7 +97,7 @@ def _relax_stage_back(
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
                 relax(
-                    flat_remaining,
+                    flat_goal_costs,
                     flat_price,
                     flat_previous,
                     flat_successors,
@@ -110,12 +110,12 @@ def _relax_stage_back(
 
 
 @inner
-def _drop_cells_above_bound(reached: Floats, remaining: Floats, spans: Records, bound: float) -> None:
+def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Records, bound: float) -> None:
     """Drop cells (layers, across) of one stage through which no route is within the bound."""
-    for z in range(reached.shape[0]):
+    for z in range(start_costs.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
-            if not reached[z, y] + remaining[z, y] <= bound:
-                remaining[z, y] = math.inf
+            if not start_costs[z, y] + goal_costs[z, y] <= bound:
+                goal_costs[z, y] = math.inf
 
 
 class SideSearch(NamedTuple):
@@ -162,13 +162,13 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
     step = frame.length / stages
     shape = (stages + 1, layer_count, width)
     centre_index, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
-    reached, remaining = np.full(shape, np.inf), np.full(shape, np.inf)
+    start_costs, goal_costs = np.full(shape, np.inf), np.full(shape, np.inf)
     spans = np.zeros((stages + 1, layer_count), dtype=SPAN)
     for z in range(layer_count):
         spans[0, z].first, spans[0, z].last = (centre_index, centre_index) if z == start else (width, -1)
-    reached[0, start, centre_index] = 0.0
+    start_costs[0, start, centre_index] = 0.0
     return SideSearch(
-        GridCosts(reached, np.zeros(shape, dtype=np.int32), remaining, np.zeros(shape, dtype=np.int32)),
+        GridCosts(start_costs, np.zeros(shape, dtype=np.int32), goal_costs, np.zeros(shape, dtype=np.int32)),
         layers_per_step(data, frame, step, grid.layers, grid.ratio),
         find_obstacles(data, frame, step, grid.shrink),
         np.full(shape, np.inf),
@@ -188,7 +188,7 @@ def continue_grid_costs(
     step, required = frame.length / stages, required_clearance(data)
     pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     costs, step_layers, obstacles, price, spans, centre_index, goal, done = search
-    reached, parents, remaining, successors = costs
+    start_costs, parents, goal_costs, successors = costs
     height_differences, goal_distances, extra = (
         grid.layers - grid.layers[goal],
         np.empty(width),
@@ -206,7 +206,7 @@ def continue_grid_costs(
                 end_number = 2 * stages
                 break
             set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, price[stage])
-            previous_costs, stage_costs = reached[stage - 1], reached[stage]
+            previous_costs, stage_costs = start_costs[stage - 1], start_costs[stage]
             relax_stage(
                 previous_costs,
                 stage_costs,
@@ -219,12 +219,12 @@ def continue_grid_costs(
                 grid.ratio,
             )
             fill_goal_distances(width, centre_index, stages - stage, step, grid.ratio, goal_distances)
-            prune(reached[stage], spans[stage], goal_distances, height_differences, bound, first, last)
+            prune(start_costs[stage], spans[stage], goal_distances, height_differences, bound, first, last)
             continue
         if step_number == stages:
-            remaining[stages, goal, centre_index] = 0.0
+            goal_costs[stages, goal, centre_index] = 0.0
         stage = 2 * stages - 1 - step_number
-        next_costs, stage_costs = remaining[stage + 1], remaining[stage]
+        next_costs, stage_costs = goal_costs[stage + 1], goal_costs[stage]
         _relax_stage_back(
             next_costs,
             price[stage + 1],
@@ -236,7 +236,7 @@ def continue_grid_costs(
             pitch,
             grid.ratio,
         )
-        _drop_cells_above_bound(reached[stage], remaining[stage], spans[stage], bound)
+        _drop_cells_above_bound(start_costs[stage], goal_costs[stage], spans[stage], bound)
     return SideSearch(costs, step_layers, obstacles, price, spans, centre_index, goal, end_number)
 
 
@@ -263,7 +263,7 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
             continue
         for z in range(grid.layers.size):
             for y in range(grid.across.size):
-                cost = costs.reached[stage, z, y] + costs.remaining[stage, z, y]
+                cost = costs.start_costs[stage, z, y] + costs.goal_costs[stage, z, y]
                 if cost == math.inf:
                     continue
                 passing = passings[k, side_of(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]

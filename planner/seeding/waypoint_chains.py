@@ -152,8 +152,11 @@ def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps
     for i in range(1, candidates.shape[0] - 1):
         for k in range(candidates.shape[1]):
             if cost[i, k] < np.inf:
-                previous, next_waypoint = candidates[i - 1, sweeps.before[i, k]], candidates[i + 1, sweeps.after[i, k]]
-                cost[i, k] += _corner_cost(data, limits, previous, candidates[i, k], next_waypoint, corners)
+                previous_waypoint, next_waypoint = (
+                    candidates[i - 1, sweeps.before[i, k]],
+                    candidates[i + 1, sweeps.after[i, k]],
+                )
+                cost[i, k] += _corner_cost(data, limits, previous_waypoint, candidates[i, k], next_waypoint, corners)
                 cost[i, k] = cost[i, k] if cost[i, k] <= bound else np.inf
     return cost
 
@@ -238,7 +241,7 @@ def _distance(start: Floats, end: Floats) -> float:
 def _corner_cost(
     data: ProblemArrays,
     limits: PrecomputedLimits,
-    previous: Floats,
+    previous_waypoint: Floats,
     waypoint: Floats,
     next_waypoint: Floats,
     corners: Records,
@@ -248,8 +251,8 @@ def _corner_cost(
     corners: scratch, one record.
     """
     ux, uy, vx, vy = (
-        waypoint[0] - previous[0],
-        waypoint[1] - previous[1],
+        waypoint[0] - previous_waypoint[0],
+        waypoint[1] - previous_waypoint[1],
         next_waypoint[0] - waypoint[0],
         next_waypoint[1] - waypoint[1],
     )
