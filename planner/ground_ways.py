@@ -107,7 +107,7 @@ class _DescentFile(_FileTable):
 
 
 class DepartureAndApproachFile(_FileTable):
-    """Departure and approach of a plan as JSON: keys with units, None if missing."""
+    """Departure and approach of a plan as JSON, with units in the keys; each is None if missing."""
 
     climb: _ClimbFile | None = None
     descent: _DescentFile | None = None
@@ -136,7 +136,7 @@ class DepartureAndApproachFile(_FileTable):
         return DepartureAndApproach(climb, descent)
 
 
-def departure_and_approach_json(ways: DepartureAndApproach) -> dict[str, Any]:
+def departure_and_approach_json(procedures: DepartureAndApproach) -> dict[str, Any]:
     """Convert departure and approach to JSON data, which `DepartureAndApproachFile` reads.
 
     >>> climb = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 90.0]]), 0.15)
@@ -145,7 +145,7 @@ def departure_and_approach_json(ways: DepartureAndApproach) -> dict[str, Any]:
     (['climb'], [[0.0, 600.0, 90.0]])
     """
     data: dict[str, Any] = {}
-    if (climb := ways.climb) is not None:
+    if (climb := procedures.climb) is not None:
         data["climb"] = {
             "home_east_north_amsl_m": climb.home.tolist(),
             "course_rad": climb.course,
@@ -153,7 +153,7 @@ def departure_and_approach_json(ways: DepartureAndApproach) -> dict[str, Any]:
             "waypoints_east_north_amsl_m": climb.waypoints.tolist(),
             "gradient": climb.gradient,
         }
-    if (descent := ways.descent) is not None:
+    if (descent := procedures.descent) is not None:
         data["descent"] = {
             "waypoints_east_north_amsl_m": descent.waypoints.tolist(),
             "line_up_east_north_amsl_m": descent.final_waypoints.tolist(),

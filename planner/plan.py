@@ -75,10 +75,9 @@ class Certificate:
     available_length: smallest length of a leg between its two turns, m; inf if only the fixed turn limit applies.
     clearance: smallest height above ground minus the required clearance, m.
     bounds: margin to map, floor and ceiling, m.
-    kill_distance: distance of the path from the nearest missile sphere, m; negative inside, inf without
-    missiles.
-    zone_distance: outside exclusions and inside inclusions, horizontal or vertical, m; negative if a zone is violated,
-    inf without zones.
+    kill_distance: distance of the path from the nearest missile sphere, m; negative inside, inf without missiles.
+    zone_distance: distance outside exclusions and inside inclusions, horizontal or vertical, m; negative if a zone is
+    violated, inf without zones.
     headroom: maximum height above ground minus the path's height, m; inf without a maximum.
     problems: one line per failure, empty if the path is certified.
     """
@@ -110,8 +109,8 @@ class Plan:
     seed, algorithm, evaluations: seed, algorithm and number of evaluations of the search.
     history: (g, 3) length ratio, kill exposure and violations (for graded algorithms the number of kinds violated) of
     the best path in each generation.
-    ended: "completed", or why the search ended early: "budget", "interrupted".
-    flown_legs: number of legs at the beginning that were already flown under an earlier plan.
+    ended: "completed", or the reason why the search ended early: "budget" or "interrupted".
+    flown_legs: number of first legs that were already flown under an earlier plan.
     ways: departure from the ground to the first waypoint and approach from the last; None for a plan that stays in the
     air. If a departure or approach that the scenario requires is blocked, the certificate reports it.
     """
@@ -201,12 +200,12 @@ class _PlanFile(_Model):
     history: list[list[float | None]]
 
 
-def _or_none(value: float) -> float | None:
+def _finite_or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _airspace_keys(certificate: Certificate) -> dict[str, float]:
-    """Return the certificate's entries for zones and maximum height, or no entries if the scenario has neither."""
+def _airspace_entries(certificate: Certificate) -> dict[str, float]:
+    """Return the certificate's entries for zones and maximum height; empty if the scenario has neither."""
     values = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
     return {key: float(value) for key, value in values.items() if np.isfinite(value)}
 
@@ -240,15 +239,15 @@ def plan_json(plan: Plan) -> str:
         "objectives": plan.objectives._asdict(),
         "certificate": {
             "turn_margin_rad": certificate.turn,
-            "turn_room_m": _or_none(certificate.available_length),
+            "turn_room_m": _finite_or_none(certificate.available_length),
             "slope_margin_rad": certificate.slope,
-            "clearance_margin_m": _or_none(certificate.clearance),
+            "clearance_margin_m": _finite_or_none(certificate.clearance),
             "bounds_margin_m": certificate.bounds,
-            "kill_distance_m": _or_none(certificate.kill_distance),
-            **_airspace_keys(certificate),
+            "kill_distance_m": _finite_or_none(certificate.kill_distance),
+            **_airspace_entries(certificate),
             "problems": list(certificate.problems),
         },
-        "history": [[_or_none(value) for value in row] for row in plan.history.tolist()],
+        "history": [[_finite_or_none(value) for value in row] for row in plan.history.tolist()],
         "scenario": plan.scenario.to_json(),
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
@@ -289,13 +288,13 @@ def parse_plan(
     saved_certificate = plan_file.certificate
     certificate = Certificate(
         turn=saved_certificate.turn_margin_rad,
-        available_length=_or_inf(saved_certificate.turn_room_m),
+        available_length=_none_to_inf(saved_certificate.turn_room_m),
         slope=saved_certificate.slope_margin_rad,
         clearance=np.nan if saved_certificate.clearance_margin_m is None else saved_certificate.clearance_margin_m,
         bounds=saved_certificate.bounds_margin_m,
-        kill_distance=_or_inf(saved_certificate.kill_distance_m),
-        zone_distance=_or_inf(saved_certificate.zone_distance_m),
-        headroom=_or_inf(saved_certificate.headroom_m),
+        kill_distance=_none_to_inf(saved_certificate.kill_distance_m),
+        zone_distance=_none_to_inf(saved_certificate.zone_distance_m),
+        headroom=_none_to_inf(saved_certificate.headroom_m),
         problems=tuple(saved_certificate.problems),
     )
     history = np.array([[np.nan if value is None else value for value in row] for row in plan_file.history]).reshape(
@@ -333,7 +332,7 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
     return parse_plan(text, str(path), base=path.parent, terrain=terrain)
 
 
-def _or_inf(value: float | None) -> float:
+def _none_to_inf(value: float | None) -> float:
     return np.inf if value is None else value
 
 

@@ -1,7 +1,7 @@
-"""Zones and the maximum height above ground: violations for the search, margins for the certificate.
+"""Measure zones and the maximum height above ground: violations for the search, margins for the certificate.
 
-A search adds to a path's scores how deep its legs penetrate zones (bounds) and how far they exceed the maximum height
-above ground (terrain), both in m x km; the paper's scores count pieces of legs instead. Each leg is first tested as a
+A search adds to a path's scores the depth of its legs in zones (bounds) and their excess over the maximum height above
+ground (terrain), both in m x km; the paper's scores count pieces of legs instead. Each leg is first tested as a
 whole with the largest lateral deviation of the flight, corners included, and cut into parts only where that test fails.
 A certificate measures the distance from each zone and the maximum height above ground of every piece of the path.
 """
@@ -116,8 +116,10 @@ def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
             end[0] = point[0] + side * lateral * dy / horizontal_length
             end[1] = point[1] - side * lateral * dx / horizontal_length
             end[2] = -(point[2] + piece.above)
-        mirrored, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
-        max_height = math.nan if math.isnan(mirrored) or math.isnan(max_height) else max(max_height, -mirrored)
+        negated_height, _ = segment_clearance(data.airspace.depths, data.to_pixel, a, b)
+        max_height = (
+            math.nan if math.isnan(negated_height) or math.isnan(max_height) else max(max_height, -negated_height)
+        )
     return max_height
 
 
@@ -135,13 +137,13 @@ def add_airspace_violations(
     path: Floats,
     legs: Records,
     corners: Records,
-    flown: Records,
+    flown_corners: Records,
     lags: Records,
     violations: Record,
 ) -> None:
     """Add zone penetration (bounds) and excess height (terrain) of a path (w, 3) to a `VIOLATIONS` record, m x km.
 
-    legs, corners, flown, lags: measurements of the path.
+    legs, corners, flown_corners, lags: measurements of the path.
     """
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
@@ -149,7 +151,7 @@ def add_airspace_violations(
     last_leg = legs.shape[0] - 1
     across = float(data.tracking.across)
     for i in range(last_leg + 1):
-        offset_before, offset_after = float(flown[i].fly_by_offset), float(flown[i + 1].fly_by_offset)
+        offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if has_max_height:
             violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
@@ -187,7 +189,9 @@ def add_airspace_violations(
 
 
 @inner
-def airspace_excess(data: ProblemArrays, a: Floats, b: Floats, below: float, above: float, max_excess: float) -> float:
+def airspace_excess(
+    data: ProblemArrays, start: Floats, end: Floats, below: float, above: float, max_excess: float
+) -> float:
     """Return the zone penetration and the excess height above ground of a leg, each integrated along the leg, m x km.
 
     below, above: vertical tracking error, m.
@@ -195,33 +199,39 @@ def airspace_excess(data: ProblemArrays, a: Floats, b: Floats, below: float, abo
     """
     total, across = 0.0, float(data.tracking.across)
     if data.airspace.zones.required.shape[0] > 0:
-        total += _leg_zone_penetration(data, a, b, across, below, above)
+        total += _leg_zone_penetration(data, start, end, across, below, above)
     if data.airspace.max_height < math.inf:
-        total += _swath_excess_height(data, required_headroom(data), a, b, across, above, max_excess - total)
+        total += _swath_excess_height(data, required_headroom(data), start, end, across, above, max_excess - total)
     return total
 
 
 @inner
 def _leg_zone_penetration(
-    data: ProblemArrays, a: Floats, b: Floats, lateral: float, below: float, above: float
+    data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
     zones = data.airspace.zones
-    return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, a, b, lateral, below, above)
+    return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, start, end, lateral, below, above)
 
 
 @inner
 def _leg_excess_height(
-    data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, leg: Record, lag: Record, across: float
+    data: ProblemArrays,
+    required: RequiredClearance,
+    leg_start: Floats,
+    leg_end: Floats,
+    leg: Record,
+    lag: Record,
+    across: float,
 ) -> float:
     """Return a leg's excess over the maximum height above ground, height lag included, m x km."""
     if not data.tracking.has_error:
-        return _swath_excess_height(data, required, a, b, 0.0, 0.0, math.inf)
+        return _swath_excess_height(data, required, leg_start, leg_end, 0.0, 0.0, math.inf)
     total, start, end = 0.0, np.empty(3), np.empty(3)
     for k in range(len(_LAG_CUTS)):
         begin_fraction = min(1.0, _LAG_CUTS[k] / max(1e-9, lag.decay))
         end_fraction = min(1.0, _LAG_CUTS[k + 1] / max(1e-9, lag.decay)) if k + 1 < len(_LAG_CUTS) else 1.0
         if end_fraction > begin_fraction:
-            _cut_segment(a, b, begin_fraction, end_fraction, start, end)
+            _cut_segment(leg_start, leg_end, begin_fraction, end_fraction, start, end)
             above = max(0.0, -lag_at(lag, begin_fraction), -lag_at(lag, end_fraction))
             total += _swath_excess_height(data, required, start, end, across, above, math.inf)
     return total
@@ -231,8 +241,8 @@ def _leg_excess_height(
 def _swath_excess_height(
     data: ProblemArrays,
     required: RequiredClearance,
-    a: Floats,
-    b: Floats,
+    start: Floats,
+    end: Floats,
     lateral: float,
     above: float,
     max_excess: float,
@@ -241,16 +251,16 @@ def _swath_excess_height(
 
     If the excess is larger than `max_excess`, return a lower bound that is larger than `max_excess`, too.
     """
-    horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
-    east, north = lateral * (b[1] - a[1]) / horizontal_length, -lateral * (b[0] - a[0]) / horizontal_length
+    horizontal_length = max(1e-9, math.hypot(end[0] - start[0], end[1] - start[1]))
+    east, north = lateral * (end[1] - start[1]) / horizontal_length, -lateral * (end[0] - start[0]) / horizontal_length
     largest_excess = 0.0
     for side in (0.0, -1.0, 1.0):
         if side != 0.0 and lateral < _MIN_OFFSET_M:
             break
-        x, y, x2, y2 = a[0] + side * east, a[1] + side * north, b[0] + side * east, b[1] + side * north
+        x, y, x2, y2 = start[0] + side * east, start[1] + side * north, end[0] + side * east, end[1] + side * north
         ends = segment_pixels(data.to_pixel, x, y, x2, y2)
         depths, bounds = data.airspace.depths, data.slope_bounds
-        excess = terrain_excess(depths, bounds, required, above, ends, x, y, -a[2], x2, y2, -b[2], max_excess)
+        excess = terrain_excess(depths, bounds, required, above, ends, x, y, -start[2], x2, y2, -end[2], max_excess)
         largest_excess = max(largest_excess, excess)
         if largest_excess > max_excess:
             break
@@ -259,12 +269,12 @@ def _swath_excess_height(
 
 @inlined
 def _cut_segment(
-    a: Floats, b: Floats, begin_fraction: float, end_fraction: float, start: Floats, end: Floats
+    leg_start: Floats, leg_end: Floats, begin_fraction: float, end_fraction: float, start: Floats, end: Floats
 ) -> None:  # pragma: no cover
-    """Fill `start` and `end` with the ends of the part of a-b between two fractions of its length."""
+    """Fill `start` and `end` with the ends of the part of a leg between two fractions of its length."""
     for axis in range(3):
-        start[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
-        end[axis] = a[axis] + end_fraction * (b[axis] - a[axis])
+        start[axis] = leg_start[axis] + begin_fraction * (leg_end[axis] - leg_start[axis])
+        end[axis] = leg_start[axis] + end_fraction * (leg_end[axis] - leg_start[axis])
 
 
 def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:

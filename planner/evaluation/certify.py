@@ -109,14 +109,16 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
     if not data.legs_hold_turns:
         return min_margin
     lengths = turn_and_roll_lengths(data, waypoints)
-    for i, (length, turns, roll) in enumerate(zip(leg_runs(waypoints), *lengths, strict=True)):
-        if turns == 0.0:
+    for i, (length, turns_length, roll_length) in enumerate(zip(leg_runs(waypoints), *lengths, strict=True)):
+        if turns_length == 0.0:
             continue
-        min_margin = min(min_margin, float(length - turns - roll))
-        settling = settling_length(float(turns), float(length)) + roll
-        if turns + settling > length + _EPSILON:
-            description = f"{length:.0f} m long, its turns need {turns:.0f} m and {settling:.0f} m to settle"
-            faults.append((float(length - turns) - settling, f"leg {i}", description))
+        min_margin = min(min_margin, float(length - turns_length - roll_length))
+        settling_and_roll = settling_length(float(turns_length), float(length)) + roll_length
+        if turns_length + settling_and_roll > length + _EPSILON:
+            description = (
+                f"{length:.0f} m long, its turns need {turns_length:.0f} m and {settling_and_roll:.0f} m to settle"
+            )
+            faults.append((float(length - turns_length) - settling_and_roll, f"leg {i}", description))
     problems += _summarise_faults(faults)
     return min_margin
 
@@ -132,16 +134,16 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
     if not data.legs_hold_turns or data.fly_over or limits_are_fixed:
         return min_margin
     radii, tangents = fly_by_radii(data, waypoints), turn_tangents(data.aircraft, waypoints)
-    rises = np.tan(leg_slopes(waypoints))
+    leg_tangents = np.tan(leg_slopes(waypoints))
     faults: list[_Fault] = []
     for i in range(1, len(waypoints) - 1):
         if tangents[i] <= 0.0 or radii[i] <= 0.0:
             continue
-        slope = math.atan(arc_slope(rises[i - 1], rises[i], tangents[i], radii[i]))
-        flat = np.array([0.0, 0.0, waypoints[i, 2]])
-        for begin, end in ((i - 1, i), (i, i + 1)):
-            step = np.append((waypoints[end] - waypoints[begin])[:2], waypoints[i, 2])
-            climb, dive = slope_limits(data, flat, step)
+        slope = math.atan(arc_slope(leg_tangents[i - 1], leg_tangents[i], tangents[i], radii[i]))
+        level_start = np.array([0.0, 0.0, waypoints[i, 2]])
+        for start, end in ((i - 1, i), (i, i + 1)):
+            level_end = np.append((waypoints[end] - waypoints[start])[:2], waypoints[i, 2])
+            climb, dive = slope_limits(data, level_start, level_end)
             margin = min(climb - slope, dive + slope)
             min_margin = min(min_margin, margin + data.angle_margin)
             if margin < -_EPSILON:

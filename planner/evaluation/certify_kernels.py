@@ -1,4 +1,4 @@
-"""Compiled measurements of the certificate: pieces of the path, their clearance and their distance to missiles.
+"""Measure a path for its certificate: pieces of the path, their clearance and their distance to missiles.
 
 A path is cut into straight pieces. Without tracking error these are its legs and the chords of its fly-by arcs. With it
 they are parts of legs and corners, each with bounds on how far the flight deviates from it sideways, below and above;
@@ -113,11 +113,11 @@ def _piece_ends(decay: float, horizontal_length: float) -> Floats:
 
 
 @inner
-def _cut_piece(a: Floats, b: Floats, begin_fraction: float, end_fraction: float, piece: Record) -> None:
-    """Set a piece's ends to the points of a-b at two fractions."""
+def _cut_piece(start: Floats, end: Floats, begin_fraction: float, end_fraction: float, piece: Record) -> None:
+    """Set a piece's ends to the points of a line at two fractions of its length."""
     for axis in range(3):
-        piece.begin[axis] = a[axis] + begin_fraction * (b[axis] - a[axis])
-        piece.end[axis] = a[axis] + end_fraction * (b[axis] - a[axis])
+        piece.begin[axis] = start[axis] + begin_fraction * (end[axis] - start[axis])
+        piece.end[axis] = start[axis] + end_fraction * (end[axis] - start[axis])
 
 
 @inner
@@ -157,10 +157,10 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
     min_distance = math.inf
     if data.tracking.has_error:
         for piece in tracked_pieces(data, waypoints):
-            a, b = piece.begin.copy(), piece.end.copy()
+            start, end = piece.begin.copy(), piece.end.copy()
             for height_shift in (0.0, -piece.below, piece.above):
-                a[2], b[2] = piece.begin[2] + height_shift, piece.end[2] + height_shift
-                min_distance = min(min_distance, _segment_distance(data.threats, a, b, math.inf) - piece.lateral)
+                start[2], end[2] = piece.begin[2] + height_shift, piece.end[2] + height_shift
+                min_distance = min(min_distance, _segment_distance(data.threats, start, end, math.inf) - piece.lateral)
         return min_distance
     leg_count = waypoints.shape[0] - 1
     for i in range(leg_count):
@@ -174,15 +174,15 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 
 @inner
-def _segment_distance(threats: Records, a: Floats, b: Floats, min_distance: float) -> float:
-    """Return the distance from a-b to the nearest missile sphere, or `min_distance` if that is smaller."""
-    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance: float) -> float:
+    """Return the distance from a segment to the nearest missile sphere, or `min_distance` if that is smaller."""
+    dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length2 = dx * dx + dy * dy + dz * dz
     for k in range(threats.shape[0]):
         threat = threats[k]
         if threat.kill_radius <= 0.0:
             continue
-        x, y, z = a[0] - threat.east, a[1] - threat.north, a[2] - threat.up
+        x, y, z = start[0] - threat.east, start[1] - threat.north, start[2] - threat.up
         along = dx * x + dy * y + dz * z
         fraction = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
         # From the closest point itself: a difference of squares loses digits.
@@ -285,10 +285,10 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
 
 
 @inner
-def _measure_piece(data: ProblemArrays, a: Floats, b: Floats, of_arc: bool, number: int, out: Record) -> None:
-    height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
+def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool, number: int, out: Record) -> None:
+    height, _ = segment_clearance(data.heights, data.to_pixel, start, end)
     out.of_arc, out.number, out.height = of_arc, number, height
-    out.buffer = required_buffer(data, data.buffer, (data.start_buffer, data.destination_buffer), a, b)
+    out.buffer = required_buffer(data, data.buffer, (data.start_buffer, data.destination_buffer), start, end)
 
 
 @inner

@@ -105,12 +105,12 @@ def measure_corner(
 @inlined
 def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float, float, float]:
     """Return the unit courses of the legs before and after waypoint i, or at an end the prescribed course."""
-    last = legs.shape[0]
-    leg_after, leg_before = min(i, last - 1), max(i - 1, 0)
+    leg_count = legs.shape[0]
+    leg_after, leg_before = min(i, leg_count - 1), max(i - 1, 0)
     ux, uy, vx, vy = legs[leg_before].east, legs[leg_before].north, legs[leg_after].east, legs[leg_after].north
     if i == 0 and not math.isnan(data.start_course):
         ux, uy = math.sin(data.start_course), math.cos(data.start_course)
-    if i == last and not math.isnan(data.destination_course):
+    if i == leg_count and not math.isnan(data.destination_course):
         vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
     return ux, uy, vx, vy
 
@@ -136,8 +136,8 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
         return 0.0
     if math.isinf(corners[i].tangent):
         return math.inf
-    return_length: float = corners[i].radius * fly_over_run(2.0 * math.atan(corners[i].tangent / corners[i].radius))
-    return max(return_length, corners[i].after) if corners[i].excursion > 0.0 else return_length
+    rejoin_length: float = corners[i].radius * fly_over_run(2.0 * math.atan(corners[i].tangent / corners[i].radius))
+    return max(rejoin_length, corners[i].after) if corners[i].excursion > 0.0 else rejoin_length
 
 
 @inner
@@ -167,14 +167,18 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 
 @inner
 def fly_by_vertices(
-    aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
+    aircraft: PerformanceTable, previous_waypoint: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
     """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`."""
-    return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
+    return blended_vertices(
+        half_blend_length(aircraft, waypoint[2]), previous_waypoint, waypoint, next_waypoint, radius
+    )
 
 
 @inner
-def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
+def blended_vertices(
+    blend: float, previous_waypoint: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
+) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flight.
 
     The vertices are a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent
@@ -184,47 +188,52 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
 
     blend: half length of a blend (`half_blend_length`).
     """
-    run_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
-    run_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
-    if run_before < 1e-6 or run_after < 1e-6:
+    length_before = math.hypot(waypoint[0] - previous_waypoint[0], waypoint[1] - previous_waypoint[1])
+    length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
+    if length_before < 1e-6 or length_after < 1e-6:
         return waypoint.copy().reshape((1, 3))
-    turn = turning_angle(previous[0], previous[1], waypoint[0], waypoint[1], next_waypoint[0], next_waypoint[1])
+    turn = turning_angle(
+        previous_waypoint[0], previous_waypoint[1], waypoint[0], waypoint[1], next_waypoint[0], next_waypoint[1]
+    )
     tangent = radius * math.tan(0.5 * turn) if 1e-6 < turn < math.pi - 1e-6 else 0.0
-    if tangent > min(run_before, run_after):
+    if tangent > min(length_before, length_after):
         tangent = 0.0
-    ux, uy = (waypoint[0] - previous[0]) / run_before, (waypoint[1] - previous[1]) / run_before
-    vx, vy = (next_waypoint[0] - waypoint[0]) / run_after, (next_waypoint[1] - waypoint[1]) / run_after
-    slope_in, slope_out = (waypoint[2] - previous[2]) / run_before, (next_waypoint[2] - waypoint[2]) / run_after
-    chords = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
-    arc = radius * turn if chords > 0 else 0.0
-    begin_height, end_height = waypoint[2] - tangent * slope_in, waypoint[2] + tangent * slope_out
-    slope = (end_height - begin_height) / arc if chords > 0 else slope_out
-    available_in, available_out = 0.5 * (run_before - tangent), 0.5 * (run_after - tangent)
-    half_limit = 0.5 * arc if chords > 0 else min(available_in, available_out)
+    ux, uy = (waypoint[0] - previous_waypoint[0]) / length_before, (waypoint[1] - previous_waypoint[1]) / length_before
+    vx, vy = (next_waypoint[0] - waypoint[0]) / length_after, (next_waypoint[1] - waypoint[1]) / length_after
+    slope_in, slope_out = (
+        (waypoint[2] - previous_waypoint[2]) / length_before,
+        (next_waypoint[2] - waypoint[2]) / length_after,
+    )
+    chord_count = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
+    arc_length = radius * turn if chord_count > 0 else 0.0
+    start_height, end_height = waypoint[2] - tangent * slope_in, waypoint[2] + tangent * slope_out
+    slope = (end_height - start_height) / arc_length if chord_count > 0 else slope_out
+    available_in, available_out = 0.5 * (length_before - tangent), 0.5 * (length_after - tangent)
+    half_limit = 0.5 * arc_length if chord_count > 0 else min(available_in, available_out)
     available_in, available_out = min(available_in, half_limit), min(available_out, half_limit)
     half_in = min(abs(slope_in - slope) * blend, available_in)
-    half_out = min(abs(slope - slope_out) * blend, available_out) if chords > 0 else half_in
+    half_out = min(abs(slope - slope_out) * blend, available_out) if chord_count > 0 else half_in
     deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in
     deviation_out = 0.25 * max(0.0, slope - slope_out) * half_out
-    vertices = np.empty((chords + 3, 3))
+    vertices = np.empty((chord_count + 3, 3))
     _set_vertex(
         vertices,
         0,
         waypoint[0] - ux * (tangent + half_in),
         waypoint[1] - uy * (tangent + half_in),
-        begin_height - half_in * slope_in,
+        start_height - half_in * slope_in,
     )
     side = 1.0 if ux * vy - uy * vx >= 0.0 else -1.0
-    for k in range(chords + 1):
-        fraction = k / chords if chords > 0 else 0.0
+    for k in range(chord_count + 1):
+        fraction = k / chord_count if chord_count > 0 else 0.0
         along, offset = radius * math.sin(fraction * turn) - tangent, side * radius * (1.0 - math.cos(fraction * turn))
         deviation = deviation_in + fraction * (deviation_out - deviation_in)
         east, north = waypoint[0] + ux * along - uy * offset, waypoint[1] + uy * along + ux * offset
-        _set_vertex(vertices, k + 1, east, north, begin_height + fraction * (end_height - begin_height) - deviation)
+        _set_vertex(vertices, k + 1, east, north, start_height + fraction * (end_height - start_height) - deviation)
     end_distance = tangent + half_out
     _set_vertex(
         vertices,
-        chords + 2,
+        chord_count + 2,
         waypoint[0] + vx * end_distance,
         waypoint[1] + vy * end_distance,
         end_height + half_out * slope_out,
@@ -234,11 +243,11 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
 
 @inner
 def legs_about(
-    previous: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
+    previous_waypoint: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
 ) -> Floats:
     """Return the parts of both legs next to `waypoint`, of the given lengths (m), as vertices (3, 3)."""
     vertices = np.empty((3, 3))
-    for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):
+    for row, neighbour, length in ((0, previous_waypoint, length_before), (2, next_waypoint, length_after)):
         horizontal_length = math.hypot(waypoint[0] - neighbour[0], waypoint[1] - neighbour[1])
         fraction = min(1.0, length / max(horizontal_length, 1e-6))
         for axis in range(3):

@@ -209,9 +209,9 @@ class Space:
     across: float | None = None
 
 
-def _add_ends(space: Space, inner: Floats) -> Floats:
-    out = np.empty((len(inner), inner.shape[1] + 2, 3))
-    out[:, 0], out[:, 1:-1], out[:, -1] = space.start, inner, space.destination
+def _add_ends(space: Space, inner_waypoints: Floats) -> Floats:
+    out = np.empty((len(inner_waypoints), inner_waypoints.shape[1] + 2, 3))
+    out[:, 0], out[:, 1:-1], out[:, -1] = space.start, inner_waypoints, space.destination
     return out
 
 
@@ -258,8 +258,8 @@ def frames_of(encoding: Encoding) -> WaypointFrames:
 
 def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
     """Return vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
-    inner = rotated_frame(space.start, space.destination).rotate(paths[:, 1:-1])
-    return np.clip(inner.reshape(len(paths), -1), encoding.lower, encoding.upper)
+    inner_points = rotated_frame(space.start, space.destination).rotate(paths[:, 1:-1])
+    return np.clip(inner_points.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
 def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:

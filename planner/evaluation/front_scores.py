@@ -18,12 +18,12 @@ from world.geometry import window_exposure
 from world.kernels import Record, compiled, inner
 from world.terrain import TILE, pixel_height
 
-_LENGTH = 0
-_EXPOSURE = 1
-_CLEARANCE = 2
-_TIME = 3
-_ENERGY = 4
-SECONDS = LENGTH_COST._replace(length=0.0, time=1.0)
+_LENGTH_COLUMN = 0
+_EXPOSURE_COLUMN = 1
+_CLEARANCE_COLUMN = 2
+_TIME_COLUMN = 3
+_ENERGY_COLUMN = 4
+TIME_COST = LENGTH_COST._replace(length=0.0, time=1.0)
 
 
 class Value(IntEnum):
@@ -42,8 +42,8 @@ def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) 
     energy: the cost of energy, with any weight (`make_travel_cost`); if None, energy is NaN.
     """
     out = np.zeros((len(paths), len(Value)))
-    energy_only = SECONDS if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
-    _fill(data, SECONDS, energy_only, np.ascontiguousarray(paths), out)
+    energy_cost = TIME_COST if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
+    _fill(data, TIME_COST, energy_cost, np.ascontiguousarray(paths), out)
     if energy is None:
         out[:, Value.ENERGY] = np.nan
     return out
@@ -55,20 +55,20 @@ def _fill(data: ProblemArrays, time_cost: TravelCost, energy_cost: TravelCost, p
         path = paths[n]
         min_height = math.inf
         for i in range(path.shape[0] - 1):
-            a, b = path[i], path[i + 1]
-            dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-            seconds = leg_cost(time_cost, data.aircraft, a, b)
-            out[n, _LENGTH] += math.sqrt(dx * dx + dy * dy + dz * dz)
-            out[n, _EXPOSURE] += seconds * _mean_detection(data, a, dx, dy, dz)
-            min_height = _min_height(data, a, dx, dy, dz, min_height)
-            out[n, _TIME] += seconds
-            out[n, _ENERGY] += leg_cost(energy_cost, data.aircraft, a, b)
-        out[n, _CLEARANCE] = min_height
+            start, end = path[i], path[i + 1]
+            dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+            seconds = leg_cost(time_cost, data.aircraft, start, end)
+            out[n, _LENGTH_COLUMN] += math.sqrt(dx * dx + dy * dy + dz * dz)
+            out[n, _EXPOSURE_COLUMN] += seconds * _mean_detection(data, start, dx, dy, dz)
+            min_height = _min_height(data, start, dx, dy, dz, min_height)
+            out[n, _TIME_COLUMN] += seconds
+            out[n, _ENERGY_COLUMN] += leg_cost(energy_cost, data.aircraft, start, end)
+        out[n, _CLEARANCE_COLUMN] = min_height
 
 
 @inner
-def _mean_detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float) -> float:
-    """Return the mean detection density along the leg d from a."""
+def _mean_detection(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float) -> float:
+    """Return the mean detection density along the leg (dx, dy, dz) from a start point."""
     total, length2 = 0.0, dx * dx + dy * dy + dz * dz
     if length2 < 1e-12:
         return 0.0
@@ -77,7 +77,7 @@ def _mean_detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: fl
         radius = threat.detection_radius
         if radius <= 0.0:
             continue
-        x, y, z = a[0] - threat.east, a[1] - threat.north, a[2] - threat.up
+        x, y, z = start[0] - threat.east, start[1] - threat.north, start[2] - threat.up
         dot, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
         mid_fraction = -dot / length2
         discriminant = mid_fraction * mid_fraction - (start2 - radius * radius) / length2
@@ -91,19 +91,19 @@ def _mean_detection(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: fl
 
 
 @inner
-def _min_height(data: ProblemArrays, a: Floats, dx: float, dy: float, dz: float, min_height: float) -> float:
-    """Return the minimum height above ground at samples of leg d from a and of earlier legs, m; -inf off the terrain.
+def _min_height(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float, min_height: float) -> float:
+    """Return the minimum height above ground at samples of a leg and of earlier legs, m; -inf off the terrain.
 
-    min_height: minimum height of the legs before, m. Samples are skipped where the steepest slope nearby shows that the
-        ground cannot be closer.
+    start, dx, dy, dz: start of the leg, and the leg, m.  min_height: minimum height of the earlier legs, m.
+    Samples are skipped where the steepest slope nearby shows that the ground cannot be closer.
     """
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     count = 1 + int(horizontal_length / data.sample_pitch)
     tiles, k = data.slope_bounds.tiles, 0
     while True:
         fraction = k / count
-        column, row = polymap(data.to_pixel, a[0] + fraction * dx, a[1] + fraction * dy)
-        height = a[2] + fraction * dz - pixel_height(data.heights, column, row)
+        column, row = polymap(data.to_pixel, start[0] + fraction * dx, start[1] + fraction * dy)
+        height = start[2] + fraction * dz - pixel_height(data.heights, column, row)
         if not height >= min_height:
             min_height = -math.inf if math.isnan(height) else height
         if k == count or min_height == -math.inf:

@@ -123,16 +123,22 @@ def score_legs(
 
     objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
     """
-    legs, corners, flown, extents, lags = scratch.legs, scratch.corners, scratch.flown, scratch.extents, scratch.lags
+    legs, corners, flown_corners, extents, lags = (
+        scratch.legs,
+        scratch.corners,
+        scratch.flown,
+        scratch.extents,
+        scratch.lags,
+    )
     aircraft = data.aircraft
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
     add_leg_violations(data, limits, path, legs, corners, True, violations)
     if data.tracking.has_error:
         measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
-        _measure_tracked(corners, flown, extents)
+        _measure_tracked_corners(corners, flown_corners, extents)
     else:
-        _measure_arcs(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
+        _measure_arcs(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown_corners, extents)
     length = 0.0
     for i in range(legs.shape[0]):
         length += legs[i].length
@@ -173,15 +179,15 @@ def score_missiles(
     """Score missiles, and the ground below corners as flown, the third part."""
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
-    bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
-    legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
+    slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
+    legs, corners, flown_corners, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
     terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
     count, has_error = path.shape[0], data.tracking.has_error
     length, kill_sum = 0.0, 0.0
     for i in range(count - 1):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
-        gap_distance = max(flown[i].missile_distance, flown[i + 1].missile_distance)
+        gap_distance = max(flown_corners[i].missile_distance, flown_corners[i + 1].missile_distance)
         lag = lags[i]
         exposure, at_beginning, at_end = kill_density(
             missiles,
@@ -202,7 +208,7 @@ def score_missiles(
         kill_sum += exposure * legs[i].length
         length += legs[i].length
     for i in range(1, count - 1):
-        vertical_drop, lateral_offset = flown[i].blend_deviation, flown[i].fly_by_offset
+        vertical_drop, lateral_offset = flown_corners[i].blend_deviation, flown_corners[i].fly_by_offset
         min_height = min(terrain_legs[i - 1].height_at_end, terrain_legs[i].height_at_beginning)
         is_near_ground = min_height < vertical_drop + required.steepest_loss * lateral_offset
         is_near_missile = (
@@ -214,12 +220,12 @@ def score_missiles(
         if has_error:
             vertices = legs_about(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
             below, above = _max_lag_near(lags[i], legs[i], corners[i])
-            extra_height, missile_margin = below + bounds.steepest * lateral_offset, margin + lateral_offset
+            extra_height, missile_margin = below + slope_bounds.steepest * lateral_offset, margin + lateral_offset
         else:
-            vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
+            vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown_corners[i].radius)
             below, above, extra_height, missile_margin = 0.0, 0.0, 0.0, margin
         if is_near_ground:
-            violations.terrain += _corner_depth(heights, bounds, to_pixel, required, extra_height, vertices)
+            violations.terrain += _corner_depth(heights, slope_bounds, to_pixel, required, extra_height, vertices)
         if is_near_missile:
             kill_sum += _corner_exposure(missiles, missile_margin, vertices, below, above)
     objectives.kill_exposure = kill_sum * POINTS_PER_LEG * (count - 1) / length
@@ -265,9 +271,9 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
     if math.isinf(corners[i].tangent):
         return 0.0
     if not legs_hold_turns:
-        last = legs.shape[0]
+        leg_count = legs.shape[0]
         tangent_before = corners[i - 1].tangent if i > 1 else 0.0
-        tangent_after = corners[i + 1].tangent if i < last - 1 else 0.0
+        tangent_after = corners[i + 1].tangent if i < leg_count - 1 else 0.0
         if corners[i].tangent + tangent_before > legs[i - 1].run or corners[i].tangent + tangent_after > legs[i].run:
             return 0.0
     return radius
@@ -316,12 +322,12 @@ def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, floa
 
     lag, leg: records of the leg after the corner.
     """
-    begin_lag, settled_lag = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
-    return max(0.0, begin_lag, settled_lag), max(0.0, -begin_lag, -settled_lag)
+    start_lag, settled_lag = lag_at(lag, 0.0), lag_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
+    return max(0.0, start_lag, settled_lag), max(0.0, -start_lag, -settled_lag)
 
 
 @inlined
-def _measure_tracked(corners: Records, flown: Records, extents: Floats) -> None:
+def _measure_tracked_corners(corners: Records, flown: Records, extents: Floats) -> None:
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path with tracking error."""
     for i in range(1, corners.shape[0] - 1):
         excursion = corners[i].excursion

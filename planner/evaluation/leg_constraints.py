@@ -74,25 +74,25 @@ def copy_point(source: Record, target: Record, size: int) -> None:
 
 
 @inlined
-def subtract_points(end: Record, begin: Record, size: int, out: Record) -> None:
+def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
     """Fill the step from one point of each path to another."""
     for b in range(size):
-        out.east[b] = end.east[b] - begin.east[b]
-        out.north[b] = end.north[b] - begin.north[b]
-        out.up[b] = end.up[b] - begin.up[b]
-        out.column[b] = end.column[b] - begin.column[b]
-        out.row[b] = end.row[b] - begin.row[b]
+        out.east[b] = end.east[b] - start.east[b]
+        out.north[b] = end.north[b] - start.north[b]
+        out.up[b] = end.up[b] - start.up[b]
+        out.column[b] = end.column[b] - start.column[b]
+        out.row[b] = end.row[b] - start.row[b]
 
 
 @inlined
-def divide_legs(begin: Record, step: Record, fraction: float, size: int, out: Record) -> None:
+def divide_legs(start: Record, step: Record, fraction: float, size: int, out: Record) -> None:
     """Fill the point of each path's leg at this fraction of the step from its beginning."""
     for b in range(size):
-        out.east[b] = begin.east[b] + fraction * step.east[b]
-        out.north[b] = begin.north[b] + fraction * step.north[b]
-        out.up[b] = begin.up[b] + fraction * step.up[b]
-        out.column[b] = begin.column[b] + fraction * step.column[b]
-        out.row[b] = begin.row[b] + fraction * step.row[b]
+        out.east[b] = start.east[b] + fraction * step.east[b]
+        out.north[b] = start.north[b] + fraction * step.north[b]
+        out.up[b] = start.up[b] + fraction * step.up[b]
+        out.column[b] = start.column[b] + fraction * step.column[b]
+        out.row[b] = start.row[b] + fraction * step.row[b]
 
 
 @inlined
@@ -168,7 +168,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
         climb = _min_slope_limit(data, data.aircraft.climb)
     if math.isnan(dive):
         dive = _min_slope_limit(data, data.aircraft.descent)
-        # No leg, whatever its slope, may lead to where the aircraft cannot fly level.
+        # No leg, whatever its slope, may lead to an altitude at which the aircraft cannot fly level.
         if data.aircraft.equivalent > 0.0 and _min_slope_limit(data, data.aircraft.climb) < 0.0:
             dive = -1.0
     return PrecomputedLimits(
@@ -209,7 +209,7 @@ def _straight_distance(start: Floats, destination: Floats) -> float:
 
 @inlined
 def _course_slope_limits(
-    data: ProblemArrays, ux: float, uy: float, begin_altitude: float, end_altitude: float, wind: Wind
+    data: ProblemArrays, ux: float, uy: float, start_altitude: float, end_altitude: float, wind: Wind
 ) -> tuple[float, float]:
     """Return the climb and dive limits on the unit course u between two altitudes, rad."""
     climb, dive = data.max_climb, data.max_dive
@@ -221,7 +221,7 @@ def _course_slope_limits(
                 data.aircraft,
                 ux * wx + uy * wy,
                 ux * wy - uy * wx,
-                begin_altitude + fraction * (end_altitude - begin_altitude),
+                start_altitude + fraction * (end_altitude - start_altitude),
             )
             aircraft_climb, aircraft_dive = min(aircraft_climb, climb_angle), min(aircraft_dive, dive_angle)
         if math.isnan(climb):
@@ -232,12 +232,12 @@ def _course_slope_limits(
 
 
 @compiled
-def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the climb and dive limits of the leg a-b, the smallest at three of its altitudes minus the margin, rad."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
+def slope_limits(data: ProblemArrays, start: Floats, end: Floats) -> tuple[float, float]:
+    """Return the climb and dive limits of a leg, the smallest at three of its altitudes minus the margin, rad."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / horizontal_length, dy / horizontal_length) if horizontal_length > 0.0 else (0.0, 1.0)
-    return _course_slope_limits(data, ux, uy, a[2], b[2], downwind(data.aircraft))
+    return _course_slope_limits(data, ux, uy, start[2], end[2], downwind(data.aircraft))
 
 
 @inlined
@@ -247,24 +247,24 @@ def slope_excess(
     ux: float,
     uy: float,
     horizontal_length: float,
-    begin_altitude: float,
+    start_altitude: float,
     end_altitude: float,
 ) -> float:
     """Return the excess of a leg's slope over its limit, m per m of horizontal length; 0 within the limit (eq. 3-4).
 
     ux, uy: unit vector along the leg's course.
     horizontal_length: m.
-    begin_altitude, end_altitude: altitudes of its start and end, m.
+    start_altitude, end_altitude: altitudes of its start and end, m.
     """
-    altitude_change = end_altitude - begin_altitude
+    altitude_change = end_altitude - start_altitude
     excess = max(
         0.0,
         altitude_change - limits.climb_slope * horizontal_length,
         -altitude_change - limits.dive_slope * horizontal_length,
     )
-    is_outside = min(begin_altitude, end_altitude) < data.floor or max(begin_altitude, end_altitude) > data.ceiling
+    is_outside = min(start_altitude, end_altitude) < data.floor or max(start_altitude, end_altitude) > data.ceiling
     if limits.slopes_by_aircraft and (excess > 0.0 or is_outside):
-        climb, dive = _course_slope_limits(data, ux, uy, begin_altitude, end_altitude, limits.wind)
+        climb, dive = _course_slope_limits(data, ux, uy, start_altitude, end_altitude, limits.wind)
         excess = max(
             0.0,
             altitude_change - math.tan(climb) * horizontal_length,
@@ -367,10 +367,10 @@ def _add_leg_length_violations(
 ) -> None:
     """Add legs that are too short for their turns, the roll between the turns, and settling, in units of 100 m."""
     for i in range(legs.shape[0]):
-        needed_length, horizontal_length = turn_length(data.fly_over, corners, i), legs[i].run
+        required_length, horizontal_length = turn_length(data.fly_over, corners, i), legs[i].run
         missing_length = (
-            needed_length + settling_length(needed_length, horizontal_length) - horizontal_length
-            if needed_length > 0.0
+            required_length + settling_length(required_length, horizontal_length) - horizontal_length
+            if required_length > 0.0
             else 0.0
         )
         if missing_length > -MAX_ROLL_LENGTH_M and not data.fly_over:
@@ -384,9 +384,9 @@ def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
     """Return the excess of the slope of the arc at waypoint i over the aircraft's limits on both courses, m per m."""
-    rise_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
-    rise_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
-    slope = arc_slope(rise_in, rise_out, corners[i].tangent, corners[i].radius)
+    slope_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
+    slope_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
+    slope = arc_slope(slope_in, slope_out, corners[i].tangent, corners[i].radius)
     if -limits.dive_slope <= slope <= limits.climb_slope:
         return 0.0
     excess = 0.0

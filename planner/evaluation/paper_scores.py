@@ -1,4 +1,4 @@
-"""The paper's four constraints and four objectives for many paths at once.
+"""Score many paths at once by the paper's four constraints and four objectives.
 
 Eq. 1-11 of Yang, Tang and Lozano, "Estimation of Distribution Algorithms based Unmanned Aerial Vehicle Path Planner
 Using a New Coordinate System", CEC 2014, evaluated at six points per leg. `planner.evaluation.graded_scores` measures
@@ -34,7 +34,7 @@ from planner.evaluation.problem import (
     as_columns,
     clearance_at,
 )
-from planner.evaluation.threat_index import Short, ThreatCells
+from planner.evaluation.threat_index import Int32s, ThreatCells
 from world.arrays import Floats, Heights, Ints
 from world.geometry import CLOSEST
 from world.kernels import Record, Records, compiled, inlined, inner
@@ -98,15 +98,15 @@ def _score_paths(
 @inlined
 def _are_limits_fixed(data: ProblemArrays, limits: PrecomputedLimits) -> bool:
     """Return True if turns and slopes have fixed limits, and no course is prescribed at the ends."""
-    courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
-    return courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
+    has_free_courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
+    return has_free_courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
 
 
 @inner
 def _score_block(
     data: ProblemArrays, limits: PrecomputedLimits, paths: Floats, first_path: int, size: int, block: Record
 ) -> None:
-    """Fill the sums of paths begin : begin + size.
+    """Fill the sums of `size` paths, from `first_path` on.
 
     Each waypoint is mapped to the raster once; between waypoints a leg is taken as straight in pixels.
     """
@@ -191,23 +191,23 @@ def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> N
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
-    outside = columns * rows
+    outside_index = columns * rows
     east, north, up = block.point.east, block.point.north, block.point.up
-    index, first, count = block.index, block.first, block.count
+    index, first_entries, entry_counts = block.index, block.first, block.count
     for b in range(size):
         column, row = (east[b] - west) * per_metre, (north[b] - south) * per_metre
         is_inside = (column >= 0.0) & (row >= 0.0) & (column < columns) & (row < rows)
         cell_index = int(row if is_inside else 0.0) * columns + int(column if is_inside else 0.0)
-        index[b] = cell_index if is_inside else outside
+        index[b] = cell_index if is_inside else outside_index
     for b in range(size):
         cell, z = cells[np.uintp(index[b])], up[b]
         first_entry, entry_count, min_altitude, max_altitude = cell.first, cell.count, cell.lowest, cell.highest
-        first[b] = first_entry
-        count[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
+        first_entries[b] = first_entry
+        entry_counts[b] = entry_count if (z >= min_altitude) & (z <= max_altitude) else 0
 
 
 @inlined
-def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> None:
+def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) -> None:
     """Add kill and detection exposure of the points to the units found near them (eq. 9, 10).
 
     Round k takes the k-th unit of every list that has one. Within a round no branch depends on the contents of a list,
@@ -215,19 +215,19 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection
-    first, count, active = block.first, block.count, block.active
+    first_entries, entry_counts, active = block.first, block.count, block.active
     # Unsigned: numba checks signed indices for wrap-around.
     one = np.uintp(1)
     open_paths = np.uintp(0)
     for b in range(size):
         active[open_paths] = b
-        open_paths += one if count[b] > 0 else np.uintp(0)
+        open_paths += one if entry_counts[b] > 0 else np.uintp(0)
     round_number = 0
     while open_paths > 0:
         remaining_paths = np.uintp(0)
         for entry in range(open_paths):
             path = np.uintp(active[np.uintp(entry)])
-            sphere = spheres[np.uintp(units[np.uintp(first[path] + round_number)])]
+            sphere = spheres[np.uintp(units[np.uintp(first_entries[path] + round_number)])]
             dx, dy = east[path] - sphere.east, north[path] - sphere.north
             dz = up[path] - sphere.up
             distance2 = dx * dx + dy * dy + dz * dz
@@ -239,7 +239,7 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
                 sphere.detection_scale4 * inverse4 * (1.0 if distance2 <= sphere.detection_radius2 else 0.0)
             )
             active[remaining_paths] = np.int64(path)
-            remaining_paths += one if count[path] > round_number + 1 else np.uintp(0)
+            remaining_paths += one if entry_counts[path] > round_number + 1 else np.uintp(0)
         open_paths = remaining_paths
         round_number += 1
 

@@ -440,7 +440,7 @@ def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTabl
 
 
 def _map_edges(bounds: Floats) -> dict[str, float]:
-    """Return the edges of a map with these bounds (2, 2) by name."""
+    """Return the edges of a map with these bounds (2, 2), keyed by name."""
     (west, east), (south, north) = bounds.tolist()
     return {"west": west, "east": east, "south": south, "north": north}
 
@@ -458,13 +458,13 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
 
 def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
-    steepest = float(slopes.max())
+    max_slope = float(slopes.max())
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.
     padded = np.pad(slopes, 1)
     shape = slopes.shape
     neighbourhood_max = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
     neighbourhood_max.setflags(write=False)
-    return SlopeBounds(steepest, neighbourhood_max, TILE * terrain.spacing)
+    return SlopeBounds(max_slope, neighbourhood_max, TILE * terrain.spacing)
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:

@@ -16,7 +16,7 @@ from world.by_reference import by_reference
 from world.geometry import window_exposure
 from world.kernels import Records, compiled, inlined, inner
 
-Short = NDArray[np.int32]
+Int32s = NDArray[np.int32]
 
 
 # --- Threats that reach a cell ---
@@ -48,7 +48,7 @@ class ThreatCells(NamedTuple):
     """
 
     cells: Records
-    units: Short
+    units: Int32s
     west: float
     south: float
     side: float
@@ -86,7 +86,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 
 @compiled
-def _fill_cells(first: Short, units: Short, min_altitudes: Short, max_altitudes: Short, cells: Records) -> None:
+def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]
@@ -100,7 +100,7 @@ def _fill_cells(first: Short, units: Short, min_altitudes: Short, max_altitudes:
 @compiled
 def _lists(
     position: Floats, radius: Floats, west: float, south: float, cell_size: float, columns: int, rows: int
-) -> tuple[Short, Short]:
+) -> tuple[Int32s, Int32s]:
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
     units = np.empty(0, dtype=np.int32)
@@ -187,7 +187,7 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
     # A class spans a factor of two; the last class takes all smaller radii.
     max_radius = float(missiles["radius"].max(initial=1.0))
     class_numbers = np.minimum(MAX_CLASSES - 1, np.floor(np.log2(max_radius / missiles["radius"]))).astype(np.int64)
-    ordered, classes, first = [missiles[:0]], [], [np.zeros(0, dtype=np.int64)]
+    ordered_missiles, classes, first = [missiles[:0]], [], [np.zeros(0, dtype=np.int64)]
     cell_count, missile_count = 0, 0
     for class_number in np.unique(class_numbers):
         class_missiles = missiles[class_numbers == class_number]
@@ -197,15 +197,15 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
         per_metre = 1.0 / (math.sqrt(MISSILES_PER_CELL * area / len(class_missiles)) if side is None else side)
         columns, rows = (int(size * per_metre) + 1 for size in max_corner - min_corner)
         steps = ((positions - min_corner) * per_metre).astype(np.int64)
-        cell = np.minimum(steps[:, 1], rows - 1) * columns + np.minimum(steps[:, 0], columns - 1)
-        order = np.argsort(cell, kind="stable")
-        ordered.append(class_missiles[order])
-        first.append(missile_count + np.searchsorted(cell[order], np.arange(columns * rows + 1)))
+        cell_indices = np.minimum(steps[:, 1], rows - 1) * columns + np.minimum(steps[:, 0], columns - 1)
+        order = np.argsort(cell_indices, kind="stable")
+        ordered_missiles.append(class_missiles[order])
+        first.append(missile_count + np.searchsorted(cell_indices[order], np.arange(columns * rows + 1)))
         classes.append(
             (min_corner[0], min_corner[1], per_metre, columns, rows, cell_count, class_missiles["radius"].max())
         )
         cell_count, missile_count = cell_count + columns * rows + 1, missile_count + len(class_missiles)
-    arrays = np.concatenate(ordered), np.array(classes, dtype=MISSILE_CLASS), np.concatenate(first)
+    arrays = np.concatenate(ordered_missiles), np.array(classes, dtype=MISSILE_CLASS), np.concatenate(first)
     for array in arrays:
         array.setflags(write=False)
     return MissileIndex(*arrays)

@@ -110,9 +110,9 @@ def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[f
     if not (min_sine < 0.0 < max_sine and math.isfinite(level)):
         return (math.nan,) * 5
     idle, full_throttle = envelope.power(airspeed, amsl, -0.5 * math.pi), envelope.power(airspeed, amsl, 0.5 * math.pi)
-    idle_slope, full_slope = (idle - level) / min_sine, (full_throttle - level) / max_sine
-    square = (full_slope - idle_slope) / (max_sine - min_sine)
-    return level, full_slope - square * max_sine, square, min_sine, max_sine
+    idle_slope, full_throttle_slope = (idle - level) / min_sine, (full_throttle - level) / max_sine
+    square = (full_throttle_slope - idle_slope) / (max_sine - min_sine)
+    return level, full_throttle_slope - square * max_sine, square, min_sine, max_sine
 
 
 class LegTime(NamedTuple):
@@ -190,7 +190,7 @@ def _conditions_at_altitude(travel: TravelCost, table: PerformanceTable, amsl: f
 
 
 @inner
-def _timed_cost(
+def _time_energy_cost(
     travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
 ) -> tuple[float, bool]:
     """Return the cost of time and energy of a leg at one altitude, and True if the leg is flyable."""
@@ -215,7 +215,7 @@ def leg_cost(
     if travel.time == 0.0 and travel.energy == 0.0:
         return total
     for point in range(3):
-        timed_cost, is_flyable = _timed_cost(travel, table, dx, dy, dz, start[2] + _SIMPSON_FRACTIONS[point] * dz)
+        timed_cost, is_flyable = _time_energy_cost(travel, table, dx, dy, dz, start[2] + _SIMPSON_FRACTIONS[point] * dz)
         if not is_flyable:
             return math.inf
         total += _SIMPSON_WEIGHTS[point] * timed_cost
@@ -296,8 +296,8 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
         _add_step_model(curvature, slopes, step_curvature, weight * rate, gradient, weight * rate)
         slopes[0, UP_AXIS] -= weight * climb_cost
         slopes[1, UP_AXIS] += weight * climb_cost
-        cost_above, _ = _timed_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP_M)
-        cost_below, _ = _timed_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP_M)
+        cost_above, _ = _time_energy_cost(travel, table, dx, dy, dz, amsl + HEIGHT_STEP_M)
+        cost_below, _ = _time_energy_cost(travel, table, dx, dy, dz, amsl - HEIGHT_STEP_M)
         height_slope = weight * (cost_above - cost_below) / (2.0 * HEIGHT_STEP_M)
         height_curvature = weight * max(0.0, cost_above - 2.0 * timed_cost + cost_below) / HEIGHT_STEP_M**2
         end_weights = (1.0 - fraction, fraction)
@@ -328,11 +328,11 @@ def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightCo
     speed2_difference = conditions.airspeed**2 - conditions.wind**2
     for axis in range(3):
         for other_axis in range(3):
-            value = 1.0 if axis == other_axis else 0.0
+            element = 1.0 if axis == other_axis else 0.0
             if time.is_flyable:
-                value -= wind[axis] * gradient[other_axis] + gradient[axis] * wind[other_axis]
-                value -= speed2_difference * gradient[axis] * gradient[other_axis]
-            curvature[axis, other_axis] = value / time.root
+                element -= wind[axis] * gradient[other_axis] + gradient[axis] * wind[other_axis]
+                element -= speed2_difference * gradient[axis] * gradient[other_axis]
+            curvature[axis, other_axis] = element / time.root
 
 
 @inner

@@ -63,31 +63,31 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
         return None
     pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
     east, north = (np.arange(lower + 0.5 * pitch, upper, pitch) for lower, upper in scenario.bounds)
-    ground = terrain.height(east[None, :], north[:, None])
-    min_heights = np.maximum(ground + scenario.limits.min_clearance_m, scenario.floor)
-    max_heights = np.full(ground.shape, scenario.ceiling)
+    ground_altitudes = terrain.height(east[None, :], north[:, None])
+    min_heights = np.maximum(ground_altitudes + scenario.limits.min_clearance_m, scenario.floor)
+    max_heights = np.full(ground_altitudes.shape, scenario.ceiling)
     if scenario.limits.max_height_m is not None:
-        max_heights = np.minimum(max_heights, ground + scenario.limits.max_height_m)
-    cells = np.full((HEIGHT_COUNT, *ground.shape), _OPEN_CELL, dtype=np.int64)
+        max_heights = np.minimum(max_heights, ground_altitudes + scenario.limits.max_height_m)
+    cells = np.full((HEIGHT_COUNT, *ground_altitudes.shape), _OPEN_CELL, dtype=np.int64)
     cells[:, ~(min_heights <= max_heights)] = _GROUND_CELL
-    ends = [_cell_of(scenario, end, pitch, min_heights, max_heights) for end in (scenario.start, scenario.destination)]
+    ends = [_end_cell(scenario, end, pitch, min_heights, max_heights) for end in (scenario.start, scenario.destination)]
     if not _are_connected(cells, ends):
         return None
-    _close_cells(zone_records(scenario.zones), east, north, ground, min_heights, max_heights, cells)
+    _close_cells(zone_records(scenario.zones), east, north, ground_altitudes, min_heights, max_heights, cells)
     for end in ends:
         cells[end] = _OPEN_CELL
     if _are_connected(cells, ends):
         return None
     adjacent_cells = [_grow_cells(_reachable_cells(cells == _OPEN_CELL, end)) for end in ends]
     adjacent_zones = [set(cells[edge_cells].tolist()) for edge_cells in adjacent_cells]
-    separating = (adjacent_zones[0] & adjacent_zones[1]) or (adjacent_zones[0] | adjacent_zones[1])
-    return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(separating) if z >= 0), pitch)
+    zone_indices = (adjacent_zones[0] & adjacent_zones[1]) or (adjacent_zones[0] | adjacent_zones[1])
+    return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(zone_indices) if z >= 0), pitch)
 
 
-def _cell_of(
+def _end_cell(
     scenario: Scenario, end: Floats, pitch: float, min_heights: Floats, max_heights: Floats
 ) -> tuple[int, int, int]:
-    """Return height, row and column of the cell of a fixed end."""
+    """Return the height, row and column indices of a fixed end's cell."""
     cell = ((end[:2] - scenario.bounds[:, 0]) / pitch).astype(np.int64)
     column, row = (
         int(np.clip(index, 0, size - 1))
@@ -106,12 +106,12 @@ def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
 
 def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
     """Flag the open cells that can be reached from a cell through their sides; none if the cell is not open."""
-    reached = np.zeros_like(is_open)
-    reached[start] = is_open[start]
+    is_reachable = np.zeros_like(is_open)
+    is_reachable[start] = is_open[start]
     count = -1
-    while count != (count := int(reached.sum())):
-        reached = _grow_cells(reached) & is_open
-    return reached
+    while count != (count := int(is_reachable.sum())):
+        is_reachable = _grow_cells(is_reachable) & is_open
+    return is_reachable
 
 
 def _grow_cells(cells: Flags) -> Flags:
@@ -251,11 +251,11 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
             return []
         lines += closed_bands(problem) or ([] if lines else _describe_margin_walls(problem))
         lines += _describe_proven_closure(problem)
-    separating = separating_zones(scenario)
-    if separating is not None:
-        names = ", ".join(separating.zones[:MAX_NAMES]) + (" and more" if len(separating.zones) > MAX_NAMES else "")
-        lines.append(f"zones block every route (gaps narrower than {separating.pitch:.0f} m count as closed): {names}")
-    is_unexplained, violated_names = not lines, violated_zones(scenario, plan.waypoints)
+    barrier = separating_zones(scenario)
+    if barrier is not None:
+        names = ", ".join(barrier.zones[:MAX_NAMES]) + (" and more" if len(barrier.zones) > MAX_NAMES else "")
+        lines.append(f"zones block every route (gaps narrower than {barrier.pitch:.0f} m count as closed): {names}")
+    has_no_explanation, violated_names = not lines, violated_zones(scenario, plan.waypoints)
     if violated_names:
         lines.append(f"the best path violates: {', '.join(violated_names[:MAX_NAMES])}")
     elif not lines:
@@ -264,7 +264,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
             lines.append(f"no obstacle blocks every route; the best path fails by: {', '.join(failed_constraints)}")
     if algorithm is not None and algorithm.encoding == "rotated" and algorithm.seeded:
         lines.append("routes that turn back or circle to climb were searched too, on a coarse lattice")
-        if is_unexplained and algorithm.optimiser == "waypoints" and scenario.planner.budget is None:
+        if has_no_explanation and algorithm.optimiser == "waypoints" and scenario.planner.budget is None:
             lines.append("it is not proven that no path exists; --budget 1000000 searches for longer")
     elif algorithm is not None and algorithm.encoding == "rotated":
         lines.append(
@@ -280,7 +280,7 @@ def _describe_walls(scenario: Scenario) -> list[str]:
     if terrain is None:
         return []
     lines: list[str] = []
-    for distance, points in _lines_across(scenario):
+    for distance, points in _map_crossings(scenario):
         min_altitudes = terrain.height(points[:, 0], points[:, 1]) + scenario.limits.min_clearance_m
         min_altitudes = np.maximum(min_altitudes, scenario.floor)
         gaps = scenario.ceiling - min_altitudes
@@ -298,8 +298,8 @@ def _describe_walls(scenario: Scenario) -> list[str]:
     return lines
 
 
-def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield lines across the map between the ends, each as its distance from the start, m, and points (n, 2)."""
+def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield straight lines across the map between the ends: the distance from the start, m, and points (n, 2)."""
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-half_width, half_width, POINTS_ACROSS)
@@ -317,7 +317,7 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
         return []
     (ceiling, name), margin = max_altitude(problem), float(data.buffer)
     length = math.dist(scenario.start[:2], scenario.destination[:2])
-    for distance, points in _lines_across(scenario):
+    for distance, points in _map_crossings(scenario):
         # Near the ends the margins are reduced.
         if min(distance, length - distance) < margin / max(1e-9, data.buffer_growth):
             continue
@@ -336,11 +336,11 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
     """Return True if any height above any of the points (n, 2) is outside every kill sphere."""
     threats = scenario.threats
     has_missile = threats.kill_radius > 0.0
-    position, radius = threats.position[has_missile], threats.kill_radius[has_missile]
+    positions, radii = threats.position[has_missile], threats.kill_radius[has_missile]
     for fraction in np.linspace(0.0, 1.0, 9):
         altitudes = min_altitudes + fraction * (scenario.ceiling - min_altitudes)
         is_free = np.ones(len(points), dtype=np.bool_)
-        for centre, kill_radius in zip(position, radius, strict=True):
+        for centre, kill_radius in zip(positions, radii, strict=True):
             distance2 = (points[:, 0] - centre[0]) ** 2 + (points[:, 1] - centre[1]) ** 2 + (altitudes - centre[2]) ** 2
             is_free &= distance2 > kill_radius * kill_radius
         if is_free.any():
@@ -351,16 +351,16 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
 def _describe_proven_closure(problem: Problem) -> list[str]:
     """Name the missiles or the altitude that block every path; return no line if this is not proven."""
     data, ceiling = problem.certified, "the ceiling"
-    missiles, level_altitude = closing_missiles(data), highest_level_flight(data)
+    missiles, max_level_altitude = closing_missiles(data), highest_level_flight(data)
     if missiles is None:
         return []
-    if level_altitude < data.ceiling:
+    if max_level_altitude < data.ceiling:
         ceiling = (
-            f"{max(level_altitude, 0.0):.0f} m, above which the aircraft cannot fly level at"
+            f"{max(max_level_altitude, 0.0):.0f} m, above which the aircraft cannot fly level at"
             f" {data.aircraft.airspeed:g} m/s"
         )
         for name, end in (("start", data.start), ("destination", data.destination)):
-            if end[2] > level_altitude:
+            if end[2] > max_level_altitude:
                 return [f"no path exists: the {name} is at {end[2]:.0f} m, higher than {ceiling}"]
     if not missiles:
         return [f"no path exists: the ground blocks every path below {ceiling}"]

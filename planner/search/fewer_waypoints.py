@@ -57,9 +57,9 @@ def _drop_one_waypoint(
     lengths = np.linalg.norm(legs, axis=1)
     detours = lengths[:-1] + lengths[1:] - np.linalg.norm(chords, axis=1)
     for i in 1 + np.argsort(detours, kind="stable"):
-        remaining = np.delete(waypoints, i, axis=0)
-        certificate = certify(problem, remaining)
-        violations, _ = paper_scores(problem.certified, remaining[None])
+        remaining_waypoints = np.delete(waypoints, i, axis=0)
+        certificate = certify(problem, remaining_waypoints)
+        violations, _ = paper_scores(problem.certified, remaining_waypoints[None])
         if certificate.ok and certificate.kill_distance >= min_kill_distance and not violations.any():
-            return remaining, certificate
+            return remaining_waypoints, certificate
     return None

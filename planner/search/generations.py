@@ -278,16 +278,16 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
     """Evaluate whole paths through some of the best candidates, and repair one path as long as no path is feasible."""
-    chosen = set()
+    candidate_chains = set()
     for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:
             if chains.cost[i, k] < math.inf:
-                chosen.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
-    if not chosen:
+                candidate_chains.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
+    if not candidate_chains:
         search.evaluate(_as_vectors(rows[:, :1]))
         return
     intervals = np.arange(len(rows))
-    vectors = np.array([rows[intervals, list(candidate_numbers)].ravel() for candidate_numbers in sorted(chosen)])
+    vectors = np.array([rows[intervals, list(chain)].ravel() for chain in sorted(candidate_chains)])
     search.evaluate(vectors)
     if not search.archive.is_feasible():
         search.improve(search.archive.vectors[0], REPAIR_EVALUATIONS)

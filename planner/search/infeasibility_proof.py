@@ -252,7 +252,7 @@ def _reaches_destination(
 ) -> bool:
     """Return True if the destination can be reached from the start through open altitudes of adjacent columns.
 
-    Open range s of a column is above its closed range s.
+    Each open range of a column is above the closed range with the same index.
     """
     columns, rows, range_limit = range_bottoms.shape
     ends = np.zeros(2, dtype=np.int64)
@@ -261,32 +261,36 @@ def _reaches_destination(
         i = min(columns - 1, max(0, math.floor((point[0] - data.west) / column_size)))
         j = min(rows - 1, max(0, math.floor((point[1] - data.south) / column_size)))
         # A fixed end may be below the clearance; then it is in the lowest open range.
-        s = 0
-        while s + 1 < range_counts[i, j] and range_bottoms[i, j, s + 1] < point[2]:
-            s += 1
-        ends[k] = (i * rows + j) * range_limit + s
+        range_index = 0
+        while range_index + 1 < range_counts[i, j] and range_bottoms[i, j, range_index + 1] < point[2]:
+            range_index += 1
+        ends[k] = (i * rows + j) * range_limit + range_index
     is_visited = np.zeros(range_bottoms.size, dtype=np.bool_)
     stack = np.empty(range_bottoms.size, dtype=np.int64)
-    stack[0], size = ends[0], 1
+    stack[0], stack_size = ends[0], 1
     is_visited[ends[0]] = True
-    while size > 0:
-        size -= 1
-        current = stack[size]
-        if current == ends[1]:
+    while stack_size > 0:
+        stack_size -= 1
+        state = stack[stack_size]
+        if state == ends[1]:
             return True
-        s, j, i = current % range_limit, current // range_limit % rows, current // (range_limit * rows)
-        bottom = range_tops[i, j, s]
-        top = range_bottoms[i, j, s + 1] if s + 1 < range_counts[i, j] else data.ceiling
+        range_index, j, i = state % range_limit, state // range_limit % rows, state // (range_limit * rows)
+        bottom = range_tops[i, j, range_index]
+        top = range_bottoms[i, j, range_index + 1] if range_index + 1 < range_counts[i, j] else data.ceiling
         for step in range(4):
-            x, y = i + (step == 0) - (step == 1), j + (step == 2) - (step == 3)
-            if x < 0 or y < 0 or x >= columns or y >= rows:
+            next_i, next_j = i + (step == 0) - (step == 1), j + (step == 2) - (step == 3)
+            if next_i < 0 or next_j < 0 or next_i >= columns or next_j >= rows:
                 continue
-            for t in range(range_counts[x, y]):
-                neighbour_bottom = range_tops[x, y, t]
-                neighbour_top = range_bottoms[x, y, t + 1] if t + 1 < range_counts[x, y] else data.ceiling
-                neighbour = (x * rows + y) * range_limit + t
-                if max(bottom, neighbour_bottom) <= min(top, neighbour_top) and not is_visited[neighbour]:
-                    is_visited[neighbour] = True
-                    stack[size] = neighbour
-                    size += 1
+            for next_index in range(range_counts[next_i, next_j]):
+                next_bottom = range_tops[next_i, next_j, next_index]
+                next_top = (
+                    range_bottoms[next_i, next_j, next_index + 1]
+                    if next_index + 1 < range_counts[next_i, next_j]
+                    else data.ceiling
+                )
+                next_state = (next_i * rows + next_j) * range_limit + next_index
+                if max(bottom, next_bottom) <= min(top, next_top) and not is_visited[next_state]:
+                    is_visited[next_state] = True
+                    stack[stack_size] = next_state
+                    stack_size += 1
     return False

@@ -65,29 +65,29 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
     _CALLS[part](_Task(problem, ENCODINGS["rotated"](space, WAYPOINTS), path))
 
 
-def _score(task: _Task) -> None:
+def _call_scores(task: _Task) -> None:
     scores = score_table(*graded_scores(task.problem.search, np.stack([task.path, task.path])))
     best_first(scores)
     vector = rotated_vectors(task.problem.space, task.encoding, task.path[None])[0]
     search_patterns(task.problem.search, task.encoding, vector, SAMPLE_COUNT)
 
 
-def _certify(task: _Task) -> None:
+def _call_certificates(task: _Task) -> None:
     certify(task.problem, task.path)
 
 
-def _shorten(task: _Task) -> None:
+def _call_shortening(task: _Task) -> None:
     shorten_path(task.problem.search, task.path)
 
 
-def _find_route(task: _Task) -> None:
+def _call_routes(task: _Task) -> None:
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     best_route = grid_route(data, frame, make_grid(data, frame, span, STAGES))
     for route in [best_route] if isinstance(best_route, GridRoute) else []:
         fit_waypoints(data, frame, route.points, WAYPOINTS)
 
 
-def _find_side_routes(task: _Task) -> None:
+def _call_side_routes(task: _Task) -> None:
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
     side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
@@ -99,15 +99,15 @@ def _frame_and_span(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
     return rotated_frame(space.start, space.destination), (float(lower[1::3].min()), float(upper[1::3].max()))
 
 
-def _score_samples(task: _Task) -> None:
+def _call_paper_scores(task: _Task) -> None:
     paper_scores(task.problem.certified, task.path[None])
 
 
-def _choose(task: _Task) -> None:
+def _call_front(task: _Task) -> None:
     data = task.problem.search
     front_values(data, make_energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
     covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)
 
 
-_PARTS = (_score, _certify, _shorten, _find_route, _find_side_routes, _score_samples)
-_CALLS = {**dict(zip(PARTS, _PARTS, strict=True)), FRONT: _choose}
+_PART_CALLS = (_call_scores, _call_certificates, _call_shortening, _call_routes, _call_side_routes, _call_paper_scores)
+_CALLS = {**dict(zip(PARTS, _PART_CALLS, strict=True)), FRONT: _call_front}

@@ -171,11 +171,11 @@ class _Site:
 
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
         """Return the climb and dive slopes (m per m) for a course (rad) at an altitude (m AMSL)."""
-        certified = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
+        certified_slopes = aircraft_slopes(self.problem.certified.aircraft, course, amsl)
         stated_limits = (self.limits.max_climb, self.limits.max_dive)
         slopes = []
         for aircraft_slope, certified_slope, stated_limit in zip(
-            self.limits.slopes(course, amsl), certified, stated_limits, strict=True
+            self.limits.slopes(course, amsl), certified_slopes, stated_limits, strict=True
         ):
             slope = min(
                 SLOPE_FRACTION * math.tan(aircraft_slope), math.tan(max(0.0, certified_slope - 1.1 * ANGLE_MARGIN_RAD))
@@ -185,10 +185,10 @@ class _Site:
             )
         return slopes[0], slopes[1]
 
-    def min_path_length(self, height_change: float, phase: int) -> float:
-        """Return the length of the shortest path that gains (phase 0) or loses (phase 1) a height, m."""
+    def min_path_length(self, height_change: float, is_descent: bool) -> float:
+        """Return the length of the shortest path that gains a height, or with `is_descent` loses it, m."""
         altitude = float(max(self.scenario.start[2], self.scenario.destination[2]))
-        max_slope = max(self.slopes(course, altitude)[phase] for course in np.arange(8) * (math.pi / 4.0))
+        max_slope = max(self.slopes(course, altitude)[is_descent] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_chain(self, chain: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
@@ -245,7 +245,7 @@ def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _S
         # An estimate, as ground speeds depend on the course; the certificate decides.
         speed_ratio = 1.0 + _WIND_FRACTION * scenario.wind.speed / algorithm_limits.airspeed
         lengths_before, lengths_after = (
-            _interpolate_turn_lengths(table, speed_ratio) for table in (tracking.before, tracking.after)
+            _interpolate_turn_lengths(length_table, speed_ratio) for length_table in (tracking.before, tracking.after)
         )
         turn_lengths = TurnLengths(
             *(
@@ -302,15 +302,15 @@ class _BestRejected:
 
 def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
     """Return the shortest accepted departure, or None and the reason."""
-    data, target = site.problem.certified, site.plan.waypoints[0]
-    home_altitude, start_altitude = float(site.home[2]), float(target[2])
+    data, first_waypoint = site.problem.certified, site.plan.waypoints[0]
+    home_altitude, start_altitude = float(site.home[2]), float(first_waypoint[2])
     takeoff_height = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
     takeoff_altitude = home_altitude + takeoff_height
     launches, reason = _find_launches(site, launch, takeoff_height, max(takeoff_altitude, start_altitude))
     if not launches:
         return None, reason
     best_rejected = _BestRejected()
-    for laps in _list_lap_counts(site, start_altitude - home_altitude, 0):
+    for laps in _list_lap_counts(site, start_altitude - home_altitude, False):
         for _, course, points in sorted(_list_departures(site, launches, laps), key=lambda path: path[0]):
             outcome = _make_departure(site, course, points, takeoff_altitude)
             if isinstance(outcome, ClimbOut):
@@ -319,7 +319,9 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
             if best_rejected.count >= _MAX_CERTIFIED:
                 break
     courses = (
-        "on its course" if launch.course is not None else f"on {len({launch.course for launch in launches})} courses"
+        "on its course"
+        if launch.course is not None
+        else f"on {len({candidate.course for candidate in launches})} courses"
     )
     if not best_rejected.count:
         return (
@@ -347,7 +349,7 @@ def _make_departure(
         altitudes = climb_altitudes(
             points,
             float(site.home[2]),
-            partial(_scale_slope, site, slope_factor, 0, top_altitude),
+            partial(_scale_slope, site, slope_factor, False, top_altitude),
             takeoff_altitude,
             goal_altitude,
         )
@@ -377,7 +379,7 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
     altitude: altitude of the climb performance, m AMSL.
     """
     courses = (
-        [2.0 * math.pi * worst_index / _LAUNCH_COURSE_COUNT for worst_index in range(_LAUNCH_COURSE_COUNT)]
+        [2.0 * math.pi * number / _LAUNCH_COURSE_COUNT for number in range(_LAUNCH_COURSE_COUNT)]
         if launch.course is None
         else [launch.course]
     )
@@ -428,31 +430,31 @@ def _list_departures(
     site: _Site, launches: Sequence[_Launch], laps: int
 ) -> Iterator[tuple[float, float, list[MapPoint]]]:
     """Yield the cost, launch course and points of departures from home to the plan's first waypoint."""
-    target, start_course = site.plan.waypoints[0], site.scenario.start_course
+    first_waypoint, start_course = site.plan.waypoints[0], site.scenario.start_course
     next_course = float(leg_courses(site.plan.waypoints[:2])[0]) if start_course is None else start_course
-    end, home = (float(target[0]), float(target[1])), (float(site.home[0]), float(site.home[1]))
+    end, home = (float(first_waypoint[0]), float(first_waypoint[1])), (float(site.home[0]), float(site.home[1]))
     next_point = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
-    min_length = site.min_path_length(float(target[2] - site.home[2]), 0) + math.dist(end, next_point)
+    min_length = site.min_path_length(float(first_waypoint[2] - site.home[2]), False) + math.dist(end, next_point)
     for course, takeoff_end, first_leg_end in launches:
         tailwind = site.scenario.wind.along(course, float(site.home[2]))[0]
         for corners in candidate_chains(first_leg_end, course, end, next_course, site.turn_radius, laps):
             points = [home, first_leg_end, *corners, end]
-            measures, takeoff_run = (
+            measures, takeoff_distance = (
                 measure_path([takeoff_end, *points[1:], next_point], site.turn_lengths),
                 math.dist(home, takeoff_end),
             )
-            if measures.fits and takeoff_run + measures.length >= min_length:
+            if measures.fits and takeoff_distance + measures.length >= min_length:
                 yield (
-                    takeoff_run + measures.cost + (_TAILWIND_COST_M if tailwind > _MAX_TAILWIND_MPS else 0.0),
+                    takeoff_distance + measures.cost + (_TAILWIND_COST_M if tailwind > _MAX_TAILWIND_MPS else 0.0),
                     course,
                     points,
                 )
 
 
-def _list_lap_counts(site: _Site, height_change: float, phase: int) -> list[int]:
-    """Return the lap counts to try for gaining (phase 0) or losing (phase 1) a height, m, fewest first."""
+def _list_lap_counts(site: _Site, height_change: float, is_descent: bool) -> list[int]:
+    """Return the lap counts to try for gaining a height, or with `is_descent` losing it, m, fewest first."""
     max_laps = math.ceil(
-        site.min_path_length(height_change, phase) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
+        site.min_path_length(height_change, is_descent) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
     )
     return list(range(min(MAX_LAPS, max_laps) + 1))
 
@@ -471,7 +473,7 @@ class _Final(NamedTuple):
     point: Floats
 
 
-def _find_approach(site: _Site, strip: LandingStrip, final_law: FinalModel) -> tuple[Descent | None, str]:
+def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) -> tuple[Descent | None, str]:
     """Return the first accepted approach, or None and the reason."""
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
@@ -487,23 +489,21 @@ def _find_approach(site: _Site, strip: LandingStrip, final_law: FinalModel) -> t
         if strip_fault:
             reasons.append(strip_fault)
             continue
-        course_finals, reason = _find_finals(site, strip, course, point, final_law)
+        course_finals, reason = _find_finals(site, strip, course, point, final_model)
         finals += course_finals
         reasons += [reason] if not course_finals else []
     if not finals:
         return None, reasons[0]
     reason = ""
-    for candidate in finals[:_MAX_FINALS]:
-        corners, reason = _find_path_to_line_up(site, candidate)
+    for final in finals[:_MAX_FINALS]:
+        corners, reason = _find_path_to_line_up(site, final)
         if corners is None:
             continue
-        go_around = _min_go_around_height(site, candidate)
+        go_around = _min_go_around_height(site, final)
         if go_around is None:
-            reason = f"no height would be sufficient for a go-around on {round(math.degrees(candidate.course)) % 360}°"
+            reason = f"no height would be sufficient for a go-around on {round(math.degrees(final.course)) % 360}°"
             continue
-        return Descent(
-            corners, candidate.final_waypoints, point, candidate.course, candidate.height / candidate.length, go_around
-        ), ""
+        return Descent(corners, final.final_waypoints, point, final.course, final.height / final.length, go_around), ""
     return None, reason
 
 
@@ -524,7 +524,7 @@ def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) 
 def _find_finals(
     site: _Site, strip: LandingStrip, course: float, point: Floats, final_model: FinalModel
 ) -> tuple[list[_Final], str]:
-    """Return the clear and flyable finals on a course, the shallowest and shortest first, and the reason if none."""
+    """Return the clear and flyable finals on a course, shallowest first, and the reason if there are none."""
     field_altitude = float(point[2])
     tailwind = site.scenario.wind.along(course, field_altitude)[0]
     max_slope = GLIDE_SLOPE_FRACTION * math.tan(
@@ -609,11 +609,11 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     glide_start = (float(final.final_waypoints[1, 0]), float(final.final_waypoints[1, 1]))
     best_rejected = _BestRejected()
     point_above = np.array([final.point[0], final.point[1], final_altitude])
-    phase = int(final_altitude < end_altitude)
+    is_descent = final_altitude < end_altitude
     extra_length = math.dist(previous_points[-1], start) + math.dist(end, glide_start)
     extra_length += sum(math.dist(leg_start, leg_end) for leg_start, leg_end in pairwise(previous_points))
-    min_length = site.min_path_length(end_altitude - final_altitude, phase) + extra_length
-    for laps in _list_lap_counts(site, end_altitude - final_altitude, phase):
+    min_length = site.min_path_length(end_altitude - final_altitude, is_descent) + extra_length
+    for laps in _list_lap_counts(site, end_altitude - final_altitude, is_descent):
         paths = [
             [start, *corners, end]
             for corners in candidate_chains(start, course, end, final.course, site.turn_radius, laps)
@@ -657,13 +657,13 @@ def _approach_altitudes(
 ) -> Floats:
     """Return the altitudes of a path between two altitudes at a fraction of its slope limits, (n,) m AMSL."""
     top_altitude = max(start_altitude, end_altitude)
-    climb, dive = (partial(_scale_slope, site, slope_factor, phase, top_altitude) for phase in (0, 1))
+    climb, dive = (partial(_scale_slope, site, slope_factor, is_descent, top_altitude) for is_descent in (False, True))
     return descent_altitudes(points, start_altitude, climb, dive, end_altitude)
 
 
-def _scale_slope(site: _Site, factor: float, phase: int, altitude: float, course: float) -> float:
-    """Return a fraction of the climb slope (phase 0) or dive slope (phase 1) on a course, m per m."""
-    return factor * site.slopes(course, altitude)[phase]
+def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
+    """Return a fraction of the climb slope, or with `is_descent` of the dive slope, on a course, m per m."""
+    return factor * site.slopes(course, altitude)[is_descent]
 
 
 def _min_go_around_height(site: _Site, final: _Final) -> float | None:
@@ -673,12 +673,12 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
     back to the line-up.
     """
     home_altitude, field_altitude = float(site.home[2]), float(final.point[2])
-    target = final.final_waypoints[0]
+    line_up = final.final_waypoints[0]
     # The height is above the line-up, because an aircraft that aborts above the go-around height turns at once.
     min_height = max(
         _MIN_GO_AROUND_HEIGHT_M,
         field_altitude - home_altitude + _MIN_GO_AROUND_HEIGHT_M,
-        float(target[2]) - home_altitude + _GO_AROUND_CLEARANCE_M,
+        float(line_up[2]) - home_altitude + _GO_AROUND_CLEARANCE_M,
     )
     for height in np.arange(
         math.ceil(min_height / _GO_AROUND_STEP_M) * _GO_AROUND_STEP_M, _MAX_GO_AROUND_HEIGHT_M, _GO_AROUND_STEP_M
@@ -701,20 +701,22 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
                 top_altitude,
             ]
         )
-        if (margins >= 0.0).all() and _return_clearance(site, turn_point, target) >= _GO_AROUND_CLEARANCE_M:
+        if (margins >= 0.0).all() and _min_height_to_line_up(site, turn_point, line_up) >= _GO_AROUND_CLEARANCE_M:
             return float(height)
     return None
 
 
-def _return_clearance(site: _Site, turn_point: Floats, target: Floats) -> float:
-    """Return the minimum height above ground from a go-around back to the line-up, m; -inf if unknown."""
-    length = float(leg_runs(np.stack([turn_point, target]))[0])
+def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> float:
+    """Return the minimum height above ground between a go-around and the line-up, m; -inf if unknown."""
+    length = float(leg_runs(np.stack([turn_point, line_up]))[0])
     fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
-    east, north = (turn_point[axis] + fractions * (target[axis] - turn_point[axis]) for axis in range(2))
-    if target[2] > turn_point[2]:
-        climb_slope = site.slopes(math.atan2(target[0] - turn_point[0], target[1] - turn_point[1]), float(target[2]))[0]
-        altitudes = np.minimum(target[2], turn_point[2] + max(0.0, climb_slope) * length * fractions)
+    east, north = (turn_point[axis] + fractions * (line_up[axis] - turn_point[axis]) for axis in range(2))
+    if line_up[2] > turn_point[2]:
+        climb_slope = site.slopes(
+            math.atan2(line_up[0] - turn_point[0], line_up[1] - turn_point[1]), float(line_up[2])
+        )[0]
+        altitudes = np.minimum(line_up[2], turn_point[2] + max(0.0, climb_slope) * length * fractions)
     else:
-        altitudes = turn_point[2] + fractions * (target[2] - turn_point[2])
+        altitudes = turn_point[2] + fractions * (line_up[2] - turn_point[2])
     heights = altitudes - site.terrain.height(east, north)
     return -math.inf if np.isnan(heights).any() else float(heights.min())

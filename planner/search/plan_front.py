@@ -151,7 +151,7 @@ def plan_front(
     default: the completed plan to begin from; None to plan it here, and to finish it like the others.
     waypoints: number of waypoints of the other plans during the search, including both ends; None for the number of the
     default plan.
-    finish: completes a plan, for example with departure and approach; only plans that are safe afterwards are taken.
+    finish: completes a plan, for example with departure and approach; only plans that are then safe enter the front.
     The same scenario, limits, count and seed give the same front.
 
     >>> from planfly.workflow.airframe import load_airframe
@@ -166,17 +166,19 @@ def plan_front(
         default = finish(plan_path(scenario, limits, seed=seed, progress=progress, stop=stop))
     path = with_waypoints(default.waypoints, waypoints or 0)
     task = fit_margins(task, path)
-    first = _with_values(task, default)
-    reference = reference_point(task, first)
+    default_plan = _with_values(task, default)
+    reference = reference_point(task, default_plan)
     if not default.safe or len(path) == 2:
         # A path of two waypoints has no inner waypoint to move.
-        return Front((first,) if default.safe else (), count, task.fourth, first, reference, 0)
+        return Front((default_plan,) if default.safe else (), count, task.fourth, default_plan, reference, 0)
     size = max(MIN_ARCHIVE_SIZE, SOLUTIONS_PER_PLAN * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
-    evaluations = _search(task, search, path, progress, stop, generations)
-    chosen, refused = _certify_distinct(task, search, count, first, replace(default, evaluations=evaluations), finish)
-    plans = tuple(sorted(chosen, key=lambda plan: plan.length))
-    return Front(plans, count, task.fourth, first, reference, evaluations, refused)
+    evaluations = _run_generations(task, search, path, progress, stop, generations)
+    front_plans, unsafe_count = _certify_distinct(
+        task, search, count, default_plan, replace(default, evaluations=evaluations), finish
+    )
+    plans = tuple(sorted(front_plans, key=lambda plan: plan.length))
+    return Front(plans, count, task.fourth, default_plan, reference, evaluations, unsafe_count)
 
 
 # --- The problem ---
@@ -227,9 +229,9 @@ class FrontTask(NamedTuple):
     def paths(self, vectors: Floats) -> Floats:
         """Return the paths (n, w, 3) of vectors (n, 3 (w - 2))."""
         data, count = self.problem.search, len(vectors)
-        inside = self.frame.restore(vectors.reshape(count, -1, 3))
+        inner_waypoints = self.frame.restore(vectors.reshape(count, -1, 3))
         ends = [np.broadcast_to(end, (count, 1, 3)) for end in (data.start, data.destination)]
-        return np.ascontiguousarray(np.concatenate([ends[0], inside, ends[1]], axis=1))
+        return np.ascontiguousarray(np.concatenate([ends[0], inner_waypoints, ends[1]], axis=1))
 
 
 def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
@@ -291,11 +293,11 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
     yield default
     count = len(default)
     routes = [default, *(resample(route, count) for route in _list_routes(task, default))]
-    for preferred in _preferred_problems(task):
+    for preferred_problem in _preferred_problems(task):
         for route in routes:
-            path, _ = shorten_path(preferred, route)
+            path, _ = shorten_path(preferred_problem, route)
             # Shorten again from equal legs, as for the default plan.
-            path, _ = shorten_path(preferred, resample(path, count))
+            path, _ = shorten_path(preferred_problem, resample(path, count))
             yield path
 
 
@@ -319,7 +321,7 @@ def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
 
 
 def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield variants of the problem with a larger clearance, with radars as obstacles, and with another cost."""
+    """Yield variants of the problem: with a larger clearance, with radars as obstacles, and with another cost."""
     data, scenario = task.problem.search, task.problem.scenario
     end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
     spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
@@ -330,15 +332,15 @@ def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
         missiles = make_missile_index(threats)
         for clearance_fraction in CLEARANCE_FRACTIONS:
             buffer = max(data.buffer, clearance_fraction * spare_height)
-            stricter = data._replace(missiles=missiles, buffer=buffer)
-            yield stricter
-            yield stricter._replace(travel=task.travel)
+            stricter_problem = data._replace(missiles=missiles, buffer=buffer)
+            yield stricter_problem
+            yield stricter_problem._replace(travel=task.travel)
 
 
 # --- The search ---
 
 
-def _search(
+def _run_generations(
     task: FrontTask,
     search: FrontSampling,
     default: Floats,
@@ -402,9 +404,9 @@ def directions(inner_count: int, scales: Floats) -> Floats:
     modes, deviations = bridge_modes(inner_count)
     waves = (modes * deviations / np.abs(modes[:, 0]).max()).T
     bumps = [
-        np.where((np.arange(inner_count) >= begin) & (np.arange(inner_count) < begin + width), 1.0, 0.0)
+        np.where((np.arange(inner_count) >= first_index) & (np.arange(inner_count) < first_index + width), 1.0, 0.0)
         for width in (1, 2, 4)
-        for begin in range(max(1, inner_count - width + 1))
+        for first_index in range(max(1, inner_count - width + 1))
     ]
     shapes = np.array([*waves, *bumps])
     out = np.zeros((len(shapes), 3, inner_count, 3))
@@ -428,34 +430,34 @@ def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
 
 
 def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
-    """Return the indices of objectives (n, m) that gain more than `amounts` (m,) over every row taken before.
+    """Return the indices of objectives (n, m) that gain more than `amounts` (m,) over every row chosen before.
 
     The additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002): a row is
-    left out if a row taken before is worse by no more than the amounts in every objective.
+    omitted if an earlier row is worse by no more than the amounts in every objective.
 
     >>> distinct_rows(np.array([[1.0, 9.0], [1.1, 8.9], [2.0, 5.0], [9.0, 4.9]]), np.array([0.5, 0.5]))
     [0, 2]
     """
-    taken_rows: list[int] = []
+    distinct_indices: list[int] = []
     for row, values in enumerate(objectives):
-        if not (objectives[taken_rows] <= values + amounts).all(axis=1).any():
-            taken_rows.append(row)
-    return taken_rows
+        if not (objectives[distinct_indices] <= values + amounts).all(axis=1).any():
+            distinct_indices.append(row)
+    return distinct_indices
 
 
 def _certify_distinct(
     task: FrontTask,
     search: FrontSampling,
     count: int,
-    first: FrontPlan,
+    default_plan: FrontPlan,
     template: Plan,
     finish: Callable[[Plan], Plan],
 ) -> tuple[list[FrontPlan], int]:
     """Return up to `count` distinct plans that cover most of the safe ones, and the number of unsafe others.
 
-    Each plan is certified and completed. first: the completed default plan, which is included if no plan is better.
+    Each plan is certified and completed. default_plan: the completed plan, which is included if no plan is better.
     """
-    amounts, plans = noticed_amounts(first, task.fourth), dict[int, FrontPlan]()
+    amounts, plans = noticed_amounts(default_plan, task.fourth), dict[int, FrontPlan]()
     remaining_rows = np.arange(len(search.vectors))
     while True:
         ranked_rows = remaining_rows[
@@ -467,12 +469,12 @@ def _certify_distinct(
                 path = task.paths(search.vectors[row][None])[0]
                 plans[row] = _with_values(task, finish(_make_plan(task, path, template)))
         rejected_rows = [row for row in rows if not plans[row].plan.safe]
-        chosen: list[FrontPlan] = []
+        accepted_plans: list[FrontPlan] = []
         if not rejected_rows:
-            chosen = _drop_dominated([*(plans[row] for row in rows), first], task.fourth, amounts)
-            rejected_rows = [row for row in rows if not any(plan is plans[row] for plan in chosen)]
+            accepted_plans = _drop_dominated([*(plans[row] for row in rows), default_plan], task.fourth, amounts)
+            rejected_rows = [row for row in rows if not any(plan is plans[row] for plan in accepted_plans)]
         if not rejected_rows:
-            return chosen[:count], sum(not plan.plan.safe for plan in plans.values())
+            return accepted_plans[:count], sum(not plan.plan.safe for plan in plans.values())
         remaining_rows = np.setdiff1d(remaining_rows, rejected_rows)
 
 
@@ -480,7 +482,7 @@ def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> lis
     """Return the plans with a noticeable gain that are not dominated by the values of their certificates."""
     objectives = np.array([_objective_row(plan, fourth) for plan in plans])
     indices = np.arange(len(objectives))
-    # Of equal plans the first is kept.
+    # Keep the first of several equal plans.
     is_better = (objectives[:, None] < objectives[None]).any(axis=2) | (indices[:, None] < indices)
     is_dominated = ((objectives[:, None] <= objectives[None]).all(axis=2) & is_better).any(axis=0)
     undominated_rows = np.flatnonzero(~is_dominated)

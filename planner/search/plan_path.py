@@ -133,34 +133,37 @@ def plan_path(
     )
 
 
-def _search_repeatedly(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:
+def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Floats, Certificate]:
     """Search, and repeat the search with finer grids and more samples while the certificate fails."""
     attempts = len(ATTEMPTS) if search.algorithm.seeded else 1
     if is_limited(search.problem.search.airspace):
         attempts = min(attempts, MAX_ATTEMPTS_AMONG_ZONES)
-    best: tuple[Floats, Certificate] | None = None
+    best_result: tuple[Floats, Certificate] | None = None
     for attempt in range(attempts):
         if attempt > 0:
             _prepare_retry(search, attempt)
         try:
-            _run_attempt(search, attempt, previous)
+            _run_attempt(search, attempt, previous_path)
         except SearchEnded:
             search.record_history()
         result = search.best_path()
         # A later attempt replaces an earlier result only if it is better.
-        if best is None or (result[1].ok, result[1].kill_distance) > (best[1].ok, best[1].kill_distance):
-            best = result
-        if attempt == 0 and not search.is_closed and may_turn_back(search, best[1]):
-            best = search_turning_back(search, best)
-        if search.meets_goal(best[1]) or search.is_closed or search.must_end() or not may_try_again(search):
+        if best_result is None or (result[1].ok, result[1].kill_distance) > (
+            best_result[1].ok,
+            best_result[1].kill_distance,
+        ):
+            best_result = result
+        if attempt == 0 and not search.is_closed and may_turn_back(search, best_result[1]):
+            best_result = search_turning_back(search, best_result)
+        if search.meets_goal(best_result[1]) or search.is_closed or search.must_end() or not may_try_again(search):
             break
-    if best is None:  # pragma: no cover - the loop always runs
+    if best_result is None:  # pragma: no cover - the loop always runs
         raise ScenarioError(
             f"{search.problem.scenario.name}: planner: nothing was tried",
             file=search.problem.scenario.name,
             field="planner",
         )
-    return best
+    return best_result
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
@@ -185,12 +188,12 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
         raise ScenarioError.at(scenario.name, "planner.budget", settings.budget, f"{allowed}")
     threats = scenario.threats
     for field, end in (("start", scenario.start), ("destination", scenario.destination)):
-        outside = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius
-        inside = np.flatnonzero((threats.kill_radius > 0.0) & (outside <= 0.0))
-        if inside.size:
-            missile = int(inside[0])
+        distances = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius
+        indices = np.flatnonzero((threats.kill_radius > 0.0) & (distances <= 0.0))
+        if indices.size:
+            missile = int(indices[0])
             raise ScenarioError(
-                f"{scenario.name}: {field}: {-outside[missile]:.0f} m inside the kill radius of"
+                f"{scenario.name}: {field}: {-distances[missile]:.0f} m inside the kill radius of"
                 f" {threats.names[missile]} "
                 f"({threats.kill_radius[missile]:.0f} m): no path from there is safe",
                 file=scenario.name,
@@ -206,7 +209,7 @@ def _prepare_retry(search: Search, attempt: int) -> None:
     search.evaluate(vectors)
 
 
-def _run_attempt(search: Search, attempt: int, previous: Floats | None) -> None:
+def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> None:
     """Search once, from the first population to the last generation."""
     settings = search.problem.scenario.planner
     grids, population_factor = ATTEMPTS[attempt]
@@ -215,7 +218,7 @@ def _run_attempt(search: Search, attempt: int, previous: Floats | None) -> None:
         search.record_history()
         search.report_progress(0)
         return
-    starts = starting_vectors(search, grids, previous, is_retry=attempt > 0)
+    starts = starting_vectors(search, grids, previous_path, is_retry=attempt > 0)
     if len(search.archive.scores) and (search.first_safe_found() or search.must_end()):
         search.record_history()
         return

@@ -48,7 +48,7 @@ MAX_LAPS = 8
 def candidate_chains(
     start: MapPoint, course: float, end: MapPoint, end_course: float, turn_radius: float, laps: int
 ) -> Iterator[list[MapPoint]]:
-    """Yield lists of corners between two points: none, or one near the start and up to two before the end.
+    """Yield lists of corners between two points: at most one corner near the start, and at most two before the end.
 
     course, end_course: course of the leg before the start, and of the leg after the end, rad.
     turn_radius: radius of the tightest turn, m.  laps: number of laps before these corners.
@@ -147,19 +147,22 @@ def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathM
     >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(990.0)).fits
     False
     """
-    length = max_turn = max_fraction = squared_turns = length_taken = east = north = leg_length = 0.0
+    length = max_turn = max_fraction = squared_turns = occupied_length = east = north = leg_length = 0.0
     for k in range(len(points) - 1):
-        to_east, to_north = points[k + 1][0] - points[k][0], points[k + 1][1] - points[k][1]
-        to_length = math.hypot(to_east, to_north)
-        if to_length < 1.0:
+        next_east, next_north = points[k + 1][0] - points[k][0], points[k + 1][1] - points[k][1]
+        next_length = math.hypot(next_east, next_north)
+        if next_length < 1.0:
             return PathMeasures(length, math.inf, math.pi, math.inf)
         if k:
-            turn = abs(math.atan2(east * to_north - north * to_east, east * to_east + north * to_north))
+            turn = abs(math.atan2(east * next_north - north * next_east, east * next_east + north * next_north))
             max_turn, squared_turns = max(max_turn, turn), squared_turns + turn * turn
             length_before, length_after = turn_lengths.lengths(turn)
-            max_fraction, length_taken = max(max_fraction, (length_taken + length_before) / leg_length), length_after
-        length, east, north, leg_length = length + to_length, to_east, to_north, to_length
-    max_fraction = max(max_fraction, length_taken / leg_length) if leg_length else math.inf
+            max_fraction, occupied_length = (
+                max(max_fraction, (occupied_length + length_before) / leg_length),
+                length_after,
+            )
+        length, east, north, leg_length = length + next_length, next_east, next_north, next_length
+    max_fraction = max(max_fraction, occupied_length / leg_length) if leg_length else math.inf
     return PathMeasures(length, length + _TURN_COST_M * squared_turns, max_turn, max_fraction)
 
 

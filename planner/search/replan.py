@@ -20,7 +20,7 @@ from world.errors import MissionError
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 
-# A function that completes a plan. It is given a search that plans a changed scenario, or within other limits.
+# Function that completes a plan, with a search that it may call for a changed scenario or for other limits.
 Settle = Callable[[Plan, Search], Plan]
 
 # Minimum number of waypoints of the path ahead; with fewer it cannot avoid anything.
@@ -39,11 +39,12 @@ def replan(
     stop: StopCondition | None = None,
     settle: Settle | None = None,
 ) -> Plan:
-    """Plan again from the waypoint at which leg `leg` of an old plan begins, and keep the flown legs before it.
+    """Plan again from the start of leg `leg` of an old plan, and keep the flown legs before it.
 
-    scenario: includes the threats known now (`world.scenario.with_threats`). The turn at that waypoint is measured from
-    the course of the last flown leg. The search starts from the rest of the old plan, in addition to its grid routes.
-    The certificate applies to the path ahead; violations and objectives to the whole path in this scenario.
+    scenario: includes the threats known now (`world.scenario.with_threats`). The turn at the first new waypoint is
+    measured from the course of the last flown leg. The search starts from the rest of the old plan, in addition to its
+    grid routes. The certificate applies to the path ahead; violations and objectives apply to the whole
+    path in this scenario.
 
     settle: completes the path ahead in a scenario that begins with it, before the flown legs are prepended.
 
@@ -59,8 +60,8 @@ def replan(
     >>> new.safe, new.flown_legs, np.array_equal(new.waypoints[:4], old.waypoints[:4])
     (True, 3, True)
 
-    Raises MissionError for a leg that the old plan does not have or that begins in a missile's kill sphere or violates
-    a zone, and for a plan of another mission; ScenarioError as `plan_path`.
+    Raises MissionError if the old plan does not have the leg, if the leg starts in a missile's kill sphere or violates
+    a zone, or if the old plan belongs to another mission. Raises ScenarioError as `plan_path` does.
     """
     waypoint_count = len(old_plan.waypoints)
     if not 0 <= leg < waypoint_count - 1:
@@ -74,7 +75,7 @@ def replan(
 
     def search(changed_scenario: Scenario, changed_limits: Limits) -> Plan:
         # A search with another number of waypoints cannot start from the old plan.
-        previous = remaining_path if changed_scenario.planner.waypoints == len(remaining_path) else None
+        previous_path = remaining_path if changed_scenario.planner.waypoints == len(remaining_path) else None
         return plan_path(
             changed_scenario,
             changed_limits,
@@ -82,7 +83,7 @@ def replan(
             algorithm=algorithm,
             progress=progress,
             stop=stop,
-            previous=previous,
+            previous=previous_path,
         )
 
     budget = SharedBudget(search)
@@ -103,7 +104,7 @@ def replan(
 
 
 def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
-    """Raise MissionError if the ends of a plan differ from the scenario's ends.
+    """Check that a plan has the ends of a scenario. Raises MissionError if its ends differ.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -114,11 +115,11 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
     Traceback (most recent call last):
     world.errors.MissionError: tight: start: 742 m from that of the plan; the plan belongs to another mission
     """
-    for name, planned, required in (
+    for name, plan_end, scenario_end in (
         ("start", old_plan.waypoints[0], scenario.start),
         ("destination", old_plan.waypoints[-1], scenario.destination),
     ):
-        distance = math.dist(planned, required)
+        distance = math.dist(plan_end, scenario_end)
         if distance > 1.0:
             raise MissionError(
                 f"{scenario.name}: {name}: {distance:.0f} m from that of the plan; the plan belongs to another mission",
@@ -128,7 +129,7 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
 
 
 def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
-    """Raise MissionError if the new plan would begin within a missile's kill radius, or where it violates a zone."""
+    """Check the first waypoint of the new plan. Raises MissionError if it is in a kill radius or violates a zone."""
     threats = scenario.threats
     depths = threats.kill_radius - np.sqrt(((threats.position - old_plan.waypoints[leg]) ** 2).sum(axis=1))
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1
@@ -140,9 +141,9 @@ def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
             field="leg",
             value=leg,
         )
-    forbidden = violated_zones(scenario, old_plan.waypoints[[leg, leg]])
-    if forbidden:
-        reason = f"waypoint {leg}, where it begins, violates {forbidden[0]}"
+    zone_names = violated_zones(scenario, old_plan.waypoints[[leg, leg]])
+    if zone_names:
+        reason = f"waypoint {leg}, where it begins, violates {zone_names[0]}"
         message = f"{scenario.name}: leg {leg}: {reason}: every path from there violates it"
         raise MissionError(message, file=scenario.name, field="leg", value=leg)
 

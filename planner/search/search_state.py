@@ -125,9 +125,9 @@ class Archive:
         is_kept = ~are_violated(scores)
         if self.is_feasible():
             if len(self.scores) == ARCHIVE_SIZE:
-                last = self.scores[-1]
-                shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
-                is_kept &= shorter | (scores[:, KILL] < last[KILL])
+                last_scores = self.scores[-1]
+                is_shorter = (scores[:, KILL] == last_scores[KILL]) & (scores[:, LENGTH] < last_scores[LENGTH])
+                is_kept &= is_shorter | (scores[:, KILL] < last_scores[KILL])
             if not is_kept.any():
                 return
         elif is_kept.any():
@@ -257,10 +257,12 @@ class Search:
 
     def improve(self, vector: Floats, max_evaluations: int) -> Floats:
         """Improve a vector (d,) by a pattern search, archive the result, and return the best scores (8,)."""
-        limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
-        if limit < 2:
+        evaluation_limit = min(max_evaluations, self._evaluation_budget() - self.evaluations)
+        if evaluation_limit < 2:
             return np.asarray(self.evaluate(vector[None])[0])
-        vectors, evaluations = search_patterns(self.problem.search, self.encoding, vector, int(limit), self.should_stop)
+        vectors, evaluations = search_patterns(
+            self.problem.search, self.encoding, vector, int(evaluation_limit), self.should_stop
+        )
         scores = self.evaluate(vectors)
         # The pattern search has already included these vectors in its evaluations.
         self.evaluations += evaluations - len(vectors)
@@ -348,8 +350,8 @@ class Search:
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
-        shortest = float(path_length(self.shortest[0])) / self._straight_length()
-        return min(ratio, shortest) if self.best_is_safe() else shortest
+        shortened_ratio = float(path_length(self.shortest[0])) / self._straight_length()
+        return min(ratio, shortened_ratio) if self.best_is_safe() else shortened_ratio
 
     def meets_goal(self, certificate: Certificate) -> bool:
         """Return True if this certificate meets the goal of the search."""
@@ -361,21 +363,23 @@ class Search:
 
     def record_history(self) -> None:
         """Append the best path to the history."""
-        best = self.archive.scores[0]
-        violations = best[: len(Violation)]
+        best_scores = self.archive.scores[0]
+        violations = best_scores[: len(Violation)]
         count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()
         has_shortened = self.shortest is not None
-        row = (self.length_ratio(), 0.0, 0.0) if has_shortened else (best[LENGTH], best[KILL], float(count))
+        row = (
+            (self.length_ratio(), 0.0, 0.0) if has_shortened else (best_scores[LENGTH], best_scores[KILL], float(count))
+        )
         self.history.append(row)
 
     def report_progress(self, remaining_generations: int) -> None:
         """Report progress, with `remaining_generations` as the number of generations that may follow."""
         if self.progress is not None:
-            best = self.archive.scores[0]
-            remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best[KILL]:.3g}"
+            best_scores = self.archive.scores[0]
+            remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best_scores[KILL]:.3g}"
             if self.shortest is not None:
                 remark = f"length ratio {self.length_ratio():.4f}, kill exposure 0"
-            is_infeasible = self.shortest is None and are_violated(best)
+            is_infeasible = self.shortest is None and are_violated(best_scores)
             self.progress(
                 self.done, self.done + remaining_generations, "no feasible path yet" if is_infeasible else remark
             )

@@ -68,7 +68,7 @@ def starting_vectors(
     is_retry: True if an earlier attempt has failed; then, among zones, grids that are no finer than another grid are
     skipped, and only the best routes are followed.
     """
-    encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
+    encoding, space, waypoint_count = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
         return np.empty((0, encoding.lower.size))
     frame, starts = rotated_frame(space.start, space.destination), list(search.archive.vectors[:1])
@@ -87,7 +87,7 @@ def starting_vectors(
             break
         if is_among_zones and is_retry and index >= MAX_FOLLOWED_RETRY_ROUTES:
             break
-        path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
+        path = fit_waypoints(search.problem.search, frame, route.points, waypoint_count)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
         improved_scores.append(search.improve(starts[-1], SEED_SEARCH_EVALUATIONS * effort_factor))
     if not starts:
@@ -107,7 +107,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     candidates, scores = [], []
-    shortens_routes = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
+    should_shorten = search.can_shorten and search.algorithm.optimiser == "waypoints" and not search.first_safe
     is_among_zones = is_limited(data.airspace)
     routes = (
         airspace_routes(data, frame, span, grids, search.pause, finer_only=is_retry)
@@ -115,14 +115,14 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
         else grid_routes(data, frame, span, grids, search.pause)
     )
     for route in routes:
-        if shortens_routes and search.has_safe():
+        if should_shorten and search.has_safe():
             search.shorten(resample(frame.restore(route.points), encoding.waypoints))
             if search.must_end():
                 break
             continue
         candidates.append(route)
-        path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK_FIT)
-        vectors = rotated_vectors(space, encoding, path[None])
+        fitted_path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK_FIT)
+        vectors = rotated_vectors(space, encoding, fitted_path[None])
         scores.append(search.evaluate(vectors)[0])
         if not search.first_safe_found():
             scores[-1] = search.improve(vectors[0], QUICK_SEARCH_EVALUATIONS)
@@ -291,10 +291,10 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         if remaining_states <= 0 or search.must_end() or lattices[index] in lattices[:index]:
             break
         try:
-            route, expanded = lattice_route(data, frame, step_fraction * step, search.pause, remaining_states)
+            route, expanded_count = lattice_route(data, frame, step_fraction * step, search.pause, remaining_states)
         except SearchEnded:
             break
-        remaining_states -= expanded
+        remaining_states -= expanded_count
         if not len(route):
             continue
         is_safe = search.meets_goal(best[1])
@@ -303,7 +303,10 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         path, certificate, is_shortened = _search_along(search, route)
         if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
             return (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
-        if not is_safe and (certificate.ok, certificate.kill_distance) > (best[1].ok, best[1].kill_distance):
+        if not is_safe and (certificate.ok, certificate.kill_distance) > (
+            best[1].ok,
+            best[1].kill_distance,
+        ):
             best = path, certificate
     return best
 

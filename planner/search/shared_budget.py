@@ -14,8 +14,8 @@ Search = Callable[[Scenario, Limits], Plan]
 class SharedBudget:
     """A search that may be repeated for the same plan, in another scenario or within other limits.
 
-    Each search has the remaining evaluations of the scenario's budget. If fewer than a population remain, there is no
-    further search.
+    Each search may use the remaining evaluations of the scenario's budget. If fewer evaluations than one population
+    remain, no further search is run.
     """
 
     def __init__(self, search: Search) -> None:
@@ -27,13 +27,13 @@ class SharedBudget:
         """Return the plan of a new search, or of the last search if the budget does not allow another search."""
         settings = scenario.planner
         if settings.budget is None:
-            return self._store(self._search(scenario, limits))
-        remaining = settings.budget - self._count_evaluations()
-        if self._plans and remaining < settings.population:
+            return self._record_plan(self._search(scenario, limits))
+        remaining_evaluations = settings.budget - self._count_evaluations()
+        if self._plans and remaining_evaluations < settings.population:
             self._end_reason = "budget"
             return self._plans[-1]
-        limited_scenario = replace(scenario, planner=settings.model_copy(update={"budget": remaining}))
-        return self._store(replace(self._search(limited_scenario, limits), scenario=scenario))
+        limited_scenario = replace(scenario, planner=settings.model_copy(update={"budget": remaining_evaluations}))
+        return self._record_plan(replace(self._search(limited_scenario, limits), scenario=scenario))
 
     def total(self, plan: Plan) -> Plan:
         """Return the final plan with the evaluations of all searches.
@@ -47,7 +47,7 @@ class SharedBudget:
     def _count_evaluations(self) -> int:
         return sum(plan.evaluations for plan in self._plans)
 
-    def _store(self, plan: Plan) -> Plan:
+    def _record_plan(self, plan: Plan) -> Plan:
         self._plans.append(plan)
         if self._end_reason == "completed":
             self._end_reason = plan.ended

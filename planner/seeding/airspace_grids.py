@@ -22,7 +22,7 @@ from planner.seeding.grids import (
     LAYERS_PER_STEP,
     MAX_SIDE,
     GridRoute,
-    distance_to_goal,
+    fill_goal_distances,
     find_obstacles,
     position_of,
     proximity_cost,
@@ -209,10 +209,10 @@ def _relax_stage(
                 continue
             target_first_height = columns[target].lowest if grid.follows else grid.floor
             horizontal_length = step * math.sqrt(1.0 + side * side)
-            to_east, to_north = position_of(frame, stage * step, grid.across[target])
+            end_east, end_north = position_of(frame, stage * step, grid.across[target])
             closed_heights = _ClosedHeights(math.inf, -math.inf)
             if zones.required.shape[0] > 0:
-                leg = segment_between(east, north, to_east, to_north)
+                leg = segment_between(east, north, end_east, end_north)
                 closed_heights = _closed_heights(zones, leg, lateral, previous_columns[y].ground)
             climb, dive = slopes[side + MAX_SIDE, 0] * horizontal_length, slopes[side + MAX_SIDE, 1] * horizontal_length
             for z in range(grid.layers):
@@ -239,11 +239,11 @@ def _relax_stage(
 
 
 class AirspaceSearch(NamedTuple):
-    """A search for the cheapest route over a grid, which can be continued.
+    """Resumable search for the cheapest route over a grid.
 
     obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
     the parent of each cell, as across x layers. cost, next_cost, price: (across, layers) of the last stage reached, and
-    scratch. home: index across of both ends. stage: the last one reached.
+    scratch. centre_index: index across of both ends. stage: the last stage reached.
     """
 
     obstacles: Records
@@ -252,7 +252,7 @@ class AirspaceSearch(NamedTuple):
     cost: Floats
     next_cost: Floats
     price: Floats
-    home: int
+    centre_index: int
     stage: int
 
 
@@ -285,14 +285,14 @@ def cheapest_airspace_route(
 
 @compiled
 def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid) -> AirspaceSearch:
-    """Return a new search at the start."""
+    """Return a new search before its first stage."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
-    home = int(np.argmin(np.abs(grid.across)))
+    centre_index = int(np.argmin(np.abs(grid.across)))
     columns = np.zeros((stages + 1, width), dtype=COLUMN)
     for y in range(width):
         _fill_column(data, frame, grid, 0.0, grid.across[y], columns[0, y])
     cost = np.full((width, grid.layers), math.inf)
-    cost[home, _nearest_layer(grid, columns[0, home], data.start[2])] = 0.0
+    cost[centre_index, _nearest_layer(grid, columns[0, centre_index], data.start[2])] = 0.0
     return AirspaceSearch(
         find_obstacles(data, frame, step),
         columns,
@@ -300,7 +300,7 @@ def begin_airspace_route(data: ProblemArrays, frame: RotatedFrame, grid: Airspac
         cost,
         np.full((width, grid.layers), math.inf),
         np.full((width, grid.layers), math.inf),
-        home,
+        centre_index,
         0,
     )
 
@@ -315,9 +315,9 @@ def continue_airspace_route(
     search: AirspaceSearch,
     max_stages: int,
 ) -> AirspaceSearch:
-    """Continue a search by up to `max_stages` stages, or until no route leads on, and return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue, and return it."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
-    obstacles, columns, cells, cost, next_cost, price, home, reached_stage = search
+    obstacles, columns, cells, cost, next_cost, price, centre_index, reached_stage = search
     last_stage, goal_distances = min(stages, reached_stage + max_stages), np.empty(width)
     for stage in range(reached_stage + 1, last_stage + 1):
         along, first, last = stage * step, width, -1
@@ -333,7 +333,7 @@ def continue_airspace_route(
             _fill_column(data, frame, grid, along, grid.across[y], columns[stage, y])
         _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, price)
         if stage == stages:
-            price[home, _nearest_layer(grid, columns[stage, home], data.destination[2])] = 1.0
+            price[centre_index, _nearest_layer(grid, columns[stage, centre_index], data.destination[2])] = 1.0
         next_cost[:] = math.inf
         _relax_stage(
             data,
@@ -348,13 +348,13 @@ def continue_airspace_route(
             cells[stage - 1],
             cells[stage],
         )
-        distance_to_goal(width, home, stages - stage, step, 1.0, goal_distances)
+        fill_goal_distances(width, centre_index, stages - stage, step, 1.0, goal_distances)
         for y in range(first, last + 1):
             for z in range(grid.layers):
                 if goal_distances[y] == math.inf or next_cost[y, z] + goal_distances[y] > bound:
                     next_cost[y, z] = math.inf
         cost, next_cost = next_cost, cost
-    return AirspaceSearch(obstacles, columns, cells, cost, next_cost, price, home, last_stage)
+    return AirspaceSearch(obstacles, columns, cells, cost, next_cost, price, centre_index, last_stage)
 
 
 @compiled
@@ -362,7 +362,7 @@ def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
 ) -> tuple[Floats, float]:
     """Return points (stages + 1, 3) of the route found, and its cost, or (0, 3) points and inf."""
-    stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.home
+    stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.centre_index
     z = _nearest_layer(grid, columns[stages, y], data.destination[2])
     total = search.cost[y, z]
     if total == math.inf:
@@ -410,8 +410,8 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
 
     span: limits across, m.
     """
-    level = np.array([*data.destination[:2], data.start[2]])
-    gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
+    level_point = np.array([*data.destination[:2], data.start[2]])
+    gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level_point))))
     space = data.airspace
     band_height = space.max_height - space.buffer - data.clearance - data.buffer
     min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
@@ -486,9 +486,9 @@ def _find_route(
     expected_cost: float,
     pause: Callable[[], None],
 ) -> GridRoute | None:
-    """Return the cheapest route over a grid away from used routes, or None.
+    """Return the cheapest route over a grid at a distance from earlier routes, or None if there is none.
 
-    expected_cost: first bound to try.
+    expected_cost: cost bound to try first.
     """
     extra = proximity_cost(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, earlier_routes)
     for bound in (expected_cost, math.inf):

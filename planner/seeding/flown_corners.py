@@ -2,8 +2,8 @@
 
 Around the end of a ridge a flight cuts its corners over higher ground than there is below the legs.  Without tracking
 error the flight is on the chords of fly-by arcs; with tracking error it is within a distance of the legs before and
-after the waypoint, on both sides.  A certificate measures these places; samples of them are taken here.  An arc is
-shorter than the legs it replaces, and steeper, so a path that climbs in circles must climb less on its arcs.
+after the waypoint, on both sides.  A certificate measures all of these positions; shortening measures samples of them.
+An arc is shorter than the legs it replaces, and steeper, so a path that climbs in circles must climb less on its arcs.
 """
 
 import math
@@ -62,7 +62,7 @@ class FlownCorners(NamedTuple):
 
 @inner
 def no_corners(count: int, margin: float) -> FlownCorners:
-    """Return the record of a path without such corners.
+    """Return the record of a path without corners near the ground.
 
     margin: additional margin, m.
     """
@@ -117,15 +117,19 @@ def corners_near_ground(
 @inner
 def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown: FlownCorners) -> None:
     """Fill the radii and slope limits of the arcs whose slopes are close to the limits on one of their courses."""
-    flat, step = np.zeros(3), np.zeros(3)
+    level_start, level_end = np.zeros(3), np.zeros(3)
     for i in range(1, path.shape[0] - 1):
         if not 0.0 < corners[i].radius < math.inf or math.isinf(corners[i].tangent):
             continue
         climb, dive = math.inf, math.inf
-        flat[2] = path[i, 2]
+        level_start[2] = path[i, 2]
         for leg in (i - 1, i):
-            step[0], step[1], step[2] = path[leg + 1, 0] - path[leg, 0], path[leg + 1, 1] - path[leg, 1], path[i, 2]
-            climb_limit, dive_limit = slope_limits(data, flat, step)
+            level_end[0], level_end[1], level_end[2] = (
+                path[leg + 1, 0] - path[leg, 0],
+                path[leg + 1, 1] - path[leg, 1],
+                path[i, 2],
+            )
+            climb_limit, dive_limit = slope_limits(data, level_start, level_end)
             climb, dive = min(climb, math.tan(climb_limit)), min(dive, math.tan(dive_limit))
         flown.slopes[i, 0], flown.slopes[i, 1] = climb, dive
         radius = corners[i].radius
@@ -166,8 +170,8 @@ def leg_of(sample: int) -> int:
 
 
 @inner
-def _horizontal_length(a: Floats, b: Floats) -> float:
-    return max(1e-3, math.hypot(b[0] - a[0], b[1] - a[1]))
+def _horizontal_length(start: Floats, end: Floats) -> float:
+    return max(1e-3, math.hypot(end[0] - start[0], end[1] - start[1]))
 
 
 @inner
@@ -181,7 +185,7 @@ def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point:
 @inner
 def corner_point(
     data: ProblemArrays,
-    previous: Floats,
+    previous_waypoint: Floats,
     waypoint: Floats,
     next_waypoint: Floats,
     radius: float,
@@ -192,10 +196,13 @@ def corner_point(
 
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
     """
-    length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
-    ux, uy = (waypoint[0] - previous[0]) / length_in, (waypoint[1] - previous[1]) / length_in
+    length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
+    ux, uy = (waypoint[0] - previous_waypoint[0]) / length_in, (waypoint[1] - previous_waypoint[1]) / length_in
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_out, (next_waypoint[1] - waypoint[1]) / length_out
-    slope_in, slope_out = (waypoint[2] - previous[2]) / length_in, (next_waypoint[2] - waypoint[2]) / length_out
+    slope_in, slope_out = (
+        (waypoint[2] - previous_waypoint[2]) / length_in,
+        (next_waypoint[2] - waypoint[2]) / length_out,
+    )
     cross = ux * vy - uy * vx
     turn = min(MAX_TURN_RAD, math.atan2(abs(cross), ux * vx + uy * vy))
     if data.tracking.has_error:

@@ -95,10 +95,10 @@ def _min_height(
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
         return math.inf
     column, row = polymap(data.to_pixel, east, north)
-    spread = 0 if steps.columns_along == 0.0 and steps.rows_along == 0.0 else 1
+    sample_radius = 0 if steps.columns_along == 0.0 and steps.rows_along == 0.0 else 1
     highest_ground = -math.inf
-    for i in range(-spread, spread + 1):
-        for j in range(-spread, spread + 1):
+    for i in range(-sample_radius, sample_radius + 1):
+        for j in range(-sample_radius, sample_radius + 1):
             ground = pixel_height(
                 data.heights,
                 column + i * steps.columns_along + j * steps.columns_across,
@@ -238,24 +238,24 @@ def relax(
     price: Floats,
     next_cost: Floats,
     parents: Codes,
-    start: int,
-    end: int,
-    price_start: int,
+    first_source: int,
+    first_target: int,
+    first_price: int,
     count: int,
     length: float,
 ) -> None:
-    """Relax `count` adjacent cells to as many cells of the next stage, with cell costs from `price_start`.
+    """Relax `count` adjacent cells to as many cells of the next stage.
 
-    All arrays are flat.
+    first_source, first_target, first_price: indices of the first cells, and of the first cell cost, in the flat arrays.
     """
     for k in range(count):
         # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
         # vectorised.
-        i, j = np.uintp(start) + np.uintp(k), np.uintp(end) + np.uintp(k)
-        total = cost[i] + length * price[np.uintp(price_start) + np.uintp(k)]
+        i, j = np.uintp(first_source) + np.uintp(k), np.uintp(first_target) + np.uintp(k)
+        total = cost[i] + length * price[np.uintp(first_price) + np.uintp(k)]
         is_better = total < next_cost[j]
         next_cost[j] = total if is_better else next_cost[j]
-        parents[j] = start + k if is_better else parents[j]
+        parents[j] = first_source + k if is_better else parents[j]
 
 
 @inner
@@ -308,7 +308,7 @@ def relax_stage(
 
 
 @inner
-def distance_to_goal(columns: int, home: int, remaining_stages: int, step: float, ratio: float, out: Floats) -> None:
+def fill_goal_distances(columns: int, home: int, remaining_stages: int, step: float, ratio: float, out: Floats) -> None:
     """Fill the shortest horizontal distance from each position across to the destination, m."""
     for y in range(columns):
         offset = abs(y - home)
@@ -316,9 +316,9 @@ def distance_to_goal(columns: int, home: int, remaining_stages: int, step: float
             out[y] = math.inf
             continue
         k = offset // remaining_stages if remaining_stages > 0 else 0
-        narrow_count, wide_count = (k + 1) * remaining_stages - offset, offset - k * remaining_stages
-        narrow_length, wide_length = math.sqrt(1.0 + (k * ratio) ** 2), math.sqrt(1.0 + ((k + 1) * ratio) ** 2)
-        out[y] = step * (narrow_count * narrow_length + wide_count * wide_length)
+        short_count, long_count = (k + 1) * remaining_stages - offset, offset - k * remaining_stages
+        short_length, long_length = math.sqrt(1.0 + (k * ratio) ** 2), math.sqrt(1.0 + ((k + 1) * ratio) ** 2)
+        out[y] = step * (short_count * short_length + long_count * long_length)
 
 
 @inner
@@ -326,24 +326,24 @@ def prune(
     next_cost: Floats,
     spans: Records,
     goal_distances: Floats,
-    rises: Floats,
+    height_differences: Floats,
     bound: float,
     first_across: int,
     last_across: int,
 ) -> None:
     """Drop cells without a route to the destination within the bound, and fill the remaining spans.
 
-    spans: `SPAN` records (layers,) to fill. goal_distances: (across,) horizontal distance to the destination, m. rises:
-    (layers,) height difference to it, m.
+    spans: `SPAN` records (layers,) to fill. goal_distances: (across,) horizontal distance to the destination, m.
+    height_differences: (layers,) height differences to the destination, m.
     """
     for z in range(next_cost.shape[0]):
         spans[z].first, spans[z].last = next_cost.shape[1], -1
-        rise2 = rises[z] * rises[z]
+        height_difference2 = height_differences[z] * height_differences[z]
         for y in range(first_across, last_across + 1):
             remaining_cost = bound - next_cost[z, y]
             if (
                 remaining_cost >= 0.0
-                and remaining_cost * remaining_cost >= goal_distances[y] * goal_distances[y] + rise2
+                and remaining_cost * remaining_cost >= goal_distances[y] * goal_distances[y] + height_difference2
                 and next_cost[z, y] < math.inf
             ):
                 spans[z].first = min(spans[z].first, y)
@@ -353,10 +353,11 @@ def prune(
 
 
 class GridSearch(NamedTuple):
-    """A search for the cheapest route over a grid, which can be continued; arrays are (layers, across).
+    """Resumable search for the cheapest route over a grid; arrays are (layers, across).
 
     parents: (stages + 1, layers, across).  cost: costs of the last stage reached.  next_cost: scratch.  price: cost per
-    m, scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  stage: the last one reached.
+    m, scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  start_layer, goal_layer: layers of
+    the ends.  centre_index: index across of both ends.  stage: the last stage reached.
     """
 
     step_layers: Records
@@ -366,9 +367,9 @@ class GridSearch(NamedTuple):
     next_cost: Floats
     price: Floats
     spans: Records
-    start: int
-    home: int
-    goal: int
+    start_layer: int
+    centre_index: int
+    goal_layer: int
     stage: int
 
 
@@ -401,16 +402,16 @@ def cheapest_route(
 
 @compiled
 def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSearch:
-    """Return a new search at the start."""
+    """Return a new search before its first stage."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
-    home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
-    goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
+    centre_index, start_layer = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
+    goal_layer = int(np.argmin(np.abs(grid.layers - data.destination[2])))
     cost = np.full((layer_count, width), np.inf)
-    cost[start, home] = 0.0
+    cost[start_layer, centre_index] = 0.0
     spans = np.zeros(layer_count, dtype=SPAN)
     for z in range(layer_count):
-        spans[z].first, spans[z].last = (home, home) if z == start else (width, -1)
+        spans[z].first, spans[z].last = (centre_index, centre_index) if z == start_layer else (width, -1)
     return GridSearch(
         layers_per_step(data, frame, step, grid.layers, grid.ratio),
         find_obstacles(data, frame, step, grid.shrink),
@@ -419,9 +420,9 @@ def begin_route(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> GridSea
         np.full((layer_count, width), np.inf),
         np.full((layer_count, width), np.inf),
         spans,
-        start,
-        home,
-        goal,
+        start_layer,
+        centre_index,
+        goal_layer,
         0,
     )
 
@@ -436,13 +437,25 @@ def continue_route(
     search: GridSearch,
     max_stages: int,
 ) -> GridSearch:
-    """Continue a search by up to `max_stages` stages, or until no route leads on, and return it."""
+    """Continue a search by up to `max_stages` stages, or until no route can continue, and return it."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     required = required_clearance(data)
-    step_layers, obstacles, parents, cost, next_cost, price, spans, start, home, goal, reached_stage = search
-    rises, goal_distances = grid.layers - grid.layers[goal], np.empty(width)
+    (
+        step_layers,
+        obstacles,
+        parents,
+        cost,
+        next_cost,
+        price,
+        spans,
+        start_layer,
+        centre_index,
+        goal_layer,
+        reached_stage,
+    ) = search
+    height_differences, goal_distances = grid.layers - grid.layers[goal_layer], np.empty(width)
     last_stage = min(stages, reached_stage + max_stages)
     for stage in range(reached_stage + 1, last_stage + 1):
         first, last = width, -1
@@ -455,19 +468,35 @@ def continue_route(
         set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, price)
         next_cost[:, first : last + 1] = np.inf
         relax_stage(cost, next_cost, parents[stage], spans, step_layers, price, step, pitch, grid.ratio)
-        distance_to_goal(width, home, stages - stage, step, grid.ratio, goal_distances)
-        prune(next_cost, spans, goal_distances, rises, bound, first, last)
+        fill_goal_distances(width, centre_index, stages - stage, step, grid.ratio, goal_distances)
+        prune(next_cost, spans, goal_distances, height_differences, bound, first, last)
         cost, next_cost = next_cost, cost
-    return GridSearch(step_layers, obstacles, parents, cost, next_cost, price, spans, start, home, goal, last_stage)
+    return GridSearch(
+        step_layers,
+        obstacles,
+        parents,
+        cost,
+        next_cost,
+        price,
+        spans,
+        start_layer,
+        centre_index,
+        goal_layer,
+        last_stage,
+    )
 
 
 @compiled
 def end_route(search: GridSearch) -> tuple[Records, float]:
     """Return `ROUTE_CELL` records (stages + 1,) of the route found, or no records, and its cost."""
-    goal, home, cost = search.goal, search.home, search.cost
-    if search.spans[goal].first > home or search.spans[goal].last < home or cost[goal, home] == np.inf:
+    goal_layer, centre_index, cost = search.goal_layer, search.centre_index, search.cost
+    if (
+        search.spans[goal_layer].first > centre_index
+        or search.spans[goal_layer].last < centre_index
+        or cost[goal_layer, centre_index] == np.inf
+    ):
         return np.zeros(0, dtype=ROUTE_CELL), np.inf
-    return trace_back(search.parents, goal, home), cost[goal, home]
+    return trace_back(search.parents, goal_layer, centre_index), cost[goal_layer, centre_index]
 
 
 @inner
@@ -518,9 +547,9 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
 
     span: limits across, m. The number of stages is reduced where the grid would become too large.
     """
-    lowest, highest = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
-    level = np.array([*data.destination[:2], data.start[2]])
-    gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
+    min_height, max_height = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
+    level_point = np.array([*data.destination[:2], data.start[2]])
+    gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level_point))))
     pitch_ratio = min(MAX_LAYER_PITCH, max(MIN_LAYER_PITCH, gentler_slope / LAYERS_PER_STEP))
     while True:
         step = frame.length / stages
@@ -528,7 +557,8 @@ def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float
         right_count, left_count = math.floor(-span[0] / step), math.floor(span[1] / step)
         across = np.arange(-right_count, left_count + 1) * step
         layer_numbers = np.arange(
-            math.ceil((lowest - data.start[2]) / layer_pitch), math.floor((highest - data.start[2]) / layer_pitch) + 1
+            math.ceil((min_height - data.start[2]) / layer_pitch),
+            math.floor((max_height - data.start[2]) / layer_pitch) + 1,
         )
         if stages <= 4 or (stages + 1) * across.size * max(1, layer_numbers.size) <= MAX_CELLS:
             return Grid(

@@ -85,13 +85,15 @@ def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int
 @compiled
 def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:
     """Return the maximum climb and descent (8, 2) of a step on each course, in layers."""
-    layers, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
-    _set_position(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
+    layers, start, end = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
+    _set_position(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, start)
     for course in range(8):
         step_across, step_along = _STEPS[course, 1], _STEPS[course, 0]
-        _set_position(frame, lattice, lattice.behind + step_along, lattice.right + step_across, lattice.start_layer, b)
-        horizontal_length = math.hypot(b[0] - a[0], b[1] - a[1])
-        climb, dive = slope_limits(data, a, b)
+        _set_position(
+            frame, lattice, lattice.behind + step_along, lattice.right + step_across, lattice.start_layer, end
+        )
+        horizontal_length = math.hypot(end[0] - start[0], end[1] - start[1])
+        climb, dive = slope_limits(data, start, end)
         layers[course, 0] = max(0, math.floor(math.tan(climb) * horizontal_length / lattice.pitch))
         layers[course, 1] = max(0, math.floor(math.tan(dive) * horizontal_length / lattice.pitch))
     return layers
@@ -100,14 +102,14 @@ def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) ->
 class _StateTable(NamedTuple):
     """State of the search, with a cost (m), parent and closed flag per state, and a feasible flag per step.
 
-    parents: the parent's number plus 1; 0 for a state that is not reached, whose cost is not set, and `_FIRST` for a
-    state of the start. rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
+    parents: the parent's number plus 1; 0 for an unreached state, whose cost is not set, and `_FIRST` for a state of
+    the start. layer_limits: (8, 2) maximum climb and descent in layers. steps: by cell, course and change of layer.
     """
 
     cost: Floats
     parents: Numbers
-    done: Flags
-    rises: Codes
+    is_expanded: Flags
+    layer_limits: Codes
     steps: Bytes
 
 
@@ -123,13 +125,13 @@ def _expand_state(
     open_states: list[tuple[float, int]],
 ) -> None:
     """Expand a state by relaxing its successors, and push each with its cost plus its distance to the goal."""
-    rises, course, cell = table.rises, state % 8, state // 8
+    layer_limits, course, cell = table.layer_limits, state % 8, state // 8
     layer, position = cell % lattice.layers, cell // lattice.layers
     along, across = position // lattice.across, position % lattice.across
-    max_descent = np.max(rises[:, 1])
-    width = np.max(rises[:, 0]) + max_descent + 1
-    a, b, goal = np.empty(3), np.empty(3), np.empty(3)
-    _set_position(frame, lattice, along, across, layer, a)
+    max_descent = np.max(layer_limits[:, 1])
+    width = np.max(layer_limits[:, 0]) + max_descent + 1
+    start, end, goal = np.empty(3), np.empty(3), np.empty(3)
+    _set_position(frame, lattice, along, across, layer, start)
     _set_position(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
     for turn in range(-max_turn, max_turn + 1):
         next_course = (course + turn) % 8
@@ -137,32 +139,32 @@ def _expand_state(
         if not (0 <= next_along < lattice.along and 0 <= next_across < lattice.across):
             continue
         lowest_layer, highest_layer = (
-            max(0, layer - rises[next_course, 1]),
-            min(lattice.layers - 1, layer + rises[next_course, 0]),
+            max(0, layer - layer_limits[next_course, 1]),
+            min(lattice.layers - 1, layer + layer_limits[next_course, 0]),
         )
         for next_layer in range(lowest_layer, highest_layer + 1):
             next_state = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + next_course
-            _set_position(frame, lattice, next_along, next_across, next_layer, b)
-            length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+            _set_position(frame, lattice, next_along, next_across, next_layer, end)
+            length = math.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
             total = table.cost[state] + length + TURN_COST * lattice.step * abs(turn)
-            if table.done[next_state] or (table.parents[next_state] != 0 and total >= table.cost[next_state]):
+            if table.is_expanded[next_state] or (table.parents[next_state] != 0 and total >= table.cost[next_state]):
                 continue
             # The feasibility of a step does not depend on the course before it.
             step_index = (cell * 8 + next_course) * width + next_layer - layer + max_descent
             if table.steps[step_index] == _UNKNOWN:
                 is_free = (
-                    _is_inside(data, b)
-                    and leg_cost(data, limits, a, b, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length
+                    _is_inside(data, end)
+                    and leg_cost(data, limits, start, end, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length
                 )
                 table.steps[step_index] = _FREE if is_free else _CLOSED
             if table.steps[step_index] == _FREE:
                 table.cost[next_state], table.parents[next_state] = total, state + 1
-                goal_distance = math.sqrt((b[0] - goal[0]) ** 2 + (b[1] - goal[1]) ** 2 + (b[2] - goal[2]) ** 2)
+                goal_distance = math.sqrt((end[0] - goal[0]) ** 2 + (end[1] - goal[1]) ** 2 + (end[2] - goal[2]) ** 2)
                 heapq.heappush(open_states, (total + goal_distance, next_state))
 
 
 class LatticeSearch(NamedTuple):
-    """A search that can be continued, with its state and the open list in heap order.
+    """Resumable search: its state table, and its open list in heap order.
 
     costs, states: (k,) of the open list. expanded_count: number of states expanded. goal_state: the goal's state once
     it is reached, or -1.
@@ -177,16 +179,16 @@ class LatticeSearch(NamedTuple):
 
 def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> LatticeSearch:
     """Return the search for a route from start to destination before its first step."""
-    rises = _climb_layers(data, frame, lattice)
-    size = lattice.along * lattice.across * lattice.layers * 8
-    width = int(rises.max(axis=0).sum()) + 1
+    layer_limits = _climb_layers(data, frame, lattice)
+    state_count = lattice.along * lattice.across * lattice.layers * 8
+    width = int(layer_limits.max(axis=0).sum()) + 1
     # Large arrays of zeros from NumPy take memory only where they are written to, mostly a small part.
     table = _StateTable(
-        np.empty(size),
-        np.zeros(size, dtype=np.int32),
-        np.zeros(size, dtype=np.bool_),
-        rises,
-        np.zeros(size * width, dtype=np.int8),
+        np.empty(state_count),
+        np.zeros(state_count, dtype=np.int32),
+        np.zeros(state_count, dtype=np.bool_),
+        layer_limits,
+        np.zeros(state_count * width, dtype=np.int8),
     )
     states = _start_states(data, frame, lattice, table)
     return LatticeSearch(table, np.zeros(states.size), states, 0, -1)
@@ -225,9 +227,9 @@ def continue_lattice_search(
     goal_state = -1
     while len(open_states) > 0 and expanded_count < search.expanded_count + max_expansions:
         _, state = heapq.heappop(open_states)
-        if table.done[state]:
+        if table.is_expanded[state]:
             continue
-        table.done[state] = True
+        table.is_expanded[state] = True
         expanded_count += 1
         if state // 8 == goal_cell and (goal_course < 0 or abs((state % 8 - goal_course + 4) % 8 - 4) <= max_turn):
             goal_state = state
@@ -251,8 +253,8 @@ def _nearest_course(frame: RotatedFrame, course: float) -> int:
 @inner
 def _is_inside(data: ProblemArrays, point: Floats) -> bool:
     """Return True if a point (3,) is on the map and between floor and ceiling."""
-    inside: bool = data.west <= point[0] <= data.east and data.south <= point[1] <= data.north
-    return inside and data.floor <= point[2] <= data.ceiling
+    is_on_map: bool = data.west <= point[0] <= data.east and data.south <= point[1] <= data.north
+    return is_on_map and data.floor <= point[2] <= data.ceiling
 
 
 @compiled
@@ -282,17 +284,17 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
     limits = precompute_limits(data)
     out = np.empty(points.shape)
     copy_into(out[0], points[0])
-    count, current, last_point = 1, 0, points.shape[0] - 1
-    while current < last_point:
-        next_point = current + 1
-        for k in range(last_point, current + 1, -1):
-            a, b = points[current], points[k]
-            length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            if leg_cost(data, limits, a, b, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length:
-                next_point = k
+    count, current_index, last_index = 1, 0, points.shape[0] - 1
+    while current_index < last_index:
+        next_index = current_index + 1
+        for candidate_index in range(last_index, current_index + 1, -1):
+            start, end = points[current_index], points[candidate_index]
+            length = math.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
+            if leg_cost(data, limits, start, end, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length:
+                next_index = candidate_index
                 break
-        current = next_point
-        copy_into(out[count], points[current])
+        current_index = next_index
+        copy_into(out[count], points[current_index])
         count += 1
     return out[:count]
 
@@ -332,24 +334,26 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     step: m. The step is increased where the lattice would have more than `MAX_LATTICE_STATES` states.
     """
     corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
-    low, high = frame.rotate(corners)[:, :2].min(axis=0), frame.rotate(corners)[:, :2].max(axis=0)
-    level = np.array([*data.destination[:2], data.start[2]])
-    gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level))))
+    min_corner, max_corner = frame.rotate(corners)[:, :2].min(axis=0), frame.rotate(corners)[:, :2].max(axis=0)
+    level_point = np.array([*data.destination[:2], data.start[2]])
+    gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level_point))))
     min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
     stages = max(1, math.ceil(frame.length / step))
     while True:
         step = frame.length / stages
         pitch = gentler_slope * step / LAYERS_PER_STEP
-        behind, right = math.floor(-low[0] / step), math.floor(-low[1] / step)
-        along, across = behind + math.floor(high[0] / step) + 1, right + math.floor(high[1] / step) + 1
+        behind, right = math.floor(-min_corner[0] / step), math.floor(-min_corner[1] / step)
+        along, across = behind + math.floor(max_corner[0] / step) + 1, right + math.floor(max_corner[1] / step) + 1
         layers_below = max(0, math.floor((data.start[2] - min_height) / pitch))
         layers = layers_below + max(0, math.floor((data.ceiling - data.start[2]) / pitch)) + 1
         if stages == 1 or along * across * layers * 8 <= MAX_LATTICE_STATES:
             break
         stages -= 1
     goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / pitch) + layers_below))
-    start = data.start[2] - layers_below * pitch
-    return Lattice(step, behind, right, along, across, behind + stages, start, pitch, layers, layers_below, goal_layer)
+    first_height = data.start[2] - layers_below * pitch
+    return Lattice(
+        step, behind, right, along, across, behind + stages, first_height, pitch, layers, layers_below, goal_layer
+    )
 
 
 def cheapest_lattice_route(

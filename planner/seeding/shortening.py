@@ -104,8 +104,8 @@ def begin_shortening(
 class _Descent(NamedTuple):
     """Scratch of a round's steps: corners (3,) of the box, model, matrix factor, step and trial path."""
 
-    low: Floats
-    high: Floats
+    min_corner: Floats
+    max_corner: Floats
     model: LagrangianModel
     factor: Floats
     step: Floats
@@ -154,7 +154,13 @@ def _descend(
     descent: _Descent,
 ) -> int:
     """Minimise the merit of a path (w, 3) in place, fill the final constraint values, and return the model count."""
-    min_corner, max_corner, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
+    min_corner, max_corner, model, step, trial = (
+        descent.min_corner,
+        descent.max_corner,
+        descent.model,
+        descent.step,
+        descent.trial,
+    )
     merit, models = lagrangian(data, limits, active, path, multipliers, values, penalty, model), 1
     for _ in range(STEPS_PER_ROUND):
         max_move, step_fraction, is_better = (

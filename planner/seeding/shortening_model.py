@@ -5,8 +5,8 @@ Hestenes and Powell applied to convex programming", Journal of Optimization Theo
 constraint c >= 0 with multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
 Constraints are distances from missiles, heights above ground, slopes, turns, and lengths of legs against their turns;
 and, if requested, heights and slopes of flown corners (`planner.seeding.flown_corners`).
-Their coefficients are computed once per round (`ActiveConstraints`). The curvature of the constraints is left out of
-the Hessian; a constraint couples at most four consecutive waypoints, so the Hessian is banded.
+Their coefficients are computed once per round (`ActiveConstraints`). The Hessian omits the curvature of the
+constraints; a constraint couples at most four consecutive waypoints, so the Hessian is banded.
 """
 
 import math
@@ -281,22 +281,22 @@ def _add_length(path: Floats, model: LagrangianModel) -> float:
             length += unit[axis] * unit[axis]
         length = max(1e-3, math.sqrt(length))
         total += length
-        a, b = 3 * (i - 1), 3 * i
+        first_row, second_row = 3 * (i - 1), 3 * i
         for axis in range(3):
             unit[axis] /= length
-            if a >= 0:
-                model.gradient[a + axis] -= unit[axis]
-            if b < size:
-                model.gradient[b + axis] += unit[axis]
+            if first_row >= 0:
+                model.gradient[first_row + axis] -= unit[axis]
+            if second_row < size:
+                model.gradient[second_row + axis] += unit[axis]
         for axis in range(3):
             for other_axis in range(3):
                 curvature = ((1.0 if axis == other_axis else 0.0) - unit[axis] * unit[other_axis]) / length
-                if a >= 0 and other_axis <= axis:
-                    model.band[a + axis, axis - other_axis] += curvature
-                if b < size and other_axis <= axis:
-                    model.band[b + axis, axis - other_axis] += curvature
-                if a >= 0 and b < size:
-                    model.band[b + axis, 3 + axis - other_axis] -= curvature
+                if first_row >= 0 and other_axis <= axis:
+                    model.band[first_row + axis, axis - other_axis] += curvature
+                if second_row < size and other_axis <= axis:
+                    model.band[second_row + axis, axis - other_axis] += curvature
+                if first_row >= 0 and second_row < size:
+                    model.band[second_row + axis, 3 + axis - other_axis] -= curvature
     return total
 
 
@@ -543,8 +543,8 @@ def lagrangian(
     """Return the augmented length or cost of a path (w, 3), m, and fill the constraints' values and the model."""
     model.gradient[:], model.band[:] = 0.0, 0.0
     first_number = active.pairs.shape[0]
-    is_by_length = data.travel.time == 0.0 and data.travel.energy == 0.0
-    merit = _add_length(path, model) if is_by_length else _add_travel_cost(data, path, model)
+    minimises_length = data.travel.time == 0.0 and data.travel.energy == 0.0
+    merit = _add_length(path, model) if minimises_length else _add_travel_cost(data, path, model)
     merit += _add_missiles(data, active, path, multipliers, values, penalty, model)
     merit += _add_ground(data, limits, active, path, multipliers, values, penalty, model, first_number)
     first_number += active.samples * (path.shape[0] - 1)

@@ -19,7 +19,7 @@ from planner.seeding.grids import (
     SPAN,
     Grid,
     GridRoute,
-    distance_to_goal,
+    fill_goal_distances,
     find_obstacles,
     layers_per_step,
     make_grid,
@@ -50,21 +50,21 @@ PASSING = np.dtype(
 class GridCosts(NamedTuple):
     """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf above the bound.
 
-    reached: cost from the start; parents: the previous cell, as layer x width + across.
-    remaining: cost to the destination; successors: the next cell.
+    start_costs: costs from the start; parents: the previous cell, as layer x width + across.
+    goal_costs: costs to the destination; successors: the next cell.
     """
 
-    reached: Floats
+    start_costs: Floats
     parents: Codes
-    remaining: Floats
+    goal_costs: Floats
     successors: Codes
 
 
 @inner
 def _relax_stage_back(
-    remaining: Floats,
+    goal_costs: Floats,
     price: Floats,
-    previous_remaining: Floats,
+    previous_goal_costs: Floats,
     successors: Codes,
     spans: Records,
     step_layers: Records,
@@ -76,10 +76,10 @@ def _relax_stage_back(
 
     spans: `SPAN` records (layers,) of the cells before it that are within the bound.
     """
-    layer_count, width = remaining.shape
-    flat_remaining, flat_previous, flat_successors, flat_price = (
-        remaining.ravel(),
-        previous_remaining.ravel(),
+    layer_count, width = goal_costs.shape
+    flat_goal_costs, flat_previous, flat_successors, flat_price = (
+        goal_costs.ravel(),
+        previous_goal_costs.ravel(),
         successors.ravel(),
         price.ravel(),
     )
@@ -97,7 +97,7 @@ def _relax_stage_back(
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
                 relax(
-                    flat_remaining,
+                    flat_goal_costs,
                     flat_price,
                     flat_previous,
                     flat_successors,
@@ -110,19 +110,20 @@ def _relax_stage_back(
 
 
 @inner
-def _drop_cells_above_bound(reached: Floats, remaining: Floats, spans: Records, bound: float) -> None:
+def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Records, bound: float) -> None:
     """Drop cells (layers, across) of one stage through which no route is within the bound."""
-    for z in range(reached.shape[0]):
+    for z in range(start_costs.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
-            if not reached[z, y] + remaining[z, y] <= bound:
-                remaining[z, y] = math.inf
+            if not start_costs[z, y] + goal_costs[z, y] <= bound:
+                goal_costs[z, y] = math.inf
 
 
 class SideSearch(NamedTuple):
-    """A search for the costs of partial routes, first from the start, then from the destination; it can be continued.
+    """Resumable search for the costs of partial routes, first from the start, then from the destination.
 
     price: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
-    cells within the bound. done: number of completed stages, forwards and then backwards; twice the grid's at the end.
+    cells within the bound. stages_done: number of completed stages, forwards and then backwards; at the
+    end twice the number of stages of the grid.
     """
 
     costs: GridCosts
@@ -130,9 +131,9 @@ class SideSearch(NamedTuple):
     obstacles: Records
     price: Floats
     spans: Records
-    home: int
+    centre_index: int
     goal: int
-    done: int
+    stages_done: int
 
 
 # Number of cells reached between two calls of `pause`: some 10 ms.
@@ -148,7 +149,7 @@ def grid_costs(
     """
     stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
     search: SideSearch = begin_grid_costs(data, frame, grid)
-    while search.done < 2 * grid.stages:
+    while search.stages_done < 2 * grid.stages:
         search = continue_grid_costs(data, frame, grid, bound, search, stages)
         pause()
     return search.costs
@@ -156,23 +157,23 @@ def grid_costs(
 
 @compiled
 def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> SideSearch:
-    """Return a new search at the start."""
+    """Return a new search before its first stage."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     shape = (stages + 1, layer_count, width)
-    home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
-    reached, remaining = np.full(shape, np.inf), np.full(shape, np.inf)
+    centre_index, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
+    start_costs, goal_costs = np.full(shape, np.inf), np.full(shape, np.inf)
     spans = np.zeros((stages + 1, layer_count), dtype=SPAN)
     for z in range(layer_count):
-        spans[0, z].first, spans[0, z].last = (home, home) if z == start else (width, -1)
-    reached[0, start, home] = 0.0
+        spans[0, z].first, spans[0, z].last = (centre_index, centre_index) if z == start else (width, -1)
+    start_costs[0, start, centre_index] = 0.0
     return SideSearch(
-        GridCosts(reached, np.zeros(shape, dtype=np.int32), remaining, np.zeros(shape, dtype=np.int32)),
+        GridCosts(start_costs, np.zeros(shape, dtype=np.int32), goal_costs, np.zeros(shape, dtype=np.int32)),
         layers_per_step(data, frame, step, grid.layers, grid.ratio),
         find_obstacles(data, frame, step, grid.shrink),
         np.full(shape, np.inf),
         spans,
-        home,
+        centre_index,
         int(np.argmin(np.abs(grid.layers - data.destination[2]))),
         0,
     )
@@ -182,15 +183,19 @@ def begin_grid_costs(data: ProblemArrays, frame: RotatedFrame, grid: Grid) -> Si
 def continue_grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, search: SideSearch, max_stages: int
 ) -> SideSearch:
-    """Continue a search by up to `max_stages` stages, or end it if no route leads on, and return it."""
+    """Continue a search by up to `max_stages` stages, or end it if no route can continue, and return it."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
-    costs, step_layers, obstacles, price, spans, home, goal, done = search
-    reached, parents, remaining, successors = costs
-    rises, goal_distances, extra = grid.layers - grid.layers[goal], np.empty(width), np.zeros((stages + 1, width))
-    end = min(2 * stages, done + max_stages)
-    for step_number in range(done, end):
+    costs, step_layers, obstacles, price, spans, centre_index, goal, done = search
+    start_costs, parents, goal_costs, successors = costs
+    height_differences, goal_distances, extra = (
+        grid.layers - grid.layers[goal],
+        np.empty(width),
+        np.zeros((stages + 1, width)),
+    )
+    end_number = min(2 * stages, done + max_stages)
+    for step_number in range(done, end_number):
         stage = step_number + 1
         if stage <= stages:
             first, last = width, -1
@@ -198,25 +203,41 @@ def continue_grid_costs(
                 first, last = min(first, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
             first, last = max(0, first - MAX_SIDE), min(width - 1, last + MAX_SIDE)
             if first > last:
-                end = 2 * stages
+                end_number = 2 * stages
                 break
             set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, price[stage])
-            previous, current = reached[stage - 1], reached[stage]
+            previous_costs, stage_costs = start_costs[stage - 1], start_costs[stage]
             relax_stage(
-                previous, current, parents[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio
+                previous_costs,
+                stage_costs,
+                parents[stage],
+                spans[stage - 1],
+                step_layers,
+                price[stage],
+                step,
+                pitch,
+                grid.ratio,
             )
-            distance_to_goal(width, home, stages - stage, step, grid.ratio, goal_distances)
-            prune(reached[stage], spans[stage], goal_distances, rises, bound, first, last)
+            fill_goal_distances(width, centre_index, stages - stage, step, grid.ratio, goal_distances)
+            prune(start_costs[stage], spans[stage], goal_distances, height_differences, bound, first, last)
             continue
         if step_number == stages:
-            remaining[stages, goal, home] = 0.0
+            goal_costs[stages, goal, centre_index] = 0.0
         stage = 2 * stages - 1 - step_number
-        next_costs, current = remaining[stage + 1], remaining[stage]
+        next_costs, stage_costs = goal_costs[stage + 1], goal_costs[stage]
         _relax_stage_back(
-            next_costs, price[stage + 1], current, successors[stage], spans[stage], step_layers, step, pitch, grid.ratio
+            next_costs,
+            price[stage + 1],
+            stage_costs,
+            successors[stage],
+            spans[stage],
+            step_layers,
+            step,
+            pitch,
+            grid.ratio,
         )
-        _drop_cells_above_bound(reached[stage], remaining[stage], spans[stage], bound)
-    return SideSearch(costs, step_layers, obstacles, price, spans, home, goal, end)
+        _drop_cells_above_bound(start_costs[stage], goal_costs[stage], spans[stage], bound)
+    return SideSearch(costs, step_layers, obstacles, price, spans, centre_index, goal, end_number)
 
 
 @inlined
@@ -242,7 +263,7 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
             continue
         for z in range(grid.layers.size):
             for y in range(grid.across.size):
-                cost = costs.reached[stage, z, y] + costs.remaining[stage, z, y]
+                cost = costs.start_costs[stage, z, y] + costs.goal_costs[stage, z, y]
                 if cost == math.inf:
                     continue
                 passing = passings[k, side_of(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
@@ -254,12 +275,12 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
 @compiled
 def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:
     """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
-    last, width = costs.successors.shape[0] - 1, costs.successors.shape[2]
-    cells = np.zeros(last + 1, dtype=ROUTE_CELL)
+    last_stage, width = costs.successors.shape[0] - 1, costs.successors.shape[2]
+    cells = np.zeros(last_stage + 1, dtype=ROUTE_CELL)
     previous_cells = trace_back(costs.parents[: stage + 1], layer, across)
     for index in range(stage + 1):
         cells[index] = previous_cells[index]
-    for index in range(stage, last):
+    for index in range(stage, last_stage):
         next_cell = costs.successors[index, layer, across]
         layer, across = next_cell // width, next_cell % width
         cells[index + 1].layer, cells[index + 1].across = layer, across

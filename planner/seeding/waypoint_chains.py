@@ -152,8 +152,11 @@ def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps
     for i in range(1, candidates.shape[0] - 1):
         for k in range(candidates.shape[1]):
             if cost[i, k] < np.inf:
-                a, c = candidates[i - 1, sweeps.before[i, k]], candidates[i + 1, sweeps.after[i, k]]
-                cost[i, k] += _corner_cost(data, limits, a, candidates[i, k], c, corners)
+                previous_waypoint, next_waypoint = (
+                    candidates[i - 1, sweeps.before[i, k]],
+                    candidates[i + 1, sweeps.after[i, k]],
+                )
+                cost[i, k] += _corner_cost(data, limits, previous_waypoint, candidates[i, k], next_waypoint, corners)
                 cost[i, k] = cost[i, k] if cost[i, k] <= bound else np.inf
     return cost
 
@@ -180,7 +183,7 @@ def _extend_paths(
     max_cost: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial
     paths. lower_bounds, corners: scratch.
     """
-    previous, evaluated, point = i - step, 0, candidates[i, k]
+    previous, evaluated_count, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:
         return 0
     for m in range(open_ends.size):
@@ -191,7 +194,7 @@ def _extend_paths(
         m = _lowest_index(lower_bounds, open_ends.size)
         j, lower_bound = open_ends[m], lower_bounds[m]
         if not lower_bound < min(cost[i, k], max_cost):
-            return evaluated
+            return evaluated_count
         lower_bounds[m] = np.inf
         turn_cost = 0.0
         if 0 < previous < candidates.shape[0] - 1:
@@ -203,7 +206,7 @@ def _extend_paths(
         first_candidate, second_candidate = (j, k) if step > 0 else (k, j)
         leg = legs[min(i, previous), first_candidate, second_candidate]
         if leg <= 0.0:
-            evaluated += 1 if leg == 0.0 else 0
+            evaluated_count += 1 if leg == 0.0 else 0
             if not cost[previous, j] - leg + turn_cost < min(cost[i, k], max_cost):
                 continue
             max_leg_cost = min(cost[i, k], max_cost) - cost[previous, j] - turn_cost + COST_ROUNDING_M
@@ -223,31 +226,41 @@ def _extend_paths(
 @inlined
 def _lowest_index(values: Floats, count: int) -> int:
     """Return the index of the lowest of the first `count` values."""
-    lowest = 0
+    lowest_index = 0
     for k in range(1, count):
-        lowest = k if values[k] < values[lowest] else lowest
-    return lowest
+        lowest_index = k if values[k] < values[lowest_index] else lowest_index
+    return lowest_index
 
 
 @inlined
-def _distance(a: Floats, b: Floats) -> float:
-    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+def _distance(start: Floats, end: Floats) -> float:
+    return math.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
 
 
 @inner
 def _corner_cost(
-    data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    previous_waypoint: Floats,
+    waypoint: Floats,
+    next_waypoint: Floats,
+    corners: Records,
 ) -> float:
-    """Return the cost of the turn at b between a and c, for its excess over the limit and for missing leg length.
+    """Return the cost of a waypoint's turn, for its excess over the limit and for missing leg length.
 
     corners: scratch, one record.
     """
-    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
+    ux, uy, vx, vy = (
+        waypoint[0] - previous_waypoint[0],
+        waypoint[1] - previous_waypoint[1],
+        next_waypoint[0] - waypoint[0],
+        next_waypoint[1] - waypoint[1],
+    )
     first_length, second_length = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
     if first_length == 0.0 or second_length == 0.0:
         return TURN_COST
     turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
-    excess = max(0.0, turn - data.max_turn)
+    turn_excess = max(0.0, turn - data.max_turn)
     if data.legs_hold_turns:
         corner = corners[0]
         measure_corner(
@@ -259,14 +272,14 @@ def _corner_cost(
             uy / first_length,
             vx / second_length,
             vy / second_length,
-            b[2],
+            waypoint[2],
             corner,
         )
         missing_length = max(0.0, corner.before - TURN_LENGTH_FRACTION * first_length) + max(
             0.0, corner.after - TURN_LENGTH_FRACTION * second_length
         )
-        excess += min(10.0, missing_length / 100.0)
-    return TURN_COST * excess
+        turn_excess += min(10.0, missing_length / 100.0)
+    return TURN_COST * turn_excess
 
 
 @compiled

@@ -142,10 +142,10 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
                     next_cost[k] = total
                     parents[i, k] = j
         cost = next_cost
-    out = np.zeros(count, dtype=np.int64)
+    chosen = np.zeros(count, dtype=np.int64)
     for i in range(count - 1, 0, -1):
-        out[i - 1] = parents[i, out[i]]
-    return out, evaluated
+        chosen[i - 1] = parents[i, chosen[i]]
+    return chosen, evaluated
 
 
 @dataclass(frozen=True, slots=True)
@@ -230,13 +230,13 @@ def _move_waypoints(
     Return the moved waypoints and the number of legs evaluated.
     """
     legs = 0
-    low, high = frames.edges[:-1, None], frames.edges[1:, None]
+    min_along, max_along = frames.edges[:-1, None], frames.edges[1:, None]
     interval = frames.edges[-1] / (len(waypoints) - 2)
     moves = moves * [interval, interval, 1.0]
     for _ in range(rounds):
         candidates = np.repeat(waypoints[:, None, :], len(steps), axis=1)
         candidates[1:-1] += steps * moves
-        candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], low, high)
+        candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], min_along, max_along)
         candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], data.floor, data.ceiling)
         waypoints, leg_count = _pick_candidates(data, frames, candidates)
         legs += leg_count
@@ -246,12 +246,12 @@ def _move_waypoints(
 
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
     """Return the chosen candidates (w, 3) in their frames, with fixed ends, and the number of legs evaluated."""
-    count = len(candidates) - 2
+    inner_count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
-    for end, point, next_inside in ((0, data.start, 0), (-1, data.destination, count - 1)):
-        candidates[end] = frames.rotate(np.tile(point, (count, 1)))[next_inside]
-    chosen, legs = _choose(data, np.ascontiguousarray(_restore_world(frames, candidates)))
-    return candidates[np.arange(len(candidates)), chosen], int(legs)
+    for end, point, neighbour_index in ((0, data.start, 0), (-1, data.destination, inner_count - 1)):
+        candidates[end] = frames.rotate(np.tile(point, (inner_count, 1)))[neighbour_index]
+    chosen_indices, leg_count = _choose(data, np.ascontiguousarray(_restore_world(frames, candidates)))
+    return candidates[np.arange(len(candidates)), chosen_indices], int(leg_count)
 
 
 def _restore_world(frames: WaypointFrames, candidates: Floats) -> Floats:

@@ -20,7 +20,7 @@ from planner.seeding.grids import (
     Grid,
     Records,
     cheapest_route,
-    distance_to_goal,
+    fill_goal_distances,
     find_obstacles,
     grid_route,
     make_grid,
@@ -198,7 +198,7 @@ def test_a_step_climbs_and_sinks_no_more_than_the_limits_allow(
 def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
     columns, home, step = 9, 3, 50.0
     out = np.empty(columns)
-    distance_to_goal(columns, home, left, step, 1.0, out)
+    fill_goal_distances(columns, home, left, step, 1.0, out)
     for y in range(columns):
         ways = itertools.product(range(-MAX_SIDE, MAX_SIDE + 1), repeat=left)
         lengths = [sum(step * math.hypot(1.0, side) for side in way) for way in ways if y + sum(way) == home]

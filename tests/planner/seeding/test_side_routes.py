@@ -99,8 +99,8 @@ def test_a_route_through_a_cell_costs_what_was_said_and_leads_from_end_to_end(da
     frame = rotated_frame(data.start, data.destination)
     costs = grid_costs(data, frame, GRID, math.inf)
     cells, best = cheapest_route(data, frame, GRID, np.zeros((7, 5)), math.inf)
-    assert costs.remaining[0, 0, 2] == pytest.approx(best)
-    assert costs.reached[6, 0, 2] == pytest.approx(best)
+    assert costs.goal_costs[0, 0, 2] == pytest.approx(best)
+    assert costs.start_costs[6, 0, 2] == pytest.approx(best)
     through = route_through(costs, 3, int(cells["layer"][3]), int(cells["across"][3]))
     # Of ways that cost the same either may be taken.
     assert through[[0, 3, 6]].tolist() == cells[[0, 3, 6]].tolist()
@@ -113,9 +113,9 @@ def test_a_route_through_a_cell_costs_what_was_said_and_leads_from_end_to_end(da
 def test_beyond_the_bound_there_is_no_way(data: ProblemArrays) -> None:
     frame = rotated_frame(data.start, data.destination)
     whole = grid_costs(data, frame, GRID, math.inf)
-    bound = 1.2 * whole.remaining[0, 0, 2]
+    bound = 1.2 * whole.goal_costs[0, 0, 2]
     bounded = grid_costs(data, frame, GRID, bound)
-    total, kept = whole.reached + whole.remaining, bounded.reached + bounded.remaining
+    total, kept = whole.start_costs + whole.goal_costs, bounded.start_costs + bounded.goal_costs
     assert (kept[total <= bound] == total[total <= bound]).all()
     assert np.isinf(kept[total > bound + 1e-6]).all()
     assert np.isinf(kept).sum() > np.isinf(total).sum()
