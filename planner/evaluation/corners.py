@@ -167,18 +167,14 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 
 @inner
 def fly_by_vertices(
-    aircraft: PerformanceTable, previous_waypoint: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
+    aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
     """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`."""
-    return blended_vertices(
-        half_blend_length(aircraft, waypoint[2]), previous_waypoint, waypoint, next_waypoint, radius
-    )
+    return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
 
 @inner
-def blended_vertices(
-    blend: float, previous_waypoint: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
-) -> Floats:
+def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flight.
 
     The vertices are a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent
@@ -188,20 +184,18 @@ def blended_vertices(
 
     blend: half length of a blend (`half_blend_length`).
     """
-    length_before = math.hypot(waypoint[0] - previous_waypoint[0], waypoint[1] - previous_waypoint[1])
+    length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
     if length_before < 1e-6 or length_after < 1e-6:
         return waypoint.copy().reshape((1, 3))
-    turn = turning_angle(
-        previous_waypoint[0], previous_waypoint[1], waypoint[0], waypoint[1], next_waypoint[0], next_waypoint[1]
-    )
+    turn = turning_angle(previous[0], previous[1], waypoint[0], waypoint[1], next_waypoint[0], next_waypoint[1])
     tangent = radius * math.tan(0.5 * turn) if 1e-6 < turn < math.pi - 1e-6 else 0.0
     if tangent > min(length_before, length_after):
         tangent = 0.0
-    ux, uy = (waypoint[0] - previous_waypoint[0]) / length_before, (waypoint[1] - previous_waypoint[1]) / length_before
+    ux, uy = (waypoint[0] - previous[0]) / length_before, (waypoint[1] - previous[1]) / length_before
     vx, vy = (next_waypoint[0] - waypoint[0]) / length_after, (next_waypoint[1] - waypoint[1]) / length_after
     slope_in, slope_out = (
-        (waypoint[2] - previous_waypoint[2]) / length_before,
+        (waypoint[2] - previous[2]) / length_before,
         (next_waypoint[2] - waypoint[2]) / length_after,
     )
     chord_count = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
@@ -243,11 +237,11 @@ def blended_vertices(
 
 @inner
 def legs_about(
-    previous_waypoint: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
+    previous: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
 ) -> Floats:
     """Return the parts of both legs next to `waypoint`, of the given lengths (m), as vertices (3, 3)."""
     vertices = np.empty((3, 3))
-    for row, neighbour, length in ((0, previous_waypoint, length_before), (2, next_waypoint, length_after)):
+    for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):
         horizontal_length = math.hypot(waypoint[0] - neighbour[0], waypoint[1] - neighbour[1])
         fraction = min(1.0, length / max(horizontal_length, 1e-6))
         for axis in range(3):

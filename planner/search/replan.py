@@ -43,8 +43,7 @@ def replan(
 
     scenario: includes the threats known now (`world.scenario.with_threats`). The turn at the first new waypoint is
     measured from the course of the last flown leg. The search starts from the rest of the old plan, in addition to its
-    grid routes. The certificate applies to the path ahead; violations and objectives apply to the whole
-    path in this scenario.
+    grid routes. The certificate applies to the path ahead; violations and objectives apply to the whole path.
 
     settle: completes the path ahead in a scenario that begins with it, before the flown legs are prepended.
 
