@@ -14,7 +14,10 @@ from world.arrays import Floats
 
 MASS = 11.0
 JX, JY, JZ, JXZ = 0.8244, 1.135, 1.759, 0.1204
-AREA, SPAN, MAX_CHORD_TURN_RAD, OSWALD = 0.55, 2.8956, 0.18994, 0.9
+AREA_M2 = 0.55
+SPAN_M = 2.8956
+CHORD_M = 0.18994
+OSWALD_FACTOR = 0.9
 CL_0, CL_ALPHA, CL_Q, CL_ELEVATOR = 0.23, 5.61, 7.95, 0.13
 CD_Q, CD_ELEVATOR = 0.0, 0.0135
 CM_0, CM_ALPHA, CM_Q, CM_ELEVATOR = 0.0135, -2.74, -38.21, -0.99
@@ -85,11 +88,11 @@ def rates(states: Floats, commands: Floats, air: BookAtmosphere) -> Floats:
     elevator, aileron, rudder, throttle = (float(x) for x in commands)
     airspeed = math.sqrt(u * u + v * v + w * w)
     alpha, beta = math.atan2(w, u), math.asin(v / airspeed)
-    pressure = 0.5 * air.density * airspeed**2 * AREA
-    half_span, half_chord = SPAN / (2.0 * airspeed), MAX_CHORD_TURN_RAD / (2.0 * airspeed)
+    pressure = 0.5 * air.density * airspeed**2 * AREA_M2
+    half_span, half_chord = SPAN_M / (2.0 * airspeed), CHORD_M / (2.0 * airspeed)
 
-    aspect = SPAN**2 / AREA
-    drag_alpha = air.parasite_drag + (CL_0 + CL_ALPHA * alpha) ** 2 / (math.pi * OSWALD * aspect)
+    aspect = SPAN_M**2 / AREA_M2
+    drag_alpha = air.parasite_drag + (CL_0 + CL_ALPHA * alpha) ** 2 / (math.pi * OSWALD_FACTOR * aspect)
     lift_force = pressure * (lift(alpha) + CL_Q * half_chord * q + CL_ELEVATOR * elevator)
     drag_force = pressure * (drag_alpha + CD_Q * half_chord * q + CD_ELEVATOR * elevator)
     side_force = pressure * (CY_BETA * beta + CY_AILERON * aileron + CY_RUDDER * rudder)
@@ -101,16 +104,14 @@ def rates(states: Floats, commands: Floats, air: BookAtmosphere) -> Floats:
 
     moment_x = (
         pressure
-        * SPAN
+        * SPAN_M
         * (ROLL_BETA * beta + half_span * (ROLL_P * p + ROLL_R * r) + ROLL_AILERON * aileron + ROLL_RUDDER * rudder)
         - torque
     )
-    moment_y = (
-        pressure * MAX_CHORD_TURN_RAD * (CM_0 + CM_ALPHA * alpha + CM_Q * half_chord * q + CM_ELEVATOR * elevator)
-    )
+    moment_y = pressure * CHORD_M * (CM_0 + CM_ALPHA * alpha + CM_Q * half_chord * q + CM_ELEVATOR * elevator)
     moment_z = (
         pressure
-        * SPAN
+        * SPAN_M
         * (YAW_BETA * beta + half_span * (YAW_P * p + YAW_R * r) + YAW_AILERON * aileron + YAW_RUDDER * rudder)
     )
 

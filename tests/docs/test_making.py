@@ -18,7 +18,9 @@ from making.tolerances import tolerance_list
 sys.path.pop(0)
 
 
-@pytest.mark.parametrize("page", [page for page in PAGES if "<!-- made: " in page.read_text(encoding="utf-8")], ids=str)
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if "<!-- made: " in page.read_text(encoding="utf-8")], ids=lambda page: page.name
+)
 def test_pages_hold_their_tables_as_the_code_is(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert filled(text) == text, "make tables writes the tables anew"
