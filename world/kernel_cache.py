@@ -20,8 +20,9 @@ from world.interruption import unfinished
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
 # Decorators of `world.kernels` that compile a function.
 DECORATORS = ("compiled", "compiled_inline", "inner", "inlined")
-_KERNEL = re.compile(rb"^@(?:" + "|".join(DECORATORS).encode() + rb")$", re.MULTILINE)
-_IMPORT = re.compile(rb"^from ((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import (\(?[^\n]*)", re.MULTILINE)
+_DECORATOR_LINES = tuple(f"\n@{name}\n".encode() for name in DECORATORS)
+# An import of a planfly module, without the "from" at the start of its line.
+_IMPORT = re.compile(rb"((?:" + "|".join(PACKAGES).encode() + rb")[\w.]*) import (\(?[^\n]*)")
 
 
 def kernel_sources(root: Path) -> dict[str, bytes]:
@@ -33,7 +34,7 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
     """
     files = {file.relative_to(root).as_posix(): file for name in PACKAGES for file in (root / name).rglob("*.py")}
     contents = {name: file.read_bytes() for name, file in files.items()}
-    pending = [name for name, content in contents.items() if _KERNEL.search(content)]
+    pending = [name for name, content in contents.items() if any(line in content for line in _DECORATOR_LINES)]
     sources: dict[str, bytes] = {}
     while pending:
         name = pending.pop()
@@ -46,7 +47,9 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
 def _imported_paths(content: bytes) -> list[str]:
     """Return the paths of modules that a source may import; an imported name may also be a module."""
     paths = []
-    for module, names in _IMPORT.findall(content):
+    # Splitting takes a tenth of the time of a search for lines that begin with "from".
+    for match in filter(None, map(_IMPORT.match, content.split(b"\nfrom ")[1:])):
+        module, names = match.groups()
         path = module.decode().replace(".", "/")
         paths += [f"{path}.py", *(f"{path}/{name}.py" for name in re.findall(r"\w+", names.decode()))]
     return paths

@@ -77,8 +77,8 @@ class ScenarioTable(BaseModel):
     """A table of a scenario file; unknown keys are rejected."""
 
     # Strict mode: otherwise pydantic accepts true, "5" and "yes" as numbers and booleans.  Each number has its own
-    # range, which excludes NaN and the infinities.
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    # range, which excludes NaN and the infinities.  A validator is built when its table is first read.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
 
 
 # ----------------------------------------------------------------------

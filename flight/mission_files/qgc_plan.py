@@ -125,7 +125,7 @@ class _CameraCalc(BaseModel):
     """QGC's camera of a survey (`CameraCalc.cc`), given by name, by lens and sensor, or only by distances."""
 
     # QGC writes whole numbers as integers.
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True, defer_build=True)
     SensorWidth: Annotated[float, Field(gt=0.0, le=1000.0)]
     SensorHeight: Annotated[float, Field(gt=0.0, le=1000.0)]
     FocalLength: Annotated[float, Field(gt=0.0, le=10_000.0)]
@@ -245,7 +245,7 @@ _MAX_SPEED_MPS = 1000.0
 
 class _Table(BaseModel):
     # QGC adds keys from release to release: unknown ones are ignored.
-    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True, strict=True)
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True, strict=True, defer_build=True)
 
 
 # A finite number in the range of a float32.

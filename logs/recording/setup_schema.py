@@ -41,7 +41,7 @@ class SetupModel(BaseModel):
     name: key of the table in the file.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, defer_build=True)
     name: ClassVar[str] = ""
 
     @classmethod

@@ -5,6 +5,7 @@ A log's verdict is computed again from its rows.  Reference flights are not in t
 
 import json
 from dataclasses import asdict, dataclass
+from functools import cache
 from typing import Final, Literal
 
 from pydantic import TypeAdapter, ValidationError
@@ -29,7 +30,10 @@ class _ReferenceFile(DocumentConfig):
     schema: Literal["planfly.beside/1"] = REFERENCE_SCHEMA
 
 
-_FILE = TypeAdapter(_ReferenceFile)
+@cache
+def _file_reader() -> TypeAdapter[_ReferenceFile]:
+    """Return the reader of the attachment; it is built at first use, since most flights have no attachment."""
+    return TypeAdapter(_ReferenceFile)
 
 
 def reference_flights_json(reference: ReferenceFlights) -> str:
@@ -49,7 +53,7 @@ def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     ReferenceFlights(airframe=None, deciding=None, tried=None)
     """
     try:
-        file = _FILE.validate_json(text)
+        file = _file_reader().validate_json(text)
     except ValidationError as error:
         raise LogError(**first_fault(error).at(source)) from error
     rules = [rule for rule, _ in file.airframe.failed] if file.airframe is not None else []

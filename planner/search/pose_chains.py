@@ -140,7 +140,9 @@ class PathMeasures(NamedTuple):
 
 
 def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathMeasures:
-    """Measure a path, with plain numbers for speed, because tens of thousands of paths are measured.
+    """Measure a path up to its first turn that is too sharp, or to its end.
+
+    With plain numbers for speed, because tens of thousands of paths are measured.
 
     >>> measure_path([(0.0, 0.0), (0.0, 1000.0), (1000.0, 1000.0)], arc_turn_lengths(150.0)).fits
     True
@@ -155,6 +157,8 @@ def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathM
             return PathMeasures(length, math.inf, math.pi, math.inf)
         if k:
             turn = abs(math.atan2(east * next_north - north * next_east, east * next_east + north * next_north))
+            if turn > MAX_TURN_RAD:
+                return PathMeasures(length, math.inf, turn, math.inf)
             max_turn, squared_turns = max(max_turn, turn), squared_turns + turn * turn
             length_before, length_after = turn_lengths.lengths(turn)
             max_fraction, occupied_length = (

@@ -230,7 +230,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
 
     time: (t,) s.  position: (t, 3).  centre: (3,).  A point on the surface is inside.
     """
-    if not radius > 0.0 or _boxes_are_disjoint(position, centre, radius):
+    if not radius > 0.0 or len(position) < 2:
         return []
     track, center = read_only(np.ascontiguousarray(position)), read_only(np.ascontiguousarray(centre))
     closest, entry_fraction, exit_fraction = _sphere_windows(track, center, float(radius))
@@ -254,12 +254,11 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
     return stays
 
 
-def _boxes_are_disjoint(position: Floats, centre: Floats, radius: float) -> bool:
-    """Return True if the track's bounding box does not overlap the sphere's."""
-    finite = position[np.isfinite(position).all(axis=1)]
-    if not len(finite):
-        return True
-    return bool((finite.min(axis=0) > centre + radius).any() or (finite.max(axis=0) < centre - radius).any())
+@inner
+def _is_plausible(position: Floats, k: int) -> bool:
+    """Return True if row k is a position that an aircraft can have: finite, and at most 10,000 km from the origin."""
+    limit = MAX_PLAUSIBLE_POSITION_M
+    return abs(position[k, 0]) <= limit and abs(position[k, 1]) <= limit and abs(position[k, 2]) <= limit
 
 
 @compiled
@@ -270,7 +269,7 @@ def _plausible_clearances(
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)
     for k in range(count):
-        if np.abs(position[k : k + 2]).max() <= MAX_PLAUSIBLE_POSITION_M:
+        if _is_plausible(position, k) and _is_plausible(position, k + 1):
             clearance[k], fraction[k] = segment_clearance(heights, to_pixel, position[k], position[k + 1])
     return clearance, fraction
 
@@ -284,6 +283,6 @@ def _sphere_windows(
     entry = np.zeros(count)
     exit_ = np.zeros(count)
     for k in range(count):
-        if np.abs(position[k : k + 2]).max() <= MAX_PLAUSIBLE_POSITION_M:
+        if _is_plausible(position, k) and _is_plausible(position, k + 1):
             closest[k], entry[k], exit_[k] = sphere_window(position[k], position[k + 1], centre, radius)
     return closest, entry, exit_
