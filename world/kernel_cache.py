@@ -34,7 +34,7 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
     """
     files = {file.relative_to(root).as_posix(): file for name in PACKAGES for file in (root / name).rglob("*.py")}
     contents = {name: file.read_bytes() for name, file in files.items()}
-    pending = [name for name, content in contents.items() if any(line in content for line in _DECORATOR_LINES)]
+    pending = [name for name, content in contents.items() if any(line in b"\n" + content for line in _DECORATOR_LINES)]
     sources: dict[str, bytes] = {}
     while pending:
         name = pending.pop()
@@ -48,7 +48,7 @@ def _imported_paths(content: bytes) -> list[str]:
     """Return the paths of modules that a source may import; an imported name may also be a module."""
     paths = []
     # Splitting takes a tenth of the time of a search for lines that begin with "from".
-    for match in filter(None, map(_IMPORT.match, content.split(b"\nfrom ")[1:])):
+    for match in filter(None, map(_IMPORT.match, (b"\n" + content).split(b"\nfrom ")[1:])):
         module, names = match.groups()
         path = module.decode().replace(".", "/")
         paths += [f"{path}.py", *(f"{path}/{name}.py" for name in re.findall(r"\w+", names.decode()))]
