@@ -29,6 +29,7 @@ from world.errors import ScenarioError, TerrainError
 from world.files import did_you_mean, whole_path
 from world.frames import GeoOrigin, to_geo
 from world.map_positions import check_inside, make_threats, map_position
+from world.radio import RadioLink, make_link
 from world.raster import open_tiles, read_terrain, tile_bounds
 from world.raster_file import RasterFile
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
@@ -80,6 +81,7 @@ class Scenario:
     home: (3,) position of the aircraft on the ground before the flight; None if not stated.
     launch, landing: launch at home and landing strip; None for a flight that begins, or ends, in the air.
     returns: requirements and settings of returns; None without any.
+    link: radio link to judge; None without any.
     """
 
     name: str
@@ -104,6 +106,7 @@ class Scenario:
     launch: Launch | None = None
     landing: LandingStrip | None = None
     returns: ReturnRequirements | None = None
+    link: RadioLink | None = None
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -383,6 +386,7 @@ def _assemble_scenario(
         launch=make_launch(spec.launch),
         landing=make_landing(spec.landing, source, origin, ground, bounds),
         returns=make_return_requirements(spec.returns, source, origin, ground),
+        link=make_link(spec.link, source, origin, ground),
     )
 
 

@@ -650,6 +650,36 @@ class ReturnsTable(ScenarioTable):
         return self
 
 
+class LinkTable(PositionTable):
+    """[link]: radio link between a ground station and the aircraft.
+
+    east_m, north_m or lat_deg, lon_deg: position of the station's antenna; if none is given, the mission's home.
+    use: "telemetry" for the ground station's link, "control" for the pilot's remote control.
+    antenna_m: height of the station's antenna above ground.
+    power_dbm: output of the transmitter.  sensitivity_dbm: power at which the receiver still works.
+    station_gain_dbi, aircraft_gain_dbi: antenna gains.  cable_loss_db: losses of cables and connectors at both ends.
+    fade_margin_db: power above the sensitivity that the link has to keep.
+    max_outage_s: longest time below the fade margin that the verdict accepts.
+    """
+
+    use: Literal["telemetry", "control"] = "telemetry"
+    antenna_m: Annotated[float, in_range(0.5, 500.0)] = 3.0
+    frequency_mhz: Annotated[float, in_range(30.0, 100_000.0)]
+    power_dbm: Annotated[float, in_range(-30.0, 60.0)]
+    sensitivity_dbm: Annotated[float, in_range(-150.0, 0.0)]
+    station_gain_dbi: Annotated[float, in_range(-20.0, 60.0)] = 0.0
+    aircraft_gain_dbi: Annotated[float, in_range(-20.0, 60.0)] = 0.0
+    cable_loss_db: Annotated[float, in_range(0.0, 60.0)] = 0.0
+    fade_margin_db: Annotated[float, in_range(0.0, 60.0)] = 10.0
+    max_outage_s: Annotated[float, in_range(0.0, 3600.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _check_position(self) -> "LinkTable":
+        if any(value is not None for value in (self.east_m, self.north_m, self.lat_deg, self.lon_deg)):
+            _check_one_position(self)
+        return self
+
+
 class ScenarioFile(ScenarioTable):
     """A complete scenario file.
 
@@ -659,6 +689,7 @@ class ScenarioFile(ScenarioTable):
     at: time of the flight, as `world.airspace.zone_times` reads it; zones that are not active then are left out.
     home, launch, landing: None for a mission that begins and ends in the air.
     returns: None if there are no requirements on returns.
+    link: None if no radio link is judged.
     """
 
     name: Name
@@ -681,6 +712,7 @@ class ScenarioFile(ScenarioTable):
     launch: LaunchTable | None = None
     landing: LandingTable | None = None
     returns: ReturnsTable | None = None
+    link: LinkTable | None = None
 
     @model_validator(mode="after")
     def _check_area(self) -> "ScenarioFile":

@@ -265,6 +265,14 @@ RULE_WORDS: dict[str, RuleWords] = {
             margin=None,
         ),
         RuleWords(
+            name="link",
+            title="radio link",
+            noun="radio link",
+            question="Does the radio link to the ground station keep its fade margin along the whole path?",
+            margin=Margin("longest outage", "s"),
+            explains_unjudged=True,
+        ),
+        RuleWords(
             name="energy",
             title="energy",
             question="Does the flight leave the required reserve in the battery or the tank?",

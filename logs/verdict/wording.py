@@ -7,7 +7,7 @@ from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from world.threats import threat_label
 
 # Text of a unit after a number.
-UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs", "%": " %"}
+UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "dB": " dB", "legs": " legs", "%": " %"}
 # Greatest length of a statement in a headline, characters.
 _MAX_STATEMENT_LENGTH = 80
 

@@ -1,0 +1,175 @@
+"""The link rule: judge the radio link between the ground station and the aircraft along the path.
+
+The link fails where less than the fade margin is left for longer than the scenario accepts, or for as long as the
+autopilot needs to notice the loss and leave the mission.
+"""
+
+import math
+
+import numpy as np
+
+from flight.autopilots.arduplane.failsafes import Cause
+from logs.verdict.findings import Fact, Finding, make_finding, message
+from logs.verdict.measures.link_outages import LinkAlongPath, Outage, link_along_path, station_antenna
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT
+from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
+from logs.verdict.returns.returns_text import headline
+from logs.verdict.rule import LogNeeds, Rule
+from logs.verdict.tolerances import LINK_LOSS_REACTION_S
+from world.errors import MissionError
+from world.radio import LinkUse, RadioLink
+
+# Causes in `flight.autopilots.arduplane.failsafes.failsafe_causes` that the loss of a link triggers.
+_LOSS_CAUSES: dict[LinkUse, tuple[str, ...]] = {
+    "telemetry": ("station lost",),
+    "control": ("RC lost for 1.5 s", "RC lost"),
+}
+# Time between two returns from an outage, s.
+_RETURN_INTERVAL_S = 5.0
+_METHOD = "free-space loss and Bullington's diffraction loss over the terrain, once a second"
+
+
+def link_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
+    """Judge the scenario's radio link with one finding; [] for a scenario without a link."""
+    setup = requirements.setup
+    link, terrain = setup.scenario.link, setup.scenario.terrain
+    if link is None:
+        return []
+    antenna = None if terrain is None else station_antenna(setup, link, terrain)
+    if terrain is None or antenna is None:
+        missing = "no terrain was given" if terrain is None else "neither the station's position nor a home is known"
+        return [make_finding("link", FLIGHT, ok=None, reason=missing, unit="s")]
+    planned = link_along_path(link, terrain, antenna, requirements.path.times, requirements.path.points)
+    reaction = _loss_reaction(requirements, link)
+    limit = link.max_outage if reaction is None else min(link.max_outage, LINK_LOSS_REACTION_S)
+    if geometric:
+        return [_link_finding(requirements, None, (planned, planned), limit, reaction)]
+    if aligned is None:
+        return [
+            make_finding("link", FLIGHT, ok=None, reason="nothing was flown", planned=planned.longest_outage, unit="s")
+        ]
+    flown = link_along_path(link, terrain, antenna, aligned.track.time, aligned.track.position)
+    return [_link_finding(requirements, aligned, (planned, flown), limit, reaction)]
+
+
+def _link_text(along: LinkAlongPath) -> str:
+    """Describe the smallest margin of the link and its outages."""
+    k = along.worst
+    if k < 0:
+        return "the terrain below the radio path is unknown"
+    points = along.points
+    sight_text = "in line of sight" if points.is_visible[k] else "behind the terrain"
+    text = (
+        f"{abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the fade margin"
+        f" at {along.time[k]:.0f} s, {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
+    )
+    if along.outages:
+        count = len(along.outages)
+        times_text = f", {count} times, at most {along.longest_outage:.0f} s at a time" if count > 1 else ""
+        text += f"; below the fade margin for {along.time_below_margin:.0f} s{times_text}"
+    return text if along.is_known else f"{text}; elsewhere the terrain below the radio path is unknown"
+
+
+def _loss_reaction(requirements: RouteRequirements, link: RadioLink) -> Cause | None:
+    """Return the cause by which ArduPlane leaves its mission without this link; None if it continues, or is unknown."""
+    world = _return_world(requirements)
+    causes = () if world is None else world.causes
+    reactions = [cause for cause in causes if cause.name in _LOSS_CAUSES[link.use]]
+    return next((cause for cause in reactions if cause.does not in ("on", "never", "landed")), None)
+
+
+def _return_world(requirements: RouteRequirements) -> ReturnWorld | None:
+    try:
+        return return_world(requirements.setup)
+    except MissionError:
+        # Without a home nothing returns.
+        return None
+
+
+def _reaction_text(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, outages: tuple[Outage, ...], reaction: Cause | None
+) -> str:
+    """Describe what the autopilot does in outages that it notices, and judge its returns from there."""
+    world = _return_world(requirements)
+    title = requirements.setup.autopilot.title
+    if world is None or world.has_other_law:
+        return f"; the reaction of {title} to the loss is not judged"
+    if reaction is None:
+        return f"; {title} continues its mission without the link"
+    if not reaction.returns:
+        return f"; {title} then leaves the mission ({reaction.parameter} {reaction.value})"
+    setup = requirements.setup
+    starts = (
+        planned_starts(setup, _RETURN_INTERVAL_S)
+        if aligned is None
+        else flown_starts(setup, aligned.track, _RETURN_INTERVAL_S)
+    )
+    returns = judge_returns(world, _starts_in_outages(starts, outages), _RETURN_INTERVAL_S)
+    return f"; {title} then returns ({reaction.parameter} {reaction.value}): {headline(returns)}"
+
+
+def _starts_in_outages(starts: ReturnStarts, outages: tuple[Outage, ...]) -> ReturnStarts:
+    """Return the starts in the outages that the autopilot notices, from when it does."""
+    is_lost = np.zeros(len(starts), dtype=np.bool_)
+    for outage in outages:
+        noticed = outage.start + LINK_LOSS_REACTION_S
+        is_lost |= (starts.time >= noticed - _RETURN_INTERVAL_S) & (starts.time <= outage.end + _RETURN_INTERVAL_S)
+    return starts.subset(np.flatnonzero(is_lost))
+
+
+def _link_finding(
+    requirements: RouteRequirements,
+    aligned: AlignedTrack | None,
+    paths: tuple[LinkAlongPath, LinkAlongPath],
+    limit: float,
+    reaction: Cause | None,
+) -> Finding:
+    """Judge the link along the second of two paths, the planned and the judged one.
+
+    limit: longest accepted outage, s.  reaction: cause by which the autopilot leaves the mission, or None.
+    """
+    planned, judged = paths
+    ok: bool | None = judged.longest_outage <= limit
+    if ok and not judged.is_known:
+        ok = None
+    text, reason, points = _link_text(judged), _link_text(judged), judged.points
+    if judged.longest_outage >= LINK_LOSS_REACTION_S:
+        reason += _reaction_text(requirements, aligned, judged.outages, reaction)
+    facts = []
+    if judged.worst >= 0:
+        facts = [
+            Fact("least margin over the fade margin", float(points.margin[judged.worst]), "dB"),
+            Fact("time below the fade margin", judged.time_below_margin, "s"),
+            Fact("greatest distance from the station", float(points.distance.max()), "m"),
+            Fact("least clearance in radii of the first Fresnel zone", float(np.nanmin(points.fresnel_clearance)), ""),
+        ]
+    return make_finding(
+        "link",
+        FLIGHT,
+        ok=ok,
+        reason=reason,
+        faults=[] if ok else [message(text, reason[len(text) :])],
+        planned=planned.longest_outage,
+        flown=math.nan if aligned is None else judged.longest_outage,
+        limit=limit,
+        source="scenario",
+        tolerance=0.0,
+        margin=None if ok is None else limit - judged.longest_outage,
+        unit="s",
+        method=_METHOD,
+        facts=facts,
+    )
+
+
+RULE = Rule(
+    name="link",
+    tolerances=("LINK_LOSS_REACTION_S",),
+    judge=link_findings,
+    judges_whole_flight=True,
+    log=LogNeeds(("heights",)),
+)
