@@ -17,7 +17,7 @@ ROUTE = [[0, 0, 300], [0, 2000, 300], [1500, 3500, 380], [1500, 6000, 300], [350
 # Rules that find nothing to judge on a plain route: no loiter, fence, take-off, landing or return, no faulty item.
 SILENT_ON_WAYPOINTS = frozenset(
     {"mission", "loiter", "takeoff", "climbout", "landing", "approach", "go_around", "return", "height", "fence"}
-    | {"survey", "launch", "touchdown"}
+    | {"survey", "launch", "touchdown", "link"}
 )
 
 
