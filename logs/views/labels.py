@@ -26,6 +26,8 @@ _FRAMED_DISTANCES = (0.0, 1.0, 2.2, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0)
 _UNFRAMED_DISTANCES = _FRAMED_DISTANCES[:3]
 # Distances tried for an optional label, which stays close to its point.
 _OPTIONAL_DISTANCES = _FRAMED_DISTANCES[:2]
+# Free width kept on each side of a label, pixels: two numbers without a gap read as one.
+_SIDE_PADDING_PX = 4.0
 # Directions tried for a label, best first: right-up, left-up, right-down, left-down, up, down, right, left.
 _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 
@@ -81,7 +83,7 @@ class LabelPlacer:
         if not (math.isfinite(point_x) and math.isfinite(point_y)):
             return
         padding = 5.0 if "bbox" in style else 1.0
-        width = 0.62 * size * len(text) * DPI / 72.0 + 2 * padding
+        width = 0.62 * size * len(text) * DPI / 72.0 + 2 * max(padding, _SIDE_PADDING_PX)
         height = 1.25 * size * DPI / 72.0 + 2 * padding
         best_box, best_cost, best_ring = self._make_box(point_x, point_y, width, height, gap, prefer), math.inf, 0
         for ring, distance_in_heights in enumerate(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.views.failures import Failures
+from logs.views.failures import Failures, stop_rows
 from world.airspace.zones_on_map import zone_walls
 from world.arrays import Floats
 from world.terrain import Terrain
@@ -98,12 +98,13 @@ def script_json(data: object) -> str:
 def scene_data(view: SceneView) -> dict[str, object]:
     """Return the scene as JSON data; the flight only determines the extent of the scene.
 
+    Numbers are rows of the plan with the numbers of their waypoints.
     Lengths are in m; heights of the ground are 16-bit fractions of their range, little-endian, in base64.
     """
     setup, failed = view.setup, view.failed
     bounds = scene_bounds(setup, view.track)
     grid = ground_grid(setup.scenario.terrain, bounds, MAX_GROUND)
-    threats = setup.scenario.threats
+    threats, stops = setup.scenario.threats, setup.route.stops.tolist()
     return {
         "name": setup.scenario.name,
         "bounds": np.round(bounds, 1).tolist(),
@@ -120,6 +121,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
         ],
         **_zone_walls(setup),
         "plan": np.round(setup.shown_waypoints, 1).tolist(),
+        "numbers": [[k, stops[k]] for k in stop_rows(stops)],
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }
 

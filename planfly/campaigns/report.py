@@ -152,7 +152,7 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
     figures = [
         (draw_probability(bins, summary.goal.target), "Share of flyable flights against the mean wind's speed"),
     ]
-    if summary.deciding:
+    if summary.sensitivities:
         bars = [
             Bar(QUANTITY_BY_NAME[entry.quantity].title, entry.index, entry.slope) for entry in summary.sensitivities
         ]

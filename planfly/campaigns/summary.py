@@ -16,7 +16,13 @@ from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
 from planfly.campaigns.failure_counts import RuleFailures, count_failures, failure_lines, failures_document
 from planfly.campaigns.flight_row import FlightRow, scale_margin
-from planfly.campaigns.statistics.decision import Estimate, Goal, first_order_index, rank_slope
+from planfly.campaigns.statistics.decision import (
+    MIN_FLIGHTS_FOR_INDEX,
+    Estimate,
+    Goal,
+    first_order_index,
+    rank_slope,
+)
 from planfly.campaigns.tables import Store
 
 # Schema of ``summary.json``.
@@ -119,11 +125,16 @@ def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str
 
 
 def _rule_sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
-    """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first."""
+    """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first.
+
+    Too few flights show none.
+    """
     if not rule:
         return ()
     margin = store.column(RULE_WORDS[rule].margin_column)
     is_known = np.isfinite(margin)
+    if np.count_nonzero(is_known) < MIN_FLIGHTS_FOR_INDEX:
+        return ()
     sensitivities = []
     for varying in base.dispersions.varying:
         name = varying.quantity.name
@@ -234,6 +245,8 @@ def _answer_text(summary: CampaignSummary) -> str:
 
 
 def _drivers_text(summary: CampaignSummary) -> str:
+    if not summary.sensitivities:
+        return f"fewer than {MIN_FLIGHTS_FOR_INDEX} flights do not show what it depends on"
     drivers = [sensitivity for sensitivity in summary.sensitivities if sensitivity.index >= _MIN_NAMED_FRACTION][:3]
     if not drivers:
         return "no single quantity explains it"

@@ -51,7 +51,7 @@ def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
     if abs(planned_slope) <= LEVEL_SLOPE_RAD and not _is_in_envelope(requirements, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
-    faults, facts = [], [f"slope {math.degrees(planned_slope):+.2f}°"]
+    faults, facts = [], []
     if abs(planned_slope) > limit + PLAN_TOLERANCE_RAD:
         step = step_height(requirements, leg)
         if step is None:
@@ -59,16 +59,18 @@ def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         else:
             facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
     faults += _steep_arc_faults(requirements, leg)
+    # A fault of the plan states the planned slope itself.
+    facts = facts if faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
-        facts += _flown_facts(measure)
         performance_faults = _performance_faults(requirements, leg, measure)
         flown_faults = _flown_faults(requirements, leg, measure, limit, performance_faults)
+        facts += [text for name, text in _flown_facts(measure) if name not in flown_faults]
         # If the aircraft's limits apply, the leg is judged by them and by a shown lack of performance; the height error
         # on the leg is only reported.
-        facts += [fault.brief for fault in flown_faults] if requirements.envelope else []
-        faults += performance_faults if requirements.envelope else [*flown_faults, *performance_faults]
+        facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
+        faults += performance_faults if requirements.envelope else [*flown_faults.values(), *performance_faults]
         fit = measure.slope
         method = "not flown"
         if fit is not None:
@@ -200,15 +202,15 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
     )
 
 
-def _flown_facts(measure: SlopeMeasure) -> list[str]:
-    """Describe how the leg was flown."""
+def _flown_facts(measure: SlopeMeasure) -> list[tuple[str, str]]:
+    """Describe how the leg was flown: quantities and their texts."""
     facts = []
     if measure.slope is not None:
-        facts.append(f"flown {math.degrees(measure.slope.value):+.2f}°")
+        facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
     if measure.height_error is not None:
-        facts.append(f"height within {abs(measure.height_error):.1f} m of the leg")
+        facts.append(("height", f"height within {abs(measure.height_error):.1f} m of the leg"))
     facts += [
-        f"throttle at {name} for {duration:.0f} s"
+        (name, f"throttle at {name} for {duration:.0f} s")
         for name, duration, _, _ in _throttle_times(measure)
         if duration >= 1.0
     ]
@@ -234,26 +236,26 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
-) -> list[Message]:
-    """Return the faults of the flown leg compared with the planned leg.
+) -> dict[str, Message]:
+    """Return the faults of the flown leg compared with the planned leg, by quantity.
 
     performance_faults: faults that show a lack of performance.
     """
-    faults = []
+    faults = {}
     planned_slope = float(requirements.slopes[leg])
     sign = 1.0 if planned_slope >= 0.0 else -1.0
     fit = measure.slope
     if fit is not None:
         flown_slope = math.degrees(fit.value)
         if sign * fit.value > limit + fit.tolerance:
-            faults.append(message(f"flown {flown_slope:+.1f}°, beyond {math.degrees(limit):.1f}°"))
-        if fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
-            faults.append(message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°"))
+            faults["slope"] = message(f"flown {flown_slope:+.1f}°, beyond {math.degrees(limit):.1f}°")
+        elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
+            faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None:
         error = abs(measure.height_error)
         if error > (SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M):
             side = "above" if measure.height_error > 0.0 else "below"
-            faults.append(message(f"{error:.0f} m {side} the leg"))
+            faults["height"] = message(f"{error:.0f} m {side} the leg")
     has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)
     max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, duration, error, direction in _throttle_times(measure):
@@ -263,7 +265,7 @@ def _flown_faults(
             and error > max_error
             and not (has_ability and name == _throttle_limit(planned_slope))
         ):
-            faults.append(message(f"throttle at {name} for {duration:.0f} s and {error:.1f} m/s too {direction}"))
+            faults[name] = message(f"throttle at {name} for {duration:.0f} s and {error:.1f} m/s too {direction}")
     return faults
 
 

@@ -54,17 +54,13 @@ def _turn_finding(
     if requirements.runs[i - 1 : i + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
-    faults, facts = (
-        [],
-        [
-            f"turns {math.degrees(planned_turn):.1f}°"
-            + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")
-        ],
-    )
+    turn_text = f"turns {math.degrees(planned_turn):.1f}°"
+    faults, facts = [], [turn_text + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")]
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink(requirements, i)
         if lateral is None:
             faults.append(_sharp_turn_message(requirements, i, planned_turn, limit, source))
+            facts = [] if faults[0].brief.startswith(turn_text) else facts
         else:
             facts.append(
                 f"a negligible kink: the path without this waypoint passes it at {lateral:.1f} m and can be flown"
@@ -73,11 +69,11 @@ def _turn_finding(
     method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE_RAD
-        facts += _flown_facts(requirements, i, measure)
         flown_faults = _flown_faults(requirements, i, measure, limit)
+        facts += [text for name, text in _flown_facts(requirements, i, measure) if name not in flown_faults]
         # If the aircraft's limits apply, the turn is judged by them; faults of the flown turn are only reported.
-        facts += [fault.brief for fault in flown_faults] if requirements.envelope else []
-        faults += [] if requirements.envelope else flown_faults
+        facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
+        faults += [] if requirements.envelope else flown_faults.values()
         method = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
         if angle is None:
             method = "not flown"
@@ -170,23 +166,25 @@ def _sharp_turn_message(
     )
 
 
-def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[str]:
-    """Describe how the turn was flown."""
+def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[tuple[str, str]]:
+    """Describe how the turn was flown: quantities and their texts."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
-        facts.append(f"flown {math.degrees(measure.angle):.2f}°")
+        facts.append(("course change", f"flown {math.degrees(measure.angle):.2f}°"))
     if measure.peak_bank is not None and measure.held_bank is not None:
-        facts.append(f"bank up to {math.degrees(measure.peak_bank):.1f}°")
+        facts.append(("bank", f"bank up to {math.degrees(measure.peak_bank):.1f}°"))
     if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[i]:
-        facts.append(f"radius {measure.radius:.0f} m")
+        facts.append(("radius", f"radius {measure.radius:.0f} m"))
     if measure.corner is not None:
-        facts.append(f"nearest pass {measure.corner.distance:.1f} m, at {measure.corner.time:.1f} s")
+        facts.append(("nearest pass", f"nearest pass {measure.corner.distance:.1f} m, at {measure.corner.time:.1f} s"))
     if measure.overshoot is not None:
-        facts.append(f"overshoot {measure.overshoot:.1f} m")
+        facts.append(("overshoot", f"overshoot {measure.overshoot:.1f} m"))
     if measure.corner is not None and measure.corner.overrun:
-        facts.append(f"that is {measure.corner.overrun:.0f} m past the end of the next leg, which was not joined")
+        facts.append(
+            ("overrun", f"that is {measure.corner.overrun:.0f} m past the end of the next leg, which was not joined")
+        )
     if measure.settled_distance is not None and measure.is_complete:
-        facts.append(f"settled to {measure.settled_distance:.2f} m")
+        facts.append(("settled", f"settled to {measure.settled_distance:.2f} m"))
     return facts
 
 
@@ -205,36 +203,35 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
     return [Fact(quantity, value, unit) for quantity, value, unit in numbers if value is not None]
 
 
-def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
-    """Return the faults of the flown turn: angle or bank beyond the limit, a tight arc, overshoot."""
-    faults = []
+def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> dict[str, Message]:
+    """Return the faults of the flown turn by quantity: angle or bank beyond the limit, a tight arc, overshoot."""
+    faults = {}
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown_angle, max_value = math.degrees(measure.angle), math.degrees(limit)
-        faults.append(message(f"flown course change {flown_angle:.1f}° beyond {max_value:.1f}°"))
+        faults["course change"] = message(f"flown course change {flown_angle:.1f}° beyond {max_value:.1f}°")
     max_bank = requirements.limits.max_bank + BANK_TOLERANCE_RAD
     # Roll in a gust, or into a turn, is not the bank of the turn: the mean over a second applies.
     if measure.held_bank is not None and measure.held_bank > max_bank:
         held_bank, max_value = math.degrees(measure.held_bank), math.degrees(max_bank)
-        faults.append(message(f"bank {held_bank:.1f}° beyond {max_value:.1f}°"))
-    faults += _tight_turn_faults(requirements, i, measure)
+        faults["bank"] = message(f"bank {held_bank:.1f}° beyond {max_value:.1f}°")
+    if (tight_turn := _tight_turn_fault(requirements, i, measure)) is not None:
+        faults["radius"] = tight_turn
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
         passed_text = "its arc" if measure.corner is None else "its next leg"
-        faults.append(
-            message(
-                f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
-            )
+        faults["overshoot"] = message(
+            f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
         )
     max_value = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
     if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_value:
         offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
-        faults.append(message(offset_text, f" (at most {max_value:.1f} m)"))
+        faults["settled"] = message(offset_text, f" (at most {max_value:.1f} m)")
     if measure.full_circles:
-        faults.append(message(f"{measure.full_circles} full circle(s) flown at the corner"))
+        faults["circles"] = message(f"{measure.full_circles} full circle(s) flown at the corner")
     return faults
 
 
-def _tight_turn_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
-    """Return a fault if a turn passed its waypoint closer than the arc at the bank limit does.
+def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> Message | None:
+    """Return a fault if a turn passed its waypoint closer than the arc at the bank limit does, else None.
 
     Legs too short for their turn are joined by a tighter arc, and a flight that follows this arc exceeded the bank
     limit or slowed down.
@@ -246,19 +243,17 @@ def _tight_turn_faults(requirements: RouteRequirements, i: int, measure: TurnMea
     # An autopilot that does not follow the arc may pass the waypoint at any distance.
     follows_arc = setup.autopilot.turns.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.min_distance is None or not math.isfinite(min_distance) or not follows_arc:
-        return []
+        return None
     tolerance = CORNER_CUT_FRACTION * min_distance + CORNER_CUT_TOLERANCE_M[setup.scenario.wind.turbulence]
     tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
     if measure.min_distance >= min_distance - tolerance:
-        return []
+        return None
     radius = measure.min_distance / min_distance * min_radius
-    return [
-        message(
-            f"flown with a radius of {radius:.0f} m, passing its waypoint at {measure.min_distance:.1f} m",
-            f"; with {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind the radius is"
-            f" {min_radius:.0f} m, and the waypoint is passed at {min_distance:.1f} m",
-        )
-    ]
+    return message(
+        f"flown with a radius of {radius:.0f} m, passing its waypoint at {measure.min_distance:.1f} m",
+        f"; with {math.degrees(requirements.limits.max_bank):.0f}° of bank in this wind the radius is"
+        f" {min_radius:.0f} m, and the waypoint is passed at {min_distance:.1f} m",
+    )
 
 
 RULE = Rule(

@@ -110,6 +110,7 @@ CHART_SCRIPTS = (
     "ground",
     "chart_library",
     "chart_layout",
+    "chart_labels",
     "chart_layers",
     "chart_panels",
     "chart_map",

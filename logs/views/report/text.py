@@ -269,7 +269,7 @@ def _missed_text(finding: Finding) -> str:
 
 
 def _sentence(finding: Finding) -> str:
-    """Describe a finding in words: the flown or planned value, its limit, and the reason."""
+    """Describe a finding in words: its reason, or the flown or planned value and its limit."""
     parts: list[str] = []
     digits, unit = _needed_decimals(finding), in_unit(None, finding.unit)[1]
     space = "" if unit in ("", "°", "%") else "\u00a0"
@@ -279,8 +279,7 @@ def _sentence(finding: Finding) -> str:
     if finding.limit is not None:
         source = f" ({finding.limit_source})" if finding.limit_source else ""
         parts.append(f"limit {_limit_text(finding, digits)}{space}{unit}{source}")
-    numbers = ", ".join(parts)
-    return f"{numbers}; {finding.reason}" if numbers and finding.reason else numbers or finding.reason
+    return finding.reason or ", ".join(parts)
 
 
 def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:

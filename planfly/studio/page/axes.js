@@ -89,14 +89,36 @@ export function groundAt(grid, east, north) {
   return low * (1 - y) + (heights[at + columns] * (1 - x) + heights[at + columns + 1] * x) * y;
 }
 
-// Names are written where none stands yet; important ones come first.
+// Names are written where none stands yet, beside the legs if there is room; important ones come first.
 export class Labels {
-  constructor() { this.taken = []; }
-  free(x, y, width, height) {
-    const box = [x, y, x + width, y + height];
-    if (this.taken.some((one) => box[0] < one[2] && one[0] < box[2] && box[1] < one[3] && one[1] < box[3])) return false;
-    this.taken.push(box);
-    return true;
+  // legs: [[x, y], [x, y]] of each, which names had better not cover.
+  constructor(legs = []) {
+    this.taken = [];
+    this.legs = legs;
+  }
+  // The first of the places [x, y] that covers no name and no leg, or else no name; undefined without one.
+  take(places, width, height) {
+    const boxes = places.map(([x, y]) => [x, y, x + width, y + height]);
+    const free = boxes.filter((box) => !this.taken.some((one) => box[0] < one[2] && one[0] < box[2] && box[1] < one[3] && one[1] < box[3]));
+    const best = free.find((box) => !this.legs.some(([from, to]) => crosses(box, from, to))) || free[0];
+    if (best) this.taken.push(best);
+    return best;
   }
   block(x, y, half) { this.taken.push([x - half, y - half, x + half, y + half]); }
+}
+
+// True if a straight line enters a box (Liang and Barsky, 1984).
+function crosses(box, from, to) {
+  let first = 0, last = 1;
+  for (const axis of [0, 1]) {
+    const along = to[axis] - from[axis];
+    if (along === 0) {
+      if (from[axis] < box[axis] || from[axis] > box[axis + 2]) return false;
+      continue;
+    }
+    const ends = [box[axis], box[axis + 2]].map((edge) => (edge - from[axis]) / along);
+    first = Math.max(first, Math.min(...ends));
+    last = Math.min(last, Math.max(...ends));
+  }
+  return first <= last;
 }

@@ -186,7 +186,7 @@ export class MapView {
   layOut() {
     for (const one of [this.world, this.land]) one.setAttribute("transform", this.view.transform());
     // Where waypoints stand closer than their dots are wide, small ones leave the legs and their colours to be seen.
-    const { route } = this.model, apart = route.slice(1).map((p, i) => Math.hypot(p[0] - route[i][0], p[1] - route[i][1]));
+    const places = this.model.items.map((item) => this.at.get(item.k)), apart = places.slice(1).map((p, i) => Math.hypot(p[0] - places[i][0], p[1] - places[i][1]));
     const middle = apart.sort((a, b) => a - b)[apart.length >> 1] || 0;
     this.markers.classList.toggle("dense", middle * this.view.scale < 13);
     this.placeMarks();
@@ -229,7 +229,8 @@ export class MapView {
 
   placeNames() {
     clear(this.names);
-    const labels = new Labels(), { items } = this.model;
+    const { items, route } = this.model, points = route.map(([east, north]) => [this.view.x(east), this.view.y(north)]);
+    const labels = new Labels(points.slice(1).map((to, i) => [points[i], to]));
     for (const item of items) {
       const [east, north] = this.at.get(item.k);
       labels.block(this.view.x(east), this.view.y(north), 7);
@@ -261,13 +262,13 @@ export class MapView {
   name(labels, x, y, text, kind, away) {
     if (!this.inside(x, y, 2)) return;
     const width = (kind === "number" ? 7.8 : 6.4) * text.length + 4, height = 14;
-    const places = away ? [[away, -height / 2], [-away - width, -height / 2], [-width / 2, -away - height], [-width / 2, away]] : [[-width / 2, -height / 2]];
-    for (const [dx, dy] of places) {
-      if (!this.inside(x + dx, y + dy, 0) || !labels.free(x + dx, y + dy, width, height)) continue;
-      const made = svg("text", { x: x + dx + 2, y: y + dy + 11, class: kind }, this.names);
-      made.textContent = text;
-      return;
-    }
+    const [right, left, up, down, near] = [away, -away - width, -away - height, away, 0.7 * away];
+    const offsets = away
+      ? [[right, -height / 2], [left, -height / 2], [-width / 2, up], [-width / 2, down], [near, -near - height], [-near - width, -near - height], [near, near], [-near - width, near]]
+      : [[-width / 2, -height / 2]];
+    const places = offsets.map(([dx, dy]) => [x + dx, y + dy]).filter(([px, py]) => this.inside(px, py, 0) && this.inside(px + width, py + height, 0));
+    const box = labels.take(places, width, height);
+    if (box) svg("text", { x: box[0] + 2, y: box[1] + 11, class: kind }, this.names).textContent = text;
   }
 
   drawScale() {

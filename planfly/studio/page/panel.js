@@ -153,7 +153,7 @@ export class Panel {
     const lines = verdict.lines.slice(0, 6);
     return element("section", { class: "card", "data-state": verdict.state },
       element("h2", {}, `${name}: ${answer}`), element("p", { class: "more" }, more),
-      verdict.state === "ok" ? null : element("p", {}, verdict.headline),
+      verdict.state === "ok" ? null : element("p", {}, verdict.headline.replace(new RegExp(`^${verdict.answer}[:;]? *`), "")),
       lines.length ? element("details", {}, element("summary", {}, "In full"), ...lines.map((line) => element("p", { class: "line" }, line))) : null);
   }
 

@@ -100,6 +100,21 @@ def test_the_text_holds_the_scene_and_ends_no_script() -> None:
     np.testing.assert_allclose(heights[known], terrain.height(east[None, :], north[:, None])[known], atol=0.01)
 
 
+def test_a_loiter_has_one_number_in_the_scene() -> None:
+    """Its corners are one stop: the numbers are those of the map and of a ground station's list."""
+    route = SETUP.route
+    looped = replace(route, waypoints=route.waypoints[[0, 1, 1, 2, 3]], items=np.array([-1, 2, 2, 3, 4]))
+    looped = replace(
+        looped,
+        airspeed=np.full(4, 25.0),
+        acceptance=np.zeros(5),
+        fly_over=np.zeros(5, dtype=bool),
+        arcs=np.array([0.0, 80.0, 80.0, 0.0, 0.0]),
+    )
+    data = scene_data(SceneView(replace(SETUP, route=looped), None, NOTHING))
+    assert data["numbers"] == [[0, 0], [1, 1], [3, 2], [4, 3]]
+
+
 def test_a_scene_without_terrain_has_no_ground() -> None:
     bare = replace(SETUP, scenario=replace(SETUP.scenario, terrain=None, external=True))
     assert scene_data(SceneView(bare, None, NOTHING))["ground"] is None

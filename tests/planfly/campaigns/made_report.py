@@ -14,11 +14,11 @@ from tests.planfly.campaigns.made_campaigns import made_flight
 
 
 @contextmanager
-def made_report(base: CampaignBase, folder: Path) -> Iterator[tuple[Store, CampaignSummary]]:
-    """Flights 0 and 1 flown, 2 to 58 made, 59 lost."""
-    goal = Goal(0.8, False, 60)
+def made_report(base: CampaignBase, folder: Path, flights: int = 60) -> Iterator[tuple[Store, CampaignSummary]]:
+    """Flights 0 and 1 flown, 2 to 58 made, 59 lost; or only the first of these."""
+    goal = Goal(0.8, False, flights)
     with open_store(base, goal, folder, resume=False) as store:
-        for k in range(60):
+        for k in range(flights):
             store.add(
                 fly_one(base, k) if k < 2 else made_flight(base, k) if k < 59 else make_lost_row(base, k, "lost: x")
             )

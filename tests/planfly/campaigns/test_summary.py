@@ -58,3 +58,12 @@ def test_whose_flights_they_are_stands_behind_the_answer(base: CampaignBase, tmp
         assert (data["wind_mps"], data["wind_from_deg"], data["turbulence"]) == (5.0, 250.0, "light")
         page = campaign_page(base, summary, store, "planfly campaign").decode()
         assert page.count("Aircraft: aerosonde, 11 kg, 25 m/s") == 1
+
+
+def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Path) -> None:
+    """Eight flights cannot say what a margin depends on, and are not drawn as eleven times 0 %."""
+    with made_report(base, tmp_path, flights=8) as (store, summary):
+        assert summary.deciding == "clearance"
+        assert summary.sensitivities == ()
+        assert "do not show what it depends on" in campaign_lines(summary)[-1]
+        assert "What the deciding margin depends on" not in campaign_page(base, summary, store, "").decode()

@@ -401,6 +401,35 @@ def test_a_dropped_file_is_opened(page: Browser) -> None:
     page.wait_for("document.getElementById('name').textContent === 'm.waypoints'")
 
 
+def test_a_circle_at_the_end_leaves_the_dots_large_and_the_names_beside_the_legs(page: Browser) -> None:
+    """The many corners of a loiter are no waypoints that lie close together."""
+    lines = [
+        "QGC WPL 110",
+        "0 1 0 16 0 0 0 0 36.2578 -84.1401 335 1",
+        "1 0 3 16 0 0 0 0 36.2676 -84.1537 220 1",
+        "2 0 3 16 0 0 0 0 36.2838 -84.1761 220 1",
+        "3 0 3 16 0 0 0 0 36.2668 -84.1641 220 1",
+        "4 0 3 18 3 0 80 0 36.2578 -84.1401 220 1",
+    ]
+    data = base64.b64encode("\n".join([lines[0], *(line.replace(" ", "\t") for line in lines[1:])]).encode()).decode()
+    page.value(
+        f"(() => {{ const data = new DataTransfer(); data.items.add(new File([atob('{data}')], 'circle.waypoints'));"
+        " dispatchEvent(new DragEvent('drop', { dataTransfer: data, cancelable: true })); return 1; })()"
+    )
+    page.wait_for("document.getElementById('name').textContent === 'circle.waypoints'")
+    page.wait_for("document.querySelectorAll('.mark').length === 4")
+    assert page.value("document.querySelector('.markers').classList.contains('dense')") is False
+    assert page.value(OVERLAPS) == 0
+    card = "document.querySelector('#panel-verdict > .card').textContent"
+    assert page.value(f"{card}.split('not flyable').length") <= 2
+    page.value("document.getElementById('tab-files').click()")
+    page.value(
+        "document.getElementById('open-path').value = 'm.waypoints'; document.getElementById('open-path').focus()"
+    )
+    page.key("Enter")
+    page.wait_for("document.getElementById('name').textContent === 'm.waypoints'")
+
+
 @only_in_soak
 def test_what_was_done_survives_a_reload_and_a_server_that_dies(page: Browser, studio: Studio) -> None:
     undo_all(page)

@@ -189,7 +189,7 @@ def test_verdict_comes_first_then_what_fails() -> None:
         "Start: in the air",
         "The broad line is the plan",
         "What fails",
-        "leg 1, slope: flown 11.2°, limit ≤ 7.90° (aircraft); why leg 1. Missed by 3.35°.",
+        "leg 1, slope: why leg 1. Missed by 3.35°.",
         "What else was judged",
         "One row per rule",
         "item 9: no loiter",

@@ -1,6 +1,7 @@
 """The page of a report works in a browser: wide, narrow, by mouse and keys, light, dark, on paper, without scripts."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_flight
+from logs.verdict.judge_geometry import judge_geometry
 from logs.views.report.compare import compare_logs, write_comparison
 from logs.views.report.identification import identification_page
 from logs.views.report.page import write_report
@@ -130,6 +132,58 @@ def test_the_first_screen_answers_and_the_page_is_short(browser: Browser, page: 
     assert max(low if width == 1400 else low[:2]) <= 900
     assert browser.value("document.documentElement.scrollHeight") <= 10_000
     assert browser.value("document.documentElement.scrollWidth") <= width
+
+
+# The pairs of a chart's labels that cover each other, by the boxes that the browser gives their glyphs.
+COVERED = """(name => {
+    const labels = [...document.querySelectorAll(`[data-chart=${name}] .textpoint text`)].filter(e => e.textContent);
+    const boxes = labels.map(e => [e.textContent, e.getBoundingClientRect()]).filter(([, b]) => b.width);
+    const cover = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom - 4 && b.top < a.bottom - 4;
+    const pairs = boxes.flatMap((one, k) => boxes.slice(0, k).map((other) => [one, other]));
+    const covered = pairs.filter(([one, other]) => cover(one[1], other[1]));
+    return [boxes.length, covered.map(([one, other]) => [one[0], other[0]])];
+})"""
+
+
+@pytest.fixture(scope="module")
+def landing_page(tmp_path_factory: pytest.TempPathFactory, setup: FlightSetup) -> Path:
+    """Twenty waypoints within 400 m of the destination, as in a landing sequence, after a leg of 2 km."""
+    angles = np.linspace(0.0, 4.0 * np.pi, 20)
+    circuit = np.column_stack([700.0 + 200.0 * np.cos(angles), 800.0 + 120.0 * np.sin(angles), np.full(20, 440.0)])
+    points = np.vstack([[-900.0, -900.0, 420.0], circuit, [900.0, 900.0, 440.0]])
+    count = len(points)
+    route = replace(
+        setup.route,
+        waypoints=points,
+        airspeed=np.full(count - 1, 25.0),
+        acceptance=np.zeros(count),
+        fly_over=np.zeros(count, dtype=bool),
+        items=np.arange(-1, count - 1),
+        arcs=np.zeros(count),
+    )
+    setup = replace(setup, route=route, plan=None)
+    arguments: dict[str, Any] = {"ended": None, "versions": {"planfly": "0"}, "command": "planfly check small"}
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        return write_report(tmp_path_factory.mktemp("landing"), setup, None, judge_geometry(setup), **arguments)[-1]
+
+
+@pytest.mark.parametrize("width", [1400, 420])
+def test_labels_cover_no_other_label_at_any_zoom(browser: Browser, landing_page: Path, width: int) -> None:
+    prefer(browser, "light", width)
+    browser.open(landing_page)
+    for name in ("map", "profile"):
+        show_chart(browser, name)
+        count, covered = browser.value(f"{COVERED}('{name}')")
+        assert (count >= 5, covered) == (True, []), name
+    show_chart(browser, "map")
+    few, _ = browser.value(f"{COVERED}('map')")
+    chart = "document.querySelector('[data-chart=map]')"
+    browser.value(f"Plotly.relayout({chart}, {{'xaxis.range': [0.4, 1], 'yaxis.range': [0.6, 1]}}).then(() => 1)")
+    browser.settle()
+    # What had no room is there where a reader zooms in.
+    until(browser, f"{COVERED}('map')[0] > {few}")
+    assert browser.value(f"{COVERED}('map')")[1] == []
 
 
 def test_a_link_opens_its_section_and_paper_all(browser: Browser, page: Path) -> None:

@@ -37,7 +37,7 @@ function layerTraces(given, axes, template, theme, scale = 1, flights = []) {
       ];
     }
     default:
-      return [{ ...common, ...hover, mode: "lines", line: theme.line(layer.role, layer.dashed) }];
+      return [{ ...common, ...hover, mode: "lines", line: theme.line(layer.role, layer.dashed), ...(layer.role === "planned" ? { meta: "path" } : {}) }];
   }
 }
 
@@ -80,17 +80,6 @@ function bandOutline({ x, y, low }) {
     k = end;
   }
   return [outX, outY];
-}
-
-// Numbers beside waypoints and names of the ends, as many as there is room for: labels are [text, x, y, role].
-function labelTraces(labels, axes, theme, width, scale = 1) {
-  if (!labels.length) return [];
-  const step = Math.max(1, Math.ceil(labels.length / (isNarrow(width) ? 15 : 40))), shown = labels.filter((_, k) => k % step === 0);
-  return [{
-    type: "scatter", mode: "markers+text", marker: { size: 10, color: theme.clear }, ...axes, x: shown.map((label) => label[1] * scale), y: shown.map((label) => label[2] * scale),
-    text: shown.map((label) => `<b>${plainName(label[0])}</b>`), textposition: shown.map((label) => (label[3] === "ink" ? "bottom center" : "top right")), showlegend: false, hoverinfo: "skip",
-    textfont: { size: 11, color: shown.map((label) => theme.colour(label[3])) }, cliponaxis: false,
-  }];
 }
 
 // The first of the traces of one name stands in the legend for all.

@@ -4,7 +4,7 @@ function mapFigure(map, { ground, flights }, theme, width) {
   const traces = [], images = [], axes = { xaxis: "x", yaxis: "y" };
   if (ground) groundOfMap(ground, theme, traces, images);
   for (const layer of map.layers) traces.push(...layerTraces(layer, axes, "", theme, 0.001, flights));
-  traces.push(...labelTraces(map.labels, axes, theme, width, 0.001));
+  traces.push(...labelTraces(map.labels, axes, theme, 0.001));
   const names = nameOnce(traces), layout = chartLayout(theme, width, names);
   const [[west, east], [south, north]] = [map.east, map.north].map((side) => side.map(km));
   const inner = width - layout.margin.l - layout.margin.r, aspect = (north - south) / (east - west);

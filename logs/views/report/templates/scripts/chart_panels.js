@@ -19,7 +19,7 @@ function panelFigure(chart, theme, width) {
       const where = chart.along || !layer.name ? "" : `${panel.along} %{x}<br>${layer.name}: `;
       traces.push(...layerTraces(layer, on, where + template + (chart.shared && chart.panels.length > 0 ? "" : "<extra></extra>"), theme));
     }
-    traces.push(...labelTraces(panel.labels, on, theme, width));
+    traces.push(...labelTraces(panel.labels, on, theme));
     const all = panel.layers.flatMap((layer) => layer.x).filter((value) => value !== null);
     const ends = [Math.min(...all), Math.max(...all)];
     traces.push(...panel.limits.map((limit) => limitTrace(limit, ends, on, theme)));

@@ -34,11 +34,23 @@ function startCharts(charts, world) {
     const chart = charts[holder.dataset.chart];
     const figure = chart.panels ? panelFigure(chart, theme, width) : mapFigure(chart, world, theme, width);
     if (chart.timed && clock) figure.layout.shapes.push(cursor(figure.layout));
+    arrangeLabels(figure.traces, figure.layout);
     await plotly.react(holder, figure.traces, figure.layout, CHART_CONFIG);
     holder.style.minHeight = "";
     holder.dataset.drawn = String(1 + Number(holder.dataset.drawn || 0));
     nameButtons(holder);
+    if (!holder.dataset.labelled) {
+      holder.dataset.labelled = "yes";
+      holder.on("plotly_relayout", (change) => { if (Object.keys(change).some((key) => key.includes("axis"))) moveLabels(plotly, holder); });
+    }
     if (chart.timed && clock && !holder.dataset.bound) bind(holder);
+  }
+  // Labels of a chart that was zoomed or moved.
+  function moveLabels(plotly, holder) {
+    const at = holder.data.map((trace, k) => (trace.meta && trace.meta.labels ? k : -1)).filter((k) => k >= 0);
+    if (!at.length) return;
+    arrangeLabels(holder.data, holder.layout);
+    plotly.restyle(holder, { text: at.map((k) => holder.data[k].text), textposition: at.map((k) => holder.data[k].textposition) }, at);
   }
   // A line at the moment that the page shows.
   function cursor(layout) {

@@ -60,11 +60,11 @@ function makeLabels(ink, theme) {
 }
 
 function sceneLabels(scene, frame) {
-  const last = scene.plan.length - 1, found = [];
+  const last = scene.plan.length - 1, found = [], numbers = new Map(scene.numbers);
   function add(text, at, look, bold, always) { found.push({ key: found.length, text, at, look, bold, always }); }
   add("start", scene.plan[0], "ink", true, true);
   add("destination", scene.plan[last], "ink", true, true);
-  for (const k of scene.failing.waypoints) if (scene.plan[k]) add("✗ " + k, scene.plan[k], "fail", true, true);
+  for (const k of scene.failing.waypoints) if (scene.plan[k]) add("✗ " + (numbers.get(k) ?? k), scene.plan[k], "fail", true, true);
   for (const k of scene.failing.legs) {
     const middle = scene.plan[k].map((value, axis) => (value + scene.plan[k + 1][axis]) / 2);
     add("✗ leg " + k, middle, "fail", true, scene.failing.legs.length <= 6);
@@ -74,6 +74,6 @@ function sceneLabels(scene, frame) {
   const [e, n] = frame.middle;
   for (const [text, at] of [["N", [e, frame.north]], ["S", [e, frame.south]], ["E", [frame.east, n]], ["W", [frame.west, n]]])
     add(text, [...at, frame.low], "ink", true, false);
-  scene.plan.forEach((point, k) => { if (k && k < last) add(String(k), point, "second", true, false); });
+  for (const [k, number] of numbers) if (k && k < last && !scene.failing.waypoints.includes(k)) add(String(number), scene.plan[k], "second", true, false);
   return found;
 }
