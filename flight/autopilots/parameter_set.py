@@ -75,7 +75,7 @@ class ParameterTable:
         self.by_name = {definition.name: definition for definition in self.definitions} | self.when_stated
         # Definition and factor to its unit, by each name that a file may use.
         self.by_any_name = {name: (definition, 1.0) for name, definition in self.by_name.items()} | {
-            definition.old[0]: (definition, definition.old[1]) for definition in self.definitions if definition.old
+            definition.old[0]: (definition, definition.old[1]) for definition in self.by_name.values() if definition.old
         }
 
     def read(self, entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:

@@ -306,6 +306,8 @@ class MissionParts(NamedTuple):
     throttled_airspeeds: airspeeds that the mission commands together with a throttle, m/s.
     moves_payload: True if the mission commands a gripper, a winch or a gimbal, after which PX4 may wait.
     wind: highest mean wind speed on the route, m/s.
+    commands: commands of the mission's items.
+    aircraft: the aircraft; None if it is not known here.
     """
 
     returns: bool = False
@@ -318,6 +320,8 @@ class MissionParts(NamedTuple):
     throttled_airspeeds: tuple[float, ...] = ()
     moves_payload: bool = False
     wind: float = 0.0
+    commands: frozenset[int] = frozenset()
+    aircraft: Aircraft | None = None
 
 
 PX4_DEFAULT_LIMITS = FeasibilityLimits()

@@ -77,13 +77,12 @@ _LEG_FIELDS = (
 
 
 # Neutral values of parameters that change the flight of a mission and are not simulated: an altitude offset,
-# soaring, lift motors, turns by rudder alone, and flight without an airspeed sensor.
+# soaring, lift motors, and turns by rudder alone.
 _NEUTRAL = {
     "ALT_OFFSET": 0.0,
     "SOAR_ENABLE": 0.0,
     "Q_ENABLE": 0.0,
     "RUDDER_ONLY": 0.0,
-    "ARSPD_USE": 1.0,
 }
 
 
@@ -184,7 +183,7 @@ class ArduPlane(Autopilot):
         )
 
     def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
-        """Return `_NEUTRAL` settings that are not neutral, zero rate gains, an own fence, RTL over terrain, and others.
+        """Return `_NEUTRAL` settings that are not neutral, an own fence, RTL over terrain, and others.
 
         The others are those of `flight.autopilots.arduplane.open_settings`.
         """
@@ -194,11 +193,6 @@ class ArduPlane(Autopilot):
             f"{name} {values[name]:g} changes the flight and is not flown"
             for name, neutral in _NEUTRAL.items()
             if values[name] != neutral
-        ]
-        texts += [
-            f"{axis}_P 0 and {axis}_FF 0 leave the attitude uncontrolled, which is not flown"
-            for axis in ("RLL_RATE", "PTCH_RATE")
-            if values[f"{axis}_P"] == values[f"{axis}_FF"] == 0.0
         ]
         fence_parameters = parameters.changed(FENCE_ENABLE=1.0) if mission.enables_fence else parameters
         if fence_parameters.has_fence_of_its_own:

@@ -476,7 +476,8 @@ def control_attitude(
     )
     previous_roll_rate = guidance.bank_rate
     roll_rate = (memory.roll_demand - guidance.bank) / (ROLL_LAG * parameters.roll_time)
-    roll_rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, roll_rate))
+    roll_rate_max = min(gains.roll_rate_max, parameters.roll_rate_max)
+    roll_rate = min(roll_rate_max, max(-roll_rate_max, roll_rate))
     max_change = gains.roll_acceleration_max * dt
     roll_rate = previous_roll_rate + min(max_change, max(-max_change, roll_rate - previous_roll_rate))
     follow_roll(

@@ -4,12 +4,19 @@ Names, defaults and effects are from ArduPlane 4.6.3 and 4.7; docs/arduplane-bra
 Each is read from a parameter file, and has no part in the control law.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from typing import NamedTuple
 
+from aircraft.catalog import Aircraft
+from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.parameter_files import read_parameter_file
+from flight.autopilots.parameter_set import AIRCRAFT_FILE
 from flight.autopilots.parts import MissionParts
+from flight.autopilots.rate_loop import RateGains, rate_gains_fault
+from flight.mission.commands import Command as C
 
 
 class Phase(StrEnum):
@@ -25,12 +32,14 @@ class OpenSetting(NamedTuple):
 
     phase: the setting matters only where this part of a flight is flown.
     lowest, highest: range of values that change nothing.
+    zero_is_off: True if 0 switches the setting off, and so changes nothing either.
     by_program: True if ArduPlane's own program flies it, with planfly's physics.
     """
 
     phase: Phase
     lowest: float = 0.0
     highest: float = 0.0
+    zero_is_off: bool = False
     by_program: bool = False
 
 
@@ -53,6 +62,26 @@ OPEN_SETTINGS = {
     # off.
     "ICE_IDLE_PCT": OpenSetting(_FLIGHT),
     "ICE_IDLE_RPM": OpenSetting(_FLIGHT, -1e9, -1e-9),
+    # `AP_PitchController::get_servo_out`: the pitch that a turn needs, in its documented range.
+    "PTCH2SRV_RLL": OpenSetting(_FLIGHT, 0.7, 1.5, by_program=True),
+    # `AC_PID`: filters in Hz, and the trim that the integrator can hold.
+    **{
+        f"{axis}_RATE_{name}": OpenSetting(_FLIGHT, 1.0, math.inf, zero_is_off=True, by_program=True)
+        for axis in ("RLL", "PTCH")
+        for name in ("FLTT", "FLTE")
+    },
+    "RLL_RATE_IMAX": OpenSetting(_FLIGHT, 0.1, math.inf, by_program=True),
+    "PTCH_RATE_IMAX": OpenSetting(_FLIGHT, 0.1, math.inf, by_program=True),
+    # `AP_Airspeed::read`: no pressure becomes an airspeed.
+    "ARSPD_RATIO": OpenSetting(_FLIGHT, 1e-9, math.inf),
+    # `AP_AHRS_DCM` and `NavEKF3`: position, attitude and their sensors.
+    "AHRS_GPS_USE": OpenSetting(_FLIGHT, 1.0, 2.0),
+    "EK3_SRC1_POSXY": OpenSetting(_FLIGHT, 3.0, 3.0),
+    "EK3_IMU_MASK": OpenSetting(_FLIGHT, 1.0, math.inf),
+    "INS_ENABLE_MASK": OpenSetting(_FLIGHT, 1.0, math.inf),
+    # `Plane::channel_function_mixer`: elevons and V-tails.
+    "MIXING_GAIN": OpenSetting(_FLIGHT, 0.25, math.inf),
+    "MIXING_OFFSET": OpenSetting(_FLIGHT, -500.0, 500.0),
     # `Plane::takeoff_calc_throttle`, `auto_takeoff_check`, `takeoff_tail_hold`, `set_servos_flaps`, `set_throttle`.
     "TKOFF_OPTIONS": OpenSetting(_TAKE_OFF, by_program=True),
     "TKOFF_ACCEL_CNT": OpenSetting(_TAKE_OFF, 0.0, 1.0, by_program=True),
@@ -87,6 +116,38 @@ _CONTINUE_AFTER_LANDING = 0b100
 _MOTOR_OFF_THROTTLE = 0.01
 # RTL_AUTOLAND of a return along the mission's return path.
 _BY_RETURN_PATH = 4.0
+# Number of airspeed sensors that ArduPlane 4.7 reads.
+_AIRSPEED_SENSORS = 6
+# Values of AHRS_EKF_TYPE.
+_EKF2 = 2.0
+_EKF3 = 3.0
+_EXTERNAL_AHRS = 11.0
+# Values of EK3_SRC1_POSZ: barometer, GPS.
+_HEIGHT_SOURCES = (1.0, 3.0)
+# Items that bits of ARMING_MIS_ITEMS require (`AP_Arming::mission_checks`).
+_ITEMS_FOR_ARMING = {
+    1 << 0: C.NAV_LAND,
+    1 << 2: C.DO_LAND_START,
+    1 << 3: C.NAV_TAKEOFF,
+    1 << 6: C.NAV_RETURN_TO_LAUNCH,
+}
+# Servo functions of mixed surfaces: differential spoilers, elevons.
+_ELEVON_FUNCTIONS = (16.0, 17.0, 86.0, 87.0, 77.0, 78.0)
+# Servo functions by the part that they move: aileron, flaperons; elevator, V-tails; throttles.
+_FUNCTIONS_BY_PART = {
+    "ailerons": (4.0, 24.0, 25.0, *_ELEVON_FUNCTIONS),
+    "elevator": (19.0, 79.0, 80.0, *_ELEVON_FUNCTIONS),
+    "motor": (70.0, 73.0, 74.0),
+}
+# Pitch rate that a flight needs besides that of its turns, deg/s: a change of 10 deg within a second.
+_PITCH_CHANGE_RATE_DEGPS = 10.0
+# Highest bank for which ArduPlane computes the pitch rate of a turn, rad.
+_MAX_COORDINATED_BANK_RAD = math.radians(80.0)
+# Parameters of the rate controllers.
+_RATE_GAIN_NAMES = (
+    *(f"{axis}_RATE_{gain}" for axis in ("RLL", "PTCH") for gain in ("FF", "P", "I", "D")),
+    *("RLL2SRV_TCONST", "PTCH2SRV_TCONST", "SCALING_SPEED"),
+)
 # Height from which a take-off banks freely, as a ratio to TKOFF_LVL_ALT.
 _FREE_BANK_HEIGHT_RATIO = 3.0
 
@@ -110,6 +171,7 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
         for name, setting in OPEN_SETTINGS.items()
         if is_flown[setting.phase]
         and not setting.lowest <= values[name] <= setting.highest
+        and not (setting.zero_is_off and values[name] == 0.0)
         and not (by_program and setting.by_program)
     ]
     return [*texts, *_describe_others(parameters, values, mission, by_program=by_program)]
@@ -118,7 +180,12 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
 def _describe_others(
     parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
 ) -> Iterator[str]:
-    """Describe settings that depend on one another or on the mission."""
+    """Describe settings that depend on one another, on the mission or on the aircraft."""
+    yield from _describe_airspeed_sensor(values)
+    yield from _describe_estimate(values)
+    yield from _describe_arming(values, mission)
+    yield from _describe_outputs(parameters, values)
+    yield from _describe_rate_gains(parameters, mission.aircraft)
     # `Plane::set_servos_flaps` compares the demanded airspeed in whole m/s, which only a landing demands below the
     # minimum.
     min_airspeed = 0 if mission.lands else int(values["AIRSPEED_MIN"])
@@ -136,6 +203,7 @@ def _describe_others(
         yield f"MIS_OPTIONS {values['MIS_OPTIONS']:g} continues the mission after its landing, which is not flown"
     if by_program:
         return
+    yield from _describe_pitch_rates(parameters, values)
     for airspeed in mission.throttled_airspeeds:
         if not parameters.airspeed_min <= airspeed <= parameters.airspeed_max:
             # `Plane::do_change_speed` falls through to the throttle.
@@ -159,3 +227,95 @@ def _describe_others(
         yield f"{settings_text} reverse the thrust, which is not flown"
     if mission.returns and mission.has_return_path and parameters.rtl_autoland == _BY_RETURN_PATH:
         yield "RTL_AUTOLAND 4 returns along the mission's return path, which is not flown"
+
+
+def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
+    """Describe an airspeed that is not measured or not used: `AP_Airspeed::update` takes the first sensor there is."""
+    primary = int(values["ARSPD_PRIMARY"]) + 1
+    prefixes = {number: f"ARSPD{number if number > 1 else ''}" for number in range(1, _AIRSPEED_SENSORS + 1)}
+    present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
+    if values["ARSPD_ENABLE"] == 0.0 or not present:
+        name = "ARSPD_TYPE" if values["ARSPD_ENABLE"] else "ARSPD_ENABLE"
+        yield f"{name} 0 leaves no airspeed sensor, which is not flown"
+        return
+    use = f"{prefixes[primary if primary in present else present[0]]}_USE"
+    if values[use] != 1.0:
+        yield f"{use} {values[use]:g} changes the flight and is not flown"
+
+
+def _describe_estimate(values: Mapping[str, float]) -> Iterator[str]:
+    """Describe settings with which ArduPlane has no position, or not that of EKF3."""
+    type_names: tuple[str, ...] = ("GPS1_TYPE", "GPS2_TYPE")
+    if values["GPS_AUTO_SWITCH"] == 0.0:
+        type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
+    if not any(values[name] for name in type_names):
+        yield f"{' and '.join(type_names)} 0 leave no GPS, and so no position, which is not flown"
+    estimator, height_source = values["AHRS_EKF_TYPE"], values["EK3_SRC1_POSZ"]
+    # `AP_AHRS::init` replaces EKF2 by EKF3.
+    enabling = {_EKF2: "", _EKF3: "EK3_ENABLE", _EXTERNAL_AHRS: "EAHRS_TYPE"}
+    if estimator not in enabling:
+        yield f"AHRS_EKF_TYPE {estimator:g} estimates the position without EKF3, which is not flown"
+    elif enabling[estimator] and values[enabling[estimator]] == 0.0:
+        yield f"{enabling[estimator]} 0 with AHRS_EKF_TYPE {estimator:g} leaves no position, which is not flown"
+    if height_source not in _HEIGHT_SOURCES:
+        yield f"EK3_SRC1_POSZ {height_source:g} takes the altitude neither from barometer nor GPS, which is not flown"
+
+
+def _describe_arming(values: Mapping[str, float], mission: MissionParts) -> Iterator[str]:
+    """Describe an item that the mission lacks, and without which ArduPlane does not arm."""
+    for bit, command in _ITEMS_FOR_ARMING.items():
+        if values["ARMING_CHECK"] and int(values["ARMING_MIS_ITEMS"]) & bit and command not in mission.commands:
+            yield f"ARMING_MIS_ITEMS {values['ARMING_MIS_ITEMS']:g} prevents arming without {command.name}"
+
+
+def _describe_outputs(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
+    """Describe outputs that move no ailerons, no elevator or no motor."""
+    if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
+        return
+    functions = {values[f"SERVO{output}_FUNCTION"] for output in range(1, 33)}
+    for part, moving in _FUNCTIONS_BY_PART.items():
+        if functions.isdisjoint(moving):
+            yield f"SERVO1_FUNCTION to SERVO32_FUNCTION move no {part}, which is not flown"
+
+
+def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
+    """Describe limits of the pitch rate that hold back a turn or a climb, deg/s.
+
+    `AP_PitchController::get_servo_out` limits the rate that a turn needs together with the rate that changes the pitch.
+    """
+    bank = parameters.roll_limit
+    turn_rate = math.degrees(GRAVITY / parameters.airspeed_cruise * math.tan(min(bank, _MAX_COORDINATED_BANK_RAD)))
+    needed_rates = {
+        "PTCH2SRV_RMAX_UP": turn_rate * math.sin(bank) + _PITCH_CHANGE_RATE_DEGPS,
+        "PTCH2SRV_RMAX_DN": _PITCH_CHANGE_RATE_DEGPS,
+    }
+    for name, needed_rate in needed_rates.items():
+        if 0.0 < values[name] < needed_rate:
+            yield f"{name} {values[name]:g} below {needed_rate:.3g} changes the flight and is not flown"
+
+
+def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:
+    """Describe gains of the file with which the aircraft does not follow its attitude.
+
+    The gains of the aircraft's own file are assumed to suit the aircraft, and so are ArduPlane's defaults.
+    """
+    own: dict[str, float] = {}
+    if aircraft is not None and (aircraft.folder / AIRCRAFT_FILE).exists():
+        own = {name: entry.value for name, entry in read_parameter_file(aircraft.folder / AIRCRAFT_FILE).items()}
+    stated = parameters.by_origin("file")
+    values = {name: parameters.table.by_name[name].default for name in _RATE_GAIN_NAMES} | own | stated
+    # `Plane::calc_speed_scaler`: at the speed for which the aircraft's own gains are stated.
+    scale = values["SCALING_SPEED"] / own.get("SCALING_SPEED", values["SCALING_SPEED"])
+    for axis, time_constant in (("RLL", "RLL2SRV_TCONST"), ("PTCH", "PTCH2SRV_TCONST")):
+        names = [f"{axis}_RATE_{gain}" for gain in ("FF", "P", "I", "D")]
+        if stated.keys().isdisjoint((*names, time_constant, "SCALING_SPEED")):
+            continue
+        # `AP_FW_Controller::_get_rate_out`: the feed-forward counts once with the speed's ratio, the others twice.
+        feed_forward, p, i, d = (values[name] for name in names)
+        gains = RateGains(feed_forward * scale, p * scale**2, i * scale**2, d * scale**2)
+        default = parameters.table.by_name[names[0]].default
+        suitable = own.get(names[0]) or default
+        fault = rate_gains_fault(gains, (min(suitable, default), max(suitable, default)), values[time_constant])
+        if fault:
+            gains_text = ", ".join(f"{name} {values[name]:g}" for name in [*names[1:], names[0], time_constant])
+            yield f"{gains_text}: gains {fault} to hold the attitude, which is not flown"

@@ -7,11 +7,13 @@ that 4.6 does not have are not read for 4.6, which flies a fixed value instead.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self, get_args
 
 import numpy as np
 
+from flight.autopilots.parameter_files import Entry
 from flight.autopilots.parameter_origin import ARDUPILOT
 from flight.autopilots.parameter_set import Definition, ParameterSet, ParameterTable, Stated
 from flight.autopilots.parts import Candidate
@@ -148,7 +150,11 @@ _OWN_FENCE_BITS = 0b1011
 _DEFAULT_LOITER_RADIUS_M = 60.0
 # Parameters that are read but not flown: an RTL is flown on a slope where this would make it follow the terrain.
 NOT_FLOWN = ("TERRAIN_FOLLOW",)
-ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS, ("is_4_7", np.bool_))
+ARDUPILOT_PARAMETERS = record_dtype(
+    *DEFINITIONS,
+    "roll_rate_max",  # rad/s, infinite without a limit
+    ("is_4_7", np.bool_),
+)
 # Parameters that should not fall from one to the next; ArduPlane does not compare them.
 _ORDERS = (
     ("THR_MIN", "TRIM_THROTTLE", "THR_MAX"),
@@ -168,6 +174,33 @@ _WHEN_STATED = {
     **dict.fromkeys(("TECS_TKOFF_IGAIN", "TECS_APPR_SMAX", "TECS_LAND_TDAMP", "TECS_LAND_IGAIN"), 0.0),
     **dict.fromkeys(("LAND_TYPE", "LAND_PF_ARSPD", "LAND_OPTIONS", "LAND_THR_SLEW", "LAND_FLAP_PERCNT"), 0.0),
     **dict.fromkeys(("RNGFND_LANDING", "TECS_LAND_PDAMP"), 0.0),
+    **dict.fromkeys(("RLL2SRV_RMAX", "PTCH2SRV_RMAX_UP", "PTCH2SRV_RMAX_DN"), 0.0),
+    "PTCH2SRV_RLL": 1.0,
+    # Gains and filters of the rate controllers.
+    **dict.fromkeys(("RLL_RATE_I", "PTCH_RATE_I"), 0.15),
+    **dict.fromkeys(("RLL_RATE_D", "PTCH_RATE_D", "RLL_RATE_FLTE", "PTCH_RATE_FLTE"), 0.0),
+    **dict.fromkeys(("RLL_RATE_IMAX", "PTCH_RATE_IMAX"), 0.666),
+    **dict.fromkeys(("RLL_RATE_FLTT", "PTCH_RATE_FLTT"), 3.0),
+    "SCALING_SPEED": 15.0,
+    # Airspeed sensors.
+    **dict.fromkeys(("ARSPD_ENABLE", "ARSPD_TYPE"), 1.0),
+    **dict.fromkeys(("ARSPD_PRIMARY", *(f"ARSPD{number}_TYPE" for number in range(2, 7))), 0.0),
+    **dict.fromkeys((f"ARSPD{number}_USE" for number in range(2, 7)), 1.0),
+    "ARSPD_RATIO": 2.0,
+    # Position and attitude estimate.
+    **dict.fromkeys(("AHRS_GPS_USE", "EK3_ENABLE", "EK3_SRC1_POSZ", "GPS1_TYPE", "GPS_AUTO_SWITCH"), 1.0),
+    **dict.fromkeys(("EAHRS_TYPE", "GPS2_TYPE", "GPS_PRIMARY"), 0.0),
+    **dict.fromkeys(("AHRS_EKF_TYPE", "EK3_IMU_MASK", "EK3_SRC1_POSXY"), 3.0),
+    "INS_ENABLE_MASK": 127.0,
+    # Arming and outputs.
+    **dict.fromkeys(("ARMING_MIS_ITEMS", "MIXING_OFFSET"), 0.0),
+    "ARMING_CHECK": 1.0,
+    "MIXING_GAIN": 0.5,
+    **{f"SERVO{output}_FUNCTION": 0.0 for output in range(5, 33)},
+    "SERVO1_FUNCTION": 4.0,
+    "SERVO2_FUNCTION": 19.0,
+    "SERVO3_FUNCTION": 70.0,
+    "SERVO4_FUNCTION": 21.0,
     "ICE_IDLE_RPM": -1.0,
     "TKOFF_ACCEL_CNT": 1.0,
     "TKOFF_ALT": 50.0,
@@ -175,13 +208,20 @@ _WHEN_STATED = {
     # mAh; read for the battery failsafe alone.
     "BATT_CAPACITY": 3300.0,
 }
+# Names of some of them before 4.6, with the factor to the present unit.
+_OLD_NAMES = {"GPS1_TYPE": ("GPS_TYPE", 1.0), "GPS2_TYPE": ("GPS_TYPE2", 1.0)}
+# Parameters whose value in the aircraft's own file is what the aircraft needs, and no part of the set.
+_NEEDED_BY_AIRCRAFT = ("RLL_RATE_I", "RLL_RATE_D", "PTCH_RATE_I", "PTCH_RATE_D", "SCALING_SPEED")
 TABLE = ParameterTable(
     ARDUPILOT,
     "ArduPlane",
     DEFINITIONS,
     pairs=_PAIRS,
     orders=_ORDERS,
-    when_stated=[Definition(name, default, -math.inf, math.inf) for name, default in _WHEN_STATED.items()],
+    when_stated=[
+        Definition(name, default, -math.inf, math.inf, old=_OLD_NAMES.get(name))
+        for name, default in _WHEN_STATED.items()
+    ],
 )
 
 
@@ -384,6 +424,12 @@ class ArduPilotParameters(ParameterSet):
         object.__setattr__(self, "altitude_slope_min", self.altitude_slope_min or math.inf)
 
     @classmethod
+    def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
+        """Return the values in the aircraft's file that the control law reads, or that leave a verdict open."""
+        values, _ = cls.table.read(entries)
+        return {name: value for name, value in values.items() if name not in _NEEDED_BY_AIRCRAFT}
+
+    @classmethod
     def _known_in_release(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
         """Return the sources without parameters that 4.6 does not have, and the names of those in the file."""
         if not fields or fields[0] != "4.6":
@@ -465,6 +511,7 @@ class ArduPilotParameters(ParameterSet):
         record: Record = np.zeros(1, ARDUPILOT_PARAMETERS)[0]
         for name in DEFINITIONS:
             setattr(record, name, getattr(self, name))
+        record.roll_rate_max = math.radians(self["RLL2SRV_RMAX"]) or math.inf
         record.is_4_7 = self.version != "4.6"
         return record
 

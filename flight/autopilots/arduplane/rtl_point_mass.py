@@ -344,7 +344,7 @@ def fly_stages(
     roll_fraction = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
     pitch_fraction = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
     path_fraction = 1.0 - math.exp(-dt / _PATH_LAG_S)
-    stage, energy = 0, 0.0
+    stage, energy, max_roll_change = 0, 0.0, parameters.roll_rate_max * dt
     for tick in range(int(timeout / dt)):
         time = tick * dt
         if tick % KEPT_EVERY == 0:
@@ -375,7 +375,7 @@ def fly_stages(
         else:
             _update_demands(state, estimated, waypoints, parameters, memory, aircraft, excesses, eas2tas, glides, dt)
         nav_roll = limited_nav_roll(memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters)
-        state.roll += roll_fraction * (nav_roll - state.roll)
+        state.roll += min(max_roll_change, max(-max_roll_change, roll_fraction * (nav_roll - state.roll)))
         pitch += pitch_fraction * (memory.pitch_demand + parameters.pitch_trim - pitch)
         path_angle += path_fraction * (pitch - angle_of_attack(state, aircraft) - path_angle)
         throttle = 0.0 if engine_out else memory.throttle_demand

@@ -83,7 +83,8 @@ _MEASURED = {"BATT_MONITOR": 4.0, "BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 0.0
 _UNMEASURED = {"BATT_MONITOR": 0.0}
 # Prefixes of the user's parameters for flight; others belong to the hardware of the file.
 FLYING = (
-    *("NAVL1_", "WP_", "TECS_", "AIRSPEED_", "ROLL_LIMIT_DEG", "PTCH_", "RLL_", "YAW_", "YAW2SRV_", "KFF_", "THR_"),
+    *("NAVL1_", "WP_", "TECS_", "AIRSPEED_", "ROLL_LIMIT_DEG", "PTCH_", "PTCH2SRV_", "RLL_", "RLL2SRV_", "YAW_"),
+    *("YAW2SRV_", "KFF_", "THR_"),
     *("TRIM_THROTTLE", "SCALING_SPEED", "STALL_PREVENTION", "GLIDE_SLOPE_", "RTL_", "STAB_PITCH_DOWN", "LEVEL_ROLL_"),
     *("ALT_SLOPE_", "CLIMB_SLOPE_HGT", "RALLY_LIMIT_KM", "RALLY_INCL_HOME", "ARSPD_USE", "MIS_OPTIONS"),
     *("FLIGHT_OPTIONS", "TKOFF_", "LAND_", "USE_REV_THRUST", "ACRO_", "GUIDED_", "MIN_GROUNDSPEED", "AHRS_WIND_MAX"),

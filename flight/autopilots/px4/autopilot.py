@@ -25,6 +25,7 @@ from flight.autopilots.parts import (
 )
 from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
 from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
+from flight.autopilots.px4.open_settings import describe_open_settings
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
@@ -67,6 +68,17 @@ _NEUTRAL = {
     # Slower changes of pitch than simulated (`FixedwingAttitudeControl`).
     "FW_P_RMAX_POS": _NeutralRange(60.0, math.inf),
     "FW_P_RMAX_NEG": _NeutralRange(60.0, math.inf),
+    # No roll at all: 0 is no exception in `RollController::control_roll`.
+    "FW_R_RMAX": _NeutralRange(1e-9, math.inf),
+    # A yaw rate below that of a turn, against which the rudder then steers (`YawController::control_yaw`).
+    "FW_Y_RMAX": _NeutralRange(20.0, math.inf),
+    # No position: estimator, GPS, and a vehicle that is not armed.
+    "EKF2_EN": _NeutralRange(1.0, 1.0, by_program=False),
+    "SYS_HAS_GPS": _NeutralRange(1.0, math.inf, by_program=False),
+    "SYS_HITL": _NeutralRange(0.0, 0.0, by_program=False),
+    "COM_ARMABLE": _NeutralRange(1.0, math.inf, by_program=False),
+    # Altitude from range finder or vision.
+    "EKF2_HGT_REF": _NeutralRange(0.0, 1.0, by_program=False),
 }
 # Part of an RTL that is not flown, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
@@ -206,6 +218,7 @@ class Px4(Autopilot):
             if not neutral.lowest <= parameters[name] <= neutral.highest and not (by_program and neutral.by_program)
         ]
         ending_texts += self._describe_endings(mission)
+        changing_texts += describe_open_settings(parameters, mission.aircraft, by_program=by_program)
         return [*ending_texts, *changing_texts, *([] if by_program else self._describe_mission_settings(mission))]
 
     def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:

@@ -167,6 +167,22 @@ _WHEN_STATED = {
     "FW_T_THR_LOW_HGT": -1.0,
     "GF_PREDICT": 0.0,
     "MIS_COMMAND_TOUT": 0.0,
+    "FW_Y_RMAX": 50.0,
+    # Gains of the rate controllers.
+    **dict.fromkeys(("FW_RR_FF", "FW_PR_FF"), 0.5),
+    **dict.fromkeys(("FW_RR_I", "FW_PR_I"), 0.1),
+    **dict.fromkeys(("FW_RR_D", "FW_PR_D"), 0.0),
+    "FW_RR_P": 0.05,
+    "FW_PR_P": 0.08,
+    # Position, altitude and arming.
+    **dict.fromkeys(("COM_ARMABLE", "EKF2_BARO_CTRL", "EKF2_EN", "EKF2_HGT_REF", "SYS_HAS_BARO", "SYS_HAS_GPS"), 1.0),
+    **dict.fromkeys(("CYPHAL_ENABLE", "GPS_2_CONFIG", "SEP_PORT1_CFG", "SYS_HITL", "UAVCAN_ENABLE"), 0.0),
+    **dict.fromkeys(("SENS_EN_GPSSIM", "SIM_GZ_EN"), 0.0),
+    "EKF2_GPS_CTRL": 7.0,
+    "GPS_1_CONFIG": 201.0,
+    # Surfaces and motors.
+    **dict.fromkeys(("CA_AIRFRAME", "CA_ROTOR_COUNT", "CA_SV_CS_COUNT"), 0.0),
+    **{f"CA_SV_CS{surface}_TYPE": 0.0 for surface in range(8)},
     "NAV_MIN_GND_DIST": -1.0,
 }
 TABLE = ParameterTable(

@@ -1,13 +1,12 @@
 """Collect PX4's parameters for a flight from the simulation, the aircraft, and, with priority, the user."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.parameter_files import LONGEST_NAME, read_parameter_file
-from flight.autopilots.parameter_set import AIRCRAFT_FILE
+from flight.autopilots.px4.open_settings import rate_gains
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.autopilots.px4_sitl.physics import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flight.simulation.setup import FlightSetup
@@ -60,17 +59,6 @@ SIMULATION = {
     "FW_YR_P": 0.05,
     "FW_YR_I": 0.05,
 }
-# ArduPlane's gains of an aircraft that PX4 has under another name.  ArduPlane's give degrees, of 45, per degree a
-# second, PX4's fractions of the throw per radian a second; both apply at cruise speed.
-_GAIN_NAMES = {
-    "RLL_RATE_FF": "FW_RR_FF",
-    "RLL_RATE_P": "FW_RR_P",
-    "RLL_RATE_I": "FW_RR_I",
-    "PTCH_RATE_FF": "FW_PR_FF",
-    "PTCH_RATE_P": "FW_PR_P",
-    "PTCH_RATE_I": "FW_PR_I",
-}
-_GAIN_FACTOR = math.degrees(1.0) / 45.0
 # Prefixes of the user's parameters for flight; others belong to the hardware of the file.
 FLYING = ("FW_", "NPFG_", "NAV_ACC_RAD", "NAV_FW_", "NAV_LOITER_RAD", "NAV_MIN_", "RTL_", "MIS_", "WEIGHT_", "CS_")
 
@@ -106,20 +94,3 @@ def given_parameters(setup: FlightSetup, aircraft: Aircraft, law_parameters: Px4
     }
     changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
     return GivenParameters(base | flight_values, changed, tuple(sorted(user_values.keys() - flight_values.keys())))
-
-
-def rate_gains(aircraft: Aircraft) -> dict[str, float]:
-    """Return the gains of the rate controllers, from the aircraft's gains for ArduPlane.
-
-    Raises ParameterError if the file is invalid.
-
-    >>> from aircraft.catalog import load_aircraft
-    >>> round(rate_gains(load_aircraft("aerosonde"))["FW_RR_FF"], 2)
-    0.33
-    """
-    entries = read_parameter_file(aircraft.folder / AIRCRAFT_FILE)
-    return {
-        name: entries[arduplane_name].value * _GAIN_FACTOR
-        for arduplane_name, name in _GAIN_NAMES.items()
-        if arduplane_name in entries
-    }

@@ -12,10 +12,12 @@ longitudes, frames and numbers of items were refused when the file was read.
 import itertools
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from typing import Literal
 
 import numpy as np
 
+from aircraft.catalog import find_again
 from flight.autopilots.parts import FeasibilityLimits, MissionParts
 from flight.mission.commands import PASSED_OVER, Treatment, support_of
 from flight.mission.fences import fence_problem
@@ -45,6 +47,7 @@ from logs.verdict.tolerances import (
     PX4_WAYPOINT_SPACING_M,
 )
 from world.airfield import STEEPEST_STRIP_SLOPE
+from world.errors import FlightError
 from world.frames import GeoOrigin, to_map
 
 C = Command
@@ -209,6 +212,10 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
     items, procedures = setup.mission.items, setup.ground_phases
     commands = {item.command for item in items}
     pairs = itertools.pairwise(_flown_items(setup.mission))
+    aircraft = None
+    # The aircraft of a log may not be on this machine.
+    with suppress(FlightError):
+        aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
     return MissionParts(
         returns=C.NAV_RETURN_TO_LAUNCH in commands,
         has_return_path=C.DO_RETURN_PATH_START in commands,
@@ -224,6 +231,8 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         ),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
         wind=setup.scenario.wind.strongest(setup.route.waypoints[:, 2]),
+        commands=frozenset(commands),
+        aircraft=aircraft,
     )
 
 

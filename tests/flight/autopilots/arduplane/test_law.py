@@ -551,6 +551,16 @@ def test_a_bank_is_late_as_in_logs_of_arduplane() -> None:
     assert 0.1 / kept.bank_rate == pytest.approx(0.43, abs=0.015)
 
 
+@pytest.mark.parametrize(("limit", "expected"), [(5.0, 5.0), (0.0, 13.6), (90.0, 13.6)])
+def test_a_bank_changes_no_faster_than_rll2srv_rmax(limit: float, expected: float) -> None:
+    """`AP_RollController::get_servo_out`: deg/s, 0 for no limit; 0.1 rad in 0.42 s are 13.6 deg/s."""
+    kept, commands = record(GUIDANCE_MEMORY), record(COMMANDS)
+    own = memory(lateral_acceleration=-GRAVITY * math.tan(0.1))
+    made = parameters(KFF_RDDRMIX=0.3, RLL2SRV_RMAX=limit)
+    control_attitude(state(), flying(), even_gains(), kept, made, own, 1.0, commands, 1.0 / 60.0)
+    assert math.degrees(kept.bank_rate) == pytest.approx(-expected, rel=0.01)
+
+
 def test_a_pitch_is_followed_a_tenth_later_than_its_time_constant_says() -> None:
     """0.055 rad of 0.55 s are 0.1 rad/s, and at 25 m/s 2.5 m/s^2 upwards, as a path that asks for them."""
     commands, _ = followed(memory(pitch_demand=0.055), state())

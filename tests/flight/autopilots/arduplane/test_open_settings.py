@@ -2,8 +2,10 @@
 
 import pytest
 
+from aircraft.catalog import aircraft_names, load_aircraft
 from flight.autopilots.arduplane.open_settings import OPEN_SETTINGS, describe_open_settings
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane_sitl.process import load_aircraft_parameters
 from flight.autopilots.autopilot import StoredParameters
 from flight.autopilots.parts import MissionParts
 
@@ -47,6 +49,56 @@ ARSPD_WIND_MAX 0
 MIS_OPTIONS 0
 USE_REV_THRUST 2
 AIRSPEED_STALL 0
+RLL2SRV_RMAX 0
+RLL2SRV_TCONST 0.5
+PTCH2SRV_RMAX_UP 0
+PTCH2SRV_RMAX_DN 0
+PTCH2SRV_TCONST 0.5
+PTCH2SRV_RLL 1
+RLL_RATE_FF 0.345
+RLL_RATE_P 0.08
+RLL_RATE_I 0.15
+RLL_RATE_D 0
+RLL_RATE_IMAX 0.666
+RLL_RATE_FLTT 3
+RLL_RATE_FLTE 0
+PTCH_RATE_FF 0.345
+PTCH_RATE_P 0.04
+PTCH_RATE_I 0.15
+PTCH_RATE_D 0
+PTCH_RATE_IMAX 0.666
+PTCH_RATE_FLTT 3
+PTCH_RATE_FLTE 0
+SCALING_SPEED 15
+ARSPD_ENABLE 1
+ARSPD_TYPE 1
+ARSPD_PRIMARY 0
+ARSPD_USE 1
+ARSPD_RATIO 2
+ARSPD2_TYPE 0
+ARSPD2_USE 0
+AHRS_EKF_TYPE 3
+AHRS_GPS_USE 1
+EK3_ENABLE 1
+EK3_IMU_MASK 3
+EK3_SRC1_POSXY 3
+EK3_SRC1_POSZ 1
+EAHRS_TYPE 0
+GPS1_TYPE 1
+GPS2_TYPE 0
+GPS_AUTO_SWITCH 1
+GPS_PRIMARY 0
+INS_ENABLE_MASK 127
+COMPASS_ENABLE 1
+ARMING_CHECK 1
+ARMING_MIS_ITEMS 0
+MIXING_GAIN 0.5
+MIXING_OFFSET 0
+SERVO1_FUNCTION 4
+SERVO2_FUNCTION 19
+SERVO3_FUNCTION 70
+SERVO4_FUNCTION 21
+SERVO5_FUNCTION 0
 """
 
 
@@ -131,6 +183,108 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
 def test_settings_that_depend_on_others(text: str, mission: MissionParts, expected: str) -> None:
     assert len(said(text, mission)) == bool(expected)
     assert all(one.startswith(expected) for one in said(text, mission))
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [
+        ("PTCH2SRV_RLL 0", "PTCH2SRV_RLL 0"),
+        ("RLL_RATE_FLTT 0.2", "RLL_RATE_FLTT 0.2"),
+        ("PTCH_RATE_FLTE 0.2", "PTCH_RATE_FLTE 0.2"),
+        ("PTCH_RATE_IMAX 0", "PTCH_RATE_IMAX 0"),
+        ("MIXING_GAIN 0", "MIXING_GAIN 0"),
+        ("ARSPD_RATIO 0", "ARSPD_RATIO 0"),
+        # Airspeed sensors: the primary one, or else the first that there is.
+        ("ARSPD_TYPE 0", "ARSPD_TYPE 0 leaves no airspeed sensor"),
+        ("ARSPD_ENABLE 0", "ARSPD_ENABLE 0 leaves no airspeed sensor"),
+        ("ARSPD_TYPE 0\nARSPD2_TYPE 8\nARSPD2_USE 0", "ARSPD2_USE 0"),
+        ("ARSPD2_TYPE 8\nARSPD_PRIMARY 1\nARSPD2_USE 2", "ARSPD2_USE 2"),
+        ("ARSPD_PRIMARY 1\nARSPD_USE 0", "ARSPD_USE 0"),
+        ("ARSPD_TYPE 0\nARSPD2_TYPE 8\nARSPD2_USE 1", ""),
+        ("ARSPD_USE 0\nARSPD2_TYPE 8\nARSPD_PRIMARY 1\nARSPD2_USE 1", ""),
+        ("ARSPD2_TYPE 0\nARSPD_PRIMARY 1", ""),
+        # Position.
+        ("GPS1_TYPE 0", "GPS1_TYPE and GPS2_TYPE 0 leave no GPS"),
+        ("GPS_TYPE 0", "GPS1_TYPE and GPS2_TYPE 0 leave no GPS"),
+        ("GPS_TYPE 0\nGPS_TYPE2 9", ""),
+        ("GPS1_TYPE 0\nGPS2_TYPE 9", ""),
+        ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0", "GPS1_TYPE 0 leave no GPS"),
+        ("GPS1_TYPE 0\nGPS2_TYPE 9\nGPS_AUTO_SWITCH 0\nGPS_PRIMARY 1", ""),
+        ("AHRS_GPS_USE 0", "AHRS_GPS_USE 0"),
+        ("AHRS_EKF_TYPE 0", "AHRS_EKF_TYPE 0 estimates the position without EKF3"),
+        ("AHRS_EKF_TYPE 2\nEK3_ENABLE 0", ""),
+        ("EK3_ENABLE 0", "EK3_ENABLE 0 with AHRS_EKF_TYPE 3 leaves no position"),
+        ("AHRS_EKF_TYPE 11", "EAHRS_TYPE 0 with AHRS_EKF_TYPE 11 leaves no position"),
+        ("AHRS_EKF_TYPE 11\nEAHRS_TYPE 1\nEK3_ENABLE 0", ""),
+        ("EK3_SRC1_POSXY 0", "EK3_SRC1_POSXY 0"),
+        ("EK3_SRC1_POSZ 0", "EK3_SRC1_POSZ 0 takes the altitude neither"),
+        ("EK3_SRC1_POSZ 3", ""),
+        ("EK3_IMU_MASK 0", "EK3_IMU_MASK 0"),
+        ("INS_ENABLE_MASK 0", "INS_ENABLE_MASK 0"),
+        # A fixed wing takes its heading from its course where it has no compass.
+        ("COMPASS_ENABLE 0", ""),
+        # Arming: bits 3 and 6 require a take-off and a return.
+        ("ARMING_MIS_ITEMS 8", "ARMING_MIS_ITEMS 8 prevents arming without NAV_TAKEOFF"),
+        ("ARMING_MIS_ITEMS 64", ""),
+        ("ARMING_MIS_ITEMS 8\nARMING_CHECK 0", ""),
+        # Outputs: elevons on 77 and 78, a V-tail on 79 and 80, two motors on 73 and 74.
+        ("SERVO1_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no ailerons"),
+        ("SERVO2_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no elevator"),
+        ("SERVO3_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no motor"),
+        ("SERVO1_FUNCTION 77\nSERVO2_FUNCTION 78\nSERVO4_FUNCTION 0", ""),
+        ("SERVO2_FUNCTION 79\nSERVO4_FUNCTION 80", ""),
+        ("SERVO1_FUNCTION 0\nSERVO3_FUNCTION 73\nSERVO5_FUNCTION 74\nSERVO9_FUNCTION 4", ""),
+    ],
+)
+def test_what_leaves_no_airspeed_position_or_control(text: str, name: str) -> None:
+    mission = IN_THE_AIR._replace(commands=frozenset({16, 20}))
+    assert len(said(text, mission)) == bool(name)
+    assert all(one.startswith(name) for one in said(text, mission))
+
+
+@pytest.mark.parametrize(
+    ("text", "opens"),
+    [
+        # 45 degrees at 12 m/s turn with 9.80665 / 12 rad/s, of which sin 45 is pitch: 33.1 deg/s, and 10 more.
+        ("PTCH2SRV_RMAX_UP 43", True),
+        ("PTCH2SRV_RMAX_UP 44", False),
+        ("PTCH2SRV_RMAX_UP 43\nROLL_LIMIT_DEG 30", False),
+        ("PTCH2SRV_RMAX_DN 2", True),
+        ("PTCH2SRV_RMAX_DN 10", False),
+        ("RLL2SRV_RMAX 2", False),  # flown
+    ],
+)
+def test_a_pitch_rate_that_no_turn_can_have_leaves_the_verdict_open(text: str, opens: bool) -> None:
+    assert [one.startswith(text.splitlines()[0]) for one in said(text, IN_THE_AIR)] == [True] * opens
+    assert said(text, IN_THE_AIR, by_program=True) == []
+
+
+@pytest.mark.parametrize("name", aircraft_names())
+@pytest.mark.parametrize(
+    ("text", "faults"),
+    [
+        # The gains of the file over those that the aircraft's own file states.
+        ("", []),
+        ("RLL_RATE_FF {RLL_RATE_FF}\nRLL_RATE_P {RLL_RATE_P}\nRLL_RATE_I {RLL_RATE_I}", []),
+        ("RLL_RATE_FF 0.0001\nRLL_RATE_P 0.0001\nRLL_RATE_I 0.0001", ["RLL too low"]),
+        ("PTCH_RATE_FF 0.0001\nPTCH_RATE_P 0.0001\nPTCH_RATE_I 0.0001", ["PTCH too low"]),
+        ("RLL_RATE_FF 0\nRLL_RATE_P 0", ["RLL too low"]),
+        ("SCALING_SPEED 1", ["RLL too low", "PTCH too low"]),
+        ("RLL_RATE_P 20", ["RLL too high"]),
+        ("PTCH_RATE_I 50", ["PTCH too high"]),
+        ("PTCH_RATE_D 2", ["PTCH too high"]),
+        ("RLL2SRV_TCONST 0.05\nRLL_RATE_FF 0.5", ["RLL too high"]),
+        # The extremes of ArduPlane's automatic tuning.
+        ("RLL2SRV_TCONST 0.1\nPTCH2SRV_TCONST 0.1", []),
+        ("RLL2SRV_TCONST 1\nPTCH2SRV_TCONST 1", []),
+    ],
+)
+def test_gains_that_hold_no_attitude_leave_the_verdict_open(name: str, text: str, faults: list[str]) -> None:
+    aircraft = load_aircraft(name)
+    own = load_aircraft_parameters(aircraft)
+    made = ArduPilotParameters.of_text(text.format(**own) + "\nWP_RADIUS 60", "mine.param")
+    texts = describe_open_settings(made, MissionParts(aircraft=aircraft), by_program=False)
+    assert [one.split("_")[0] + one.split("gains")[1].split(" to ")[0] for one in texts] == faults
 
 
 def test_a_program_flies_its_own_settings_but_what_the_physics_lacks() -> None:

@@ -166,6 +166,18 @@ def test_it_is_mirrored_with_its_start() -> None:
         assert lefts[0][name] == pytest.approx(lefts[1][name], rel=1e-6)
 
 
+def test_a_slow_roll_turns_back_later() -> None:
+    """At 10 deg/s a bank of 30 deg is 1.5 s late and not 0.42 s, and it flies away for as long as it comes back.
+
+    At 2 deg/s it swings about its course, and does not arrive.
+    """
+    begin, circle = start(up=900.0, velocity_north=-26.0), ReturnCircle(0.0, 5000.0, 950.0, 200.0)
+    seconds = [float(returned(begin, circle, flat(100.0), RLL2SRV_RMAX=rate)["seconds"]) for rate in (0.0, 90.0, 10.0)]
+    assert seconds[0] == seconds[1]
+    assert seconds[2] - seconds[0] == pytest.approx(2.0 * (1.5 - 0.42), abs=1.0)
+    assert returned(begin, circle, flat(100.0), RLL2SRV_RMAX=2.0)["ended"] == RETURN_TIMEOUT
+
+
 def test_a_wall_that_is_higher_is_never_safer() -> None:
     circle, begin = ReturnCircle(0.0, 6000.0, 300.0, 120.0), start(up=900.0, velocity_north=26.0)
     ends = [returned(begin, circle, flat(height)) for height in (100.0, 295.0, 310.0, 600.0)]

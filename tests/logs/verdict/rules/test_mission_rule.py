@@ -347,7 +347,7 @@ def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
         ({"TERRAIN_FOLLOW": 16.0}, ("TERRAIN_FOLLOW 16",)),
         ({"MIN_GROUNDSPEED": 30.0}, ()),
         ({"ARSPD_USE": 0.0}, ("ARSPD_USE 0",)),
-        ({"RLL_RATE_P": 0.0, "RLL_RATE_FF": 0.0}, ("RLL_RATE_P 0 and RLL_RATE_FF 0",)),
+        ({"RLL_RATE_P": 0.0, "RLL_RATE_FF": 0.0}, ("RLL_RATE_P 0, RLL_RATE_I 0.2, RLL_RATE_D 0, RLL_RATE_FF 0",)),
         ({"PTCH_RATE_P": 0.0}, ()),
     ],
 )

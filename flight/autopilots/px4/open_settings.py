@@ -1,0 +1,119 @@
+"""Describe PX4's settings that leave an aircraft without a position, without control, or not armed.
+
+docs/px4-branches.md lists the functions that read them.
+"""
+
+import math
+from collections.abc import Iterator
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.parameter_files import read_parameter_file
+from flight.autopilots.parameter_set import AIRCRAFT_FILE
+from flight.autopilots.px4.parameters import Px4Parameters
+from flight.autopilots.rate_loop import RateGains, rate_gains_fault
+
+# Bits of EKF2_GPS_CTRL: position and altitude.
+_GPS_POSITION_BIT = 1 << 0
+_GPS_ALTITUDE_BIT = 1 << 1
+# Settings of which each that is not 0 connects a GPS, the last two in a simulator.
+_GPS_CONNECTIONS = (
+    *("GPS_1_CONFIG", "GPS_2_CONFIG", "SEP_PORT1_CFG", "UAVCAN_ENABLE", "CYPHAL_ENABLE"),
+    *("SENS_EN_GPSSIM", "SIM_GZ_EN"),
+)
+# Values of CA_SV_CSn_TYPE by the part that they move: ailerons; elevator, V-tails; elevons and custom surfaces both.
+_BOTH_AXES = (5.0, 6.0, 12.0)
+_SURFACES_BY_PART = {
+    "ailerons": (1.0, 2.0, 15.0, *_BOTH_AXES),
+    "elevator": (3.0, 7.0, 8.0, 13.0, 14.0, *_BOTH_AXES),
+}
+# CA_AIRFRAME of a fixed wing.
+_FIXED_WING = 1.0
+# ArduPlane's gains of an aircraft that PX4 has under another name.  ArduPlane's give degrees, of 45, per degree a
+# second, PX4's fractions of the throw per radian a second; both apply at cruise speed.
+_GAIN_NAMES = {
+    "RLL_RATE_FF": "FW_RR_FF",
+    "RLL_RATE_P": "FW_RR_P",
+    "RLL_RATE_I": "FW_RR_I",
+    "PTCH_RATE_FF": "FW_PR_FF",
+    "PTCH_RATE_P": "FW_PR_P",
+    "PTCH_RATE_I": "FW_PR_I",
+}
+_GAIN_FACTOR = math.degrees(1.0) / 45.0
+
+
+def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None, *, by_program: bool) -> Iterator[str]:
+    """Describe the settings with such a value, without a full stop.
+
+    aircraft: None if it is not known here.
+    by_program: True if PX4's own program flies, which gets the gains of the rate controllers.
+    """
+    yield from _describe_estimate(parameters)
+    yield from _describe_outputs(parameters)
+    if not by_program:
+        yield from _describe_rate_gains(parameters, aircraft)
+
+
+def _describe_estimate(parameters: Px4Parameters) -> Iterator[str]:
+    """Describe settings with which EKF2 has no position or no altitude."""
+    gps_bits = int(parameters["EKF2_GPS_CTRL"])
+    if not gps_bits & _GPS_POSITION_BIT:
+        yield f"EKF2_GPS_CTRL {gps_bits} takes no position from GPS, which is not flown"
+    has_barometer = parameters["EKF2_BARO_CTRL"] > 0.0 and parameters["SYS_HAS_BARO"] > 0.0
+    if not has_barometer and not gps_bits & _GPS_ALTITUDE_BIT:
+        yield f"EKF2_GPS_CTRL {gps_bits} without a barometer leaves no altitude, which is not flown"
+    if not any(parameters[name] for name in _GPS_CONNECTIONS):
+        yield "GPS_1_CONFIG 0 connects no GPS, which is not flown"
+
+
+def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
+    """Describe a control allocation that moves no ailerons, no elevator or no motor, if the file states it."""
+    stated = parameters.by_origin("file")
+    if parameters["CA_AIRFRAME"] != _FIXED_WING:
+        return
+    if stated.get("CA_ROTOR_COUNT", 1.0) == 0.0:
+        yield "CA_ROTOR_COUNT 0 leaves no motor, which is not flown"
+    names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(stated.get("CA_SV_CS_COUNT", 0.0)))]
+    if "CA_SV_CS_COUNT" in stated and stated.keys() >= set(names):
+        for part, types in _SURFACES_BY_PART.items():
+            if {stated[name] for name in names}.isdisjoint(types):
+                yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not flown"
+
+
+def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -> Iterator[str]:
+    """Describe gains of the file with which the aircraft does not follow its attitude.
+
+    ArduPlane's gains of the aircraft are assumed to suit the aircraft, and so are PX4's defaults.
+    """
+    own = {} if aircraft is None or not (aircraft.folder / AIRCRAFT_FILE).exists() else rate_gains(aircraft)
+    stated = parameters.by_origin("file")
+    for axis, time_constant in (("FW_RR", "FW_R_TC"), ("FW_PR", "FW_P_TC")):
+        names = [f"{axis}_{gain}" for gain in ("FF", "P", "I", "D")]
+        if stated.keys().isdisjoint((*names, time_constant)):
+            continue
+        default = parameters.table.by_name[names[0]].default
+        suitable = own.get(names[0]) or default
+        fault = rate_gains_fault(
+            RateGains(*(parameters[name] for name in names)),
+            (min(suitable, default), max(suitable, default)),
+            parameters[time_constant],
+        )
+        if fault:
+            gains_text = ", ".join(f"{name} {parameters[name]:g}" for name in [*names, time_constant])
+            yield f"{gains_text}: gains {fault} to hold the attitude, which is not flown"
+
+
+def rate_gains(aircraft: Aircraft) -> dict[str, float]:
+    """Return the gains of the rate controllers, from the aircraft's gains for ArduPlane.
+
+    Raises ParameterError if the file is invalid.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> round(rate_gains(load_aircraft("aerosonde"))["FW_RR_FF"], 2)
+    0.33
+    """
+    entries = read_parameter_file(aircraft.folder / AIRCRAFT_FILE)
+    return {
+        name: entries[arduplane_name].value * _GAIN_FACTOR
+        for arduplane_name, name in _GAIN_NAMES.items()
+        if arduplane_name in entries
+    }
