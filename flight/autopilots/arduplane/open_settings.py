@@ -263,8 +263,11 @@ def _describe_estimate(values: Mapping[str, float]) -> Iterator[str]:
 
 def _describe_arming(values: Mapping[str, float], mission: MissionParts) -> Iterator[str]:
     """Describe an item that the mission lacks, and without which ArduPlane does not arm."""
+    # 4.7 has ARMING_SKIPCHK for ARMING_CHECK.
+    if values["ARMING_CHECK"] == 0.0 or values["ARMING_SKIPCHK"] != 0.0:
+        return
     for bit, command in _ITEMS_FOR_ARMING.items():
-        if values["ARMING_CHECK"] and int(values["ARMING_MIS_ITEMS"]) & bit and command not in mission.commands:
+        if int(values["ARMING_MIS_ITEMS"]) & bit and command not in mission.commands:
             yield f"ARMING_MIS_ITEMS {values['ARMING_MIS_ITEMS']:g} prevents arming without {command.name}"
 
 

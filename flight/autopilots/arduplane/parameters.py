@@ -193,7 +193,7 @@ _WHEN_STATED = {
     **dict.fromkeys(("AHRS_EKF_TYPE", "EK3_IMU_MASK", "EK3_SRC1_POSXY"), 3.0),
     "INS_ENABLE_MASK": 127.0,
     # Arming and outputs.
-    **dict.fromkeys(("ARMING_MIS_ITEMS", "MIXING_OFFSET"), 0.0),
+    **dict.fromkeys(("ARMING_MIS_ITEMS", "ARMING_SKIPCHK", "MIXING_OFFSET"), 0.0),
     "ARMING_CHECK": 1.0,
     "MIXING_GAIN": 0.5,
     **{f"SERVO{output}_FUNCTION": 0.0 for output in range(5, 33)},

@@ -227,6 +227,7 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("ARMING_MIS_ITEMS 8", "ARMING_MIS_ITEMS 8 prevents arming without NAV_TAKEOFF"),
         ("ARMING_MIS_ITEMS 64", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_CHECK 0", ""),
+        ("ARMING_MIS_ITEMS 8\nARMING_SKIPCHK -1", ""),
         # Outputs: elevons on 77 and 78, a V-tail on 79 and 80, two motors on 73 and 74.
         ("SERVO1_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no ailerons"),
         ("SERVO2_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no elevator"),

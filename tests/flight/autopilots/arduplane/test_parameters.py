@@ -103,7 +103,7 @@ def test_the_edges_of_a_range_are_taken() -> None:
 def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path: Path) -> None:
     aircraft: Aircraft = replace(load_aircraft("aerosonde"), folder=tmp_path)
     assert ArduPilotParameters.load(aircraft) == ArduPilotParameters.defaults()
-    (tmp_path / "ardupilot.parm").write_text("WP_RADIUS 70\nROLL_LIMIT_DEG 30\nSERVO1_FUNCTION 4\n", encoding="utf-8")
+    (tmp_path / "ardupilot.parm").write_text("WP_RADIUS 70\nROLL_LIMIT_DEG 30\nSERVO1_TRIM 1500\n", encoding="utf-8")
     mine = tmp_path / "mine.param"
     mine.write_text("WP_RADIUS 50\nSERIAL1_BAUD 57\n", encoding="utf-8")
     found = ArduPilotParameters.load(aircraft, mine)
@@ -117,7 +117,7 @@ def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path:
 def test_the_record_holds_every_field() -> None:
     found = ArduPilotParameters.of_text(NEW, "a")
     record = found.record()
-    assert field_names(ARDUPILOT_PARAMETERS) == (*DEFINITIONS, "is_4_7")
+    assert field_names(ARDUPILOT_PARAMETERS) == (*DEFINITIONS, "roll_rate_max", "is_4_7")
     assert all(record[name] == getattr(found, name) for name in DEFINITIONS)
     assert record.dtype == ARDUPILOT_PARAMETERS
     assert np.isfinite([record[name] for name in DEFINITIONS]).all()
