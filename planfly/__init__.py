@@ -21,6 +21,7 @@ play_to_foxglove, play_to_stations   the same in other programs
 import_log, refly, recover           another program's log; its mission flown in JSBSim; a damaged log
 guess_columns                        a table of columns, by which CSV, MAT, Parquet and HDF5 files are logs
 returns                              will it come home, from everywhere on its way
+link                                 the radio link to the ground station along a flight
 survey                               how much of each photo line of a survey can be used, and what would help
 campaign, campaign_flight, winds     how likely success is; the largest wind from each direction
 serve                                a MAVLink vehicle for ground stations
@@ -84,6 +85,8 @@ if TYPE_CHECKING:
     from planfly.api.imported import import_log as import_log
     from planfly.api.imported import recover as recover
     from planfly.api.imported import refly as refly
+    from planfly.api.linking import LinkResult as LinkResult
+    from planfly.api.linking import link as link
     from planfly.api.making_scenarios import make_scenario as make_scenario
     from planfly.api.optimising import BestFound as BestFound
     from planfly.api.optimising import Optimiser as Optimiser
@@ -190,6 +193,10 @@ _HOMES = {
             "import_log",
             "recover",
             "refly",
+        ),
+        "planfly.api.linking": (
+            "LinkResult",
+            "link",
         ),
         "planfly.api.making_scenarios": ("make_scenario",),
         "planfly.api.optimising": (

@@ -39,6 +39,7 @@ from world.scenario_tables import (
     AreaTable,
     FlightTable,
     LimitsTable,
+    LinkTable,
     OriginTable,
     PlannerTable,
     ScenarioFile,
@@ -468,6 +469,26 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
         turbulence=spec.wind.turbulence,
     )
     return replace(scenario, spec=spec, wind=wind)
+
+
+def with_link(scenario: Scenario, **entries: Any) -> Scenario:
+    """Return a scenario with other entries of [link]; None keeps the present value.
+
+    A position in degrees replaces a position in metres.  Raises ScenarioError for an entry that is not allowed in a
+    scenario file, and for a link without frequency, power or sensitivity.
+
+    >>> linked = with_link(load_scenario("tight"), frequency_mhz=1000.0, power_dbm=20.0, sensitivity_dbm=-90.0)
+    >>> linked.link.allowed_loss
+    100.0
+    """
+    table = scenario.spec.link
+    changes = {name: value for name, value in entries.items() if value is not None}
+    stated = {} if table is None else table.model_dump(exclude_none=True)
+    if "lat_deg" in changes:
+        stated = {name: value for name, value in stated.items() if name not in ("east_m", "north_m")}
+    new_table = checked_table(lambda: LinkTable(**(stated | changes)), f"{scenario.name}: link")
+    link = make_link(new_table, scenario.name, scenario.origin, scenario.terrain)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"link": new_table}), link=link)
 
 
 def with_flight(scenario: Scenario, **changes: Any) -> Scenario:

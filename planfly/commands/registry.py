@@ -58,6 +58,7 @@ COMMANDS = (
     Command("serve", _PLAN_AND_FLY),
     Command("check", _JUDGE_AND_SHOW, "verdict_answers.CheckDocument"),
     Command("returns", _JUDGE_AND_SHOW, "returns_answers.ReturnsAnswer"),
+    Command("link", _JUDGE_AND_SHOW, "link_answers.LinkAnswer"),
     Command("survey", _JUDGE_AND_SHOW, "survey_answers.SurveyAnswer"),
     Command("report", _JUDGE_AND_SHOW, "ReportAnswer"),
     Command("compare", _JUDGE_AND_SHOW, "CompareAnswer"),

@@ -20,6 +20,7 @@ FUNCTIONS = {
     "serve": ("serve",),
     "check": ("judge", "fly_by_each"),
     "returns": ("returns",),
+    "link": ("link",),
     "survey": ("survey",),
     "report": ("report", "foxglove_layout"),
     "compare": ("compare",),

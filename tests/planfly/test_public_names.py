@@ -28,6 +28,7 @@ VERBS = {
         "judge",
         "read_log",
         "returns",
+        "link",
         "survey",
         "figures",
         "report",

@@ -26,6 +26,7 @@ SHORT = """QGC WPL 110
 2 0 3 16 0 0 0 0 46 8.01 100 1
 3 0 3 16 0 0 0 0 46.004 8.01 100 1
 """
+_RADIO = ("--frequency", "915", "--power", "20", "--sensitivity", "-100")
 _AREA = ("--box", "36.25,-84.3,36.3,-84.2")
 _CAMPAIGN = ("short.waypoints", "--scenario", "field.toml", "--workers", "1", "--out", "out")
 
@@ -61,6 +62,7 @@ EVERY = {
         Given(("serve", "--scenario", "field.toml", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")),
         Given(("check", "flight.mcap", "--json", "new.json"), (0, 4), "new.json"),
         Given(("returns", "plan.json", "--every", "20", "--json", "new.json"), (0, 4), "new.json"),
+        Given(("link", "flight.mcap", *_RADIO, "--json", "new.json"), (0, 3, 4), "new.json"),
         Given(("survey", "lines.waypoints", "--aircraft", "x8", "--out", "out"), (0, 4), "out"),
         Given(("report", "flight.mcap", "--out", "out"), (0, 4), "out"),
         Given(("compare", "flight.mcap", "flight.mcap", "--out", "out"), target="out"),

@@ -1,0 +1,156 @@
+"""Judge the radio link between a ground station and an aircraft along a mission or a flight."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Unpack
+
+from flight.simulation.setup import FlightSetup
+from logs.recording.reader import FlightLog
+from logs.verdict.findings import Finding
+from logs.verdict.measures.link_outages import LinkAlongPath, link_along_path, station_antenna
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.rules.link_rule import link_findings
+from logs.views.charts import Chart, Panel, series
+from planfly.api.flying import FlownMission, judge
+from planfly.arguments import check_arguments
+from planfly.flight_options import LogOptions, takes_options
+from planfly.kernel_units.unit_kernels import FLYING
+from planfly.runtime.first_start import with_warm_up
+from planfly.runtime.stages import stage
+from planfly.workflow.output_paths import LINK_FILES, check_output_folder, clean_folder
+from planner.plan import Plan
+from world.errors import ArgumentError
+from world.files import write_whole
+from world.scenario import with_link
+
+# Entries of [link] that a scenario without this table needs.
+_NEEDED = ("frequency", "power", "sensitivity")
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class LinkResult:
+    """Result of `planfly.link`.
+
+    setup: the flown mission, in a scenario with the link.
+    finding: the verdict's finding on the link.
+    along: the link once a second along the flight; None if it cannot be computed.
+    files: files written; empty if no folder was named.
+    """
+
+    setup: FlightSetup
+    finding: Finding
+    along: LinkAlongPath | None = None
+    files: tuple[Path, ...] = ()
+
+    @property
+    def outage_lines(self) -> tuple[str, ...]:
+        """Description of each outage, by time."""
+        if self.along is None:
+            return ()
+        lines = []
+        for outage in self.along.outages:
+            is_lost = (self.along.time >= outage.start) & (self.along.time <= outage.end)
+            margin = self.along.points.margin[is_lost]
+            worst_text = f", at worst {-float(margin.min()):.1f} dB" if margin.size else ""
+            lines.append(
+                f"{outage.start:.0f} to {outage.end:.0f} s: {outage.duration:.0f} s below the fade margin{worst_text}"
+            )
+        return tuple(lines)
+
+    def __repr__(self) -> str:
+        return f"<LinkResult {self.setup.scenario.name}: {self.finding.reason}>"
+
+
+@with_warm_up(*FLYING)
+@takes_options
+def link(
+    what: FlightLog | FlownMission | Plan | str | Path,
+    *,
+    frequency: float | None = None,
+    power: float | None = None,
+    sensitivity: float | None = None,
+    station: tuple[float, float] | None = None,
+    antenna: float | None = None,
+    fade_margin: float | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = True,
+    **options: Unpack[LogOptions],
+) -> LinkResult:
+    """Judge the radio link to the ground station along a flight; a plan or a mission is flown first.
+
+    what: a `Plan`, or the path of a plan.json, .waypoints or .plan; or a flight, which is a result of `planfly.fly`, a
+    flight log or its path, or an autopilot's log.
+    A scenario's [link] describes the link; these replace its entries, None keeps them:
+    frequency: MHz.  power: output of the transmitter, dBm.  sensitivity: of the receiver, dBm.
+    station: latitude and longitude of the station's antenna; by default it stands at the mission's home.
+    antenna: height of that antenna above ground, m.  fade_margin: power to keep above the sensitivity, dB.
+    out: folder for a picture of the link over time; None writes none.  overwrite: True replaces it.
+    options: see `planfly.judge`.
+    Raises a `planfly.PlanflyError` for bad input, and for a scenario without [link] if frequency, power or sensitivity
+    is missing.
+
+    >>> import planfly
+    >>> flown = planfly.fly(planfly.plan("jacksboro-air", seed=1))
+    >>> found = planfly.link(flown, frequency=915, power=27, sensitivity=-105, station=(36.3, -84.2))
+    >>> found.finding.ok
+    False
+    """
+    entries: dict[str, Any] = {
+        "frequency_mhz": frequency,
+        "power_dbm": power,
+        "sensitivity_dbm": sensitivity,
+        "lat_deg": None if station is None else station[0],
+        "lon_deg": None if station is None else station[1],
+        "antenna_m": antenna,
+        "fade_margin_db": fade_margin,
+    }
+    check_arguments(frequency=frequency, power=power, sensitivity=sensitivity, antenna=antenna, fade_margin=fade_margin)
+    if out is not None:
+        check_output_folder(Path(out), overwrite)
+    judged = judge(what, **options)
+    if judged.setup.scenario.link is None:
+        given = dict(zip(_NEEDED, (frequency, power, sensitivity), strict=True))
+        missing = next((name for name, value in given.items() if value is None), None)
+        if missing is not None:
+            raise ArgumentError.of_argument(missing, "", "expected a number, or a scenario with [link]")
+    setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries))
+    with stage("computing the radio link"):
+        requirements = route_requirements(setup)
+        aligned = None if judged.track is None else align_track(requirements, judged.track)
+        (finding,) = link_findings(requirements, aligned)
+        along = _flown_link(setup, judged.track)
+    if out is None or along is None:
+        return LinkResult(setup, finding, along)
+    # Imported here: only a picture needs matplotlib.
+    from logs.views.drawing import draw_chart, png_bytes
+
+    folder = clean_folder(Path(out), LINK_FILES, overwrite=overwrite)
+    write_whole(folder / LINK_FILES[0], png_bytes(draw_chart(_link_chart(setup, along))))
+    return LinkResult(setup, finding, along, (folder / LINK_FILES[0],))
+
+
+def _flown_link(setup: FlightSetup, track: Any) -> LinkAlongPath | None:
+    """Return the link along a track; None without a track, a terrain or a known position of the station."""
+    scenario = setup.scenario
+    if track is None or not len(track) or scenario.terrain is None or scenario.link is None:
+        return None
+    antenna = station_antenna(setup, scenario.link, scenario.terrain)
+    if antenna is None:
+        return None
+    return link_along_path(scenario.link, scenario.terrain, antenna, track.time, track.position)
+
+
+def _link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
+    """Return the margin, the distance and the Fresnel clearance over time."""
+    points = along.points
+
+    def panel(title: str, unit: str, values: Any, limits: tuple[tuple[str, float], ...] = ()) -> Panel:
+        return Panel(title, unit, (series("flown", "flown", along.time, values),), limits=limits)
+
+    panels = (
+        panel("margin over the fade margin", "dB", points.margin, (("required", 0.0),)),
+        panel("diffraction loss over the terrain", "dB", points.diffraction_loss),
+        panel("distance from the station", "km", points.distance / 1000.0),
+    )
+    return Chart(f"{setup.scenario.name}: the radio link", "time since the start", "s", panels, timed=True)

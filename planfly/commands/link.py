@@ -1,0 +1,101 @@
+"""``planfly link``: judge the radio link between a ground station and an aircraft along a flight."""
+
+import argparse
+from typing import TYPE_CHECKING
+
+import planfly
+from planfly.commands.check import LOGS
+from planfly.terminal.arguments import (
+    IMPORTED_LOG_SUFFIXES,
+    MISSION_SUFFIXES,
+    file_completer,
+    number_parser,
+    parse_position,
+    with_completer,
+)
+from planfly.terminal.command_parser import LineParser, colour_text
+from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.options import (
+    aircraft_and_wind_options,
+    call_api,
+    imported_log_options,
+    result_options,
+    steering_options,
+    world_options,
+)
+from planfly.terminal.output import write_json_if_requested
+
+if TYPE_CHECKING:
+    from planfly import LinkResult
+
+
+def link_options(command_line: LineParser) -> None:
+    """Add the parser of ``planfly link``."""
+    parser = command_line.command(
+        "link",
+        "compute the radio link to the ground station along a flight: margin, line of sight, outages behind the"
+        " terrain, and what the autopilot does when the link is lost",
+        "planfly link mission.waypoints --terrain jacksboro --frequency 915 --power 27 --sensitivity -105",
+        "planfly link flight.mcap --scenario mine.toml --out pictures",
+    )
+    with_completer(
+        parser.add_argument(
+            "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
+        ),
+        file_completer(*MISSION_SUFFIXES, "mcap", *IMPORTED_LOG_SUFFIXES),
+    )
+    group = parser.group("the link (each replaces an entry of the scenario's [link])")
+    for name, unit, text in (
+        ("frequency", "MHZ", "frequency, MHz"),
+        ("power", "DBM", "output of the transmitter, dBm"),
+        ("sensitivity", "DBM", "power at which the receiver still works, dBm"),
+        ("antenna", "M", "height of the station's antenna above ground, m (default: 3)"),
+        ("fade_margin", "DB", "power that the link has to keep above the sensitivity, dB (default: 10)"),
+    ):
+        group.add_argument(f"--{name.replace('_', '-')}", metavar=unit, type=number_parser(name), help=text)
+    group.add_argument(
+        "--station",
+        metavar="LAT,LON",
+        type=parse_position,
+        help="position of the station's antenna, degrees (default: the mission's home)",
+    )
+    imported_log_options(parser)
+    world_options(parser)
+    aircraft_and_wind_options(parser)
+    steering_options(parser).add_argument(
+        "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
+    )
+    result_options(parser, "folder for a picture of the link over time (default: none)")
+
+
+def link(args: argparse.Namespace) -> int:
+    """Judge the link; the exit code is 0 if it is kept, 4 if it is lost for too long, and 3 if it is not known."""
+    from logs.verdict.conditions import flown_lines, setup_conditions
+
+    result = call_api(planfly.link, args)
+    ok = result.finding.ok
+    code = LOSS if ok is None else FLYABLE if ok else NOT_FLYABLE
+    print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")
+    for text in (*flown_lines(setup_conditions(result.setup)), *result.outage_lines):
+        print(f"  {text}")
+    for path in result.files:
+        print(f"  written {path}")
+    write_json_if_requested(args, lambda: _json_answer(str(args.what), result, code))
+    return code
+
+
+def _json_answer(source: str, result: "LinkResult", code: int) -> object:
+    from logs.verdict.conditions import setup_conditions
+    from planfly.terminal.link_answers import LinkAnswer, OutageEntry
+
+    outages = () if result.along is None else result.along.outages
+    return LinkAnswer(
+        exit_code=code,
+        what=source,
+        headline=result.finding.reason,
+        ok=result.finding.ok,
+        conditions=setup_conditions(result.setup),
+        facts={fact.what: fact.value for fact in result.finding.facts},
+        outages=[OutageEntry(first_s=round(outage.start, 2), last_s=round(outage.end, 2)) for outage in outages],
+        files=[str(path) for path in result.files],
+    )
