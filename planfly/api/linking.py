@@ -1,10 +1,11 @@
 """Judge the radio link between a ground station and an aircraft along a mission or a flight."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Unpack
 
 from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
 from logs.recording.reader import FlightLog
 from logs.verdict.findings import Finding
 from logs.verdict.measures.link_outages import LinkAlongPath, link_along_path, station_antenna
@@ -113,24 +114,29 @@ def link(
         given = dict(zip(_NEEDED, (frequency, power, sensitivity), strict=True))
         missing = next((name for name, value in given.items() if value is None), None)
         if missing is not None:
-            raise ArgumentError.of_argument(missing, "", "expected a number, or a scenario with [link]")
+            raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
     setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries))
-    with stage("computing the radio link"):
-        requirements = route_requirements(setup)
-        aligned = None if judged.track is None else align_track(requirements, judged.track)
-        (finding,) = link_findings(requirements, aligned)
-        along = _flown_link(setup, judged.track)
-    if out is None or along is None:
-        return LinkResult(setup, finding, along)
+    result = _judge_link(setup, judged.track)
+    if out is None or result.along is None:
+        return result
     # Imported here: only a picture needs matplotlib.
     from logs.views.drawing import draw_chart, png_bytes
 
-    folder = clean_folder(Path(out), LINK_FILES, overwrite=overwrite)
-    write_whole(folder / LINK_FILES[0], png_bytes(draw_chart(_link_chart(setup, along))))
-    return LinkResult(setup, finding, along, (folder / LINK_FILES[0],))
+    file = clean_folder(Path(out), LINK_FILES, overwrite=overwrite) / LINK_FILES[0]
+    write_whole(file, png_bytes(draw_chart(_link_chart(setup, result.along))))
+    return replace(result, files=(file,))
 
 
-def _flown_link(setup: FlightSetup, track: Any) -> LinkAlongPath | None:
+def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
+    """Judge the link of a setup's scenario along a track, or leave it open without a track."""
+    with stage("computing the radio link"):
+        requirements = route_requirements(setup)
+        aligned = None if track is None else align_track(requirements, track)
+        (finding,) = link_findings(requirements, aligned)
+        return LinkResult(setup, finding, _flown_link(setup, track))
+
+
+def _flown_link(setup: FlightSetup, track: Track | None) -> LinkAlongPath | None:
     """Return the link along a track; None without a track, a terrain or a known position of the station."""
     scenario = setup.scenario
     if track is None or not len(track) or scenario.terrain is None or scenario.link is None:
@@ -142,15 +148,15 @@ def _flown_link(setup: FlightSetup, track: Any) -> LinkAlongPath | None:
 
 
 def _link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
-    """Return the margin, the distance and the Fresnel clearance over time."""
+    """Return a chart of the margin over the fade margin, the diffraction loss and the distance over time."""
     points = along.points
 
     def panel(title: str, unit: str, values: Any, limits: tuple[tuple[str, float], ...] = ()) -> Panel:
         return Panel(title, unit, (series("flown", "flown", along.time, values),), limits=limits)
 
     panels = (
-        panel("margin over the fade margin", "dB", points.margin, (("required", 0.0),)),
-        panel("diffraction loss over the terrain", "dB", points.diffraction_loss),
-        panel("distance from the station", "km", points.distance / 1000.0),
+        panel("link margin", "dB", points.margin, (("required", 0.0),)),
+        panel("terrain loss", "dB", points.diffraction_loss),
+        panel("distance", "km", points.distance / 1000.0),
     )
     return Chart(f"{setup.scenario.name}: the radio link", "time since the start", "s", panels, timed=True)

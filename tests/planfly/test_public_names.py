@@ -68,6 +68,7 @@ RESULTS = {
     *(
         "Predicted",
         "Reflown",
+        "LinkResult",
         "ReturnsResult",
         "Round",
         "RunResult",
