@@ -54,18 +54,19 @@ def name_circle(noun: str, finding: Finding) -> str:
 
 
 def name_zone(noun: str, finding: Finding) -> str:
-    """Name a violated zone and the depth of the violation."""
+    """Name a violated zone, and the depth inside an exclusion zone or outside an inclusion zone."""
     if not finding.place.name:
         return name_excess(noun, finding)
     depth = max(finding.flown or 0.0, finding.planned or 0.0)
-    return f"{place_text(finding.place)} violated ({depth:.1f} m beyond it)"
+    side = "outside" if finding.place.kind == "inclusion" else "inside"
+    return f"{place_text(finding.place)} violated ({depth:.1f} m {side})"
 
 
 def name_missile(_noun: str, finding: Finding) -> str:
-    """Name the missile and the time inside its sphere; a missile without a name is "threat 3 (missile)"."""
+    """Name the missile and the time inside its range; a missile without a name is "threat 3 (missile)"."""
     place = place_text(finding.place)
     name = f"threat {place}" if finding.place.name else place
-    return f"{name} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside)"
+    return f"{name} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside its range)"
 
 
 def name_photo_line(noun: str, finding: Finding) -> str:

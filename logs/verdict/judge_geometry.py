@@ -126,10 +126,10 @@ _RULES_OF_PLACE = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings on course reversals that fail only if the aircraft turns to the other side.
+    """Return undecided findings at places that fail only if a course reversal is turned to one of its two sides.
 
-    A flight shows only one side, which depends on the navigation error of the day: of 12 ArduPlane flights through a
-    turn of 180 degrees, 4 turned left.
+    A flight shows only one side, which depends on the navigation error of that flight: of 12 ArduPlane flights through
+    a turn of 180 degrees, 4 turned left.
     """
     setup = requirements.setup
     corners = reversals(setup.route)
@@ -150,7 +150,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
     one_sided_findings = []
     for key in (failures_by_side[0].keys() ^ failures_by_side[1].keys()) - failed_keys:
         finding = failures_by_side[0].get(key) or failures_by_side[1][key]
-        brief = f"a reversal of the course at {corners_text} may turn to either side, and one side fails"
+        brief = f"the autopilot may turn left or right at {corners_text}, and on one side the flight fails"
         fault = message(brief, f": {finding.reason}")
         one_sided_findings.append(
             make_finding(finding.rule, finding.place, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)
@@ -159,7 +159,9 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
 
 
 def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Keep each rule's worst finding on the corners of a stop, and its worst finding on the stop's legs.
+    """Keep only each rule's worst finding on the corners of a stop, and its worst finding on the legs to the stop.
+
+    A stop is a waypoint or a loiter of the mission; a loiter is flown as several corners and legs.
 
     >>> from logs.verdict.places import Place
     >>> legs = [Place("leg", k, to_item=4, number=2) for k in (2, 3, 4)]

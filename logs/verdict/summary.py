@@ -146,7 +146,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
     for finding in findings:
         facts = {fact.what: fact.value for fact in finding.facts if finding.rule == "threat" and finding.ok}
         if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
-            notes.append(f"a missile missed by {facts['nearest']:.1f} m, less than the navigation error")
+            notes.append(f"passes {facts['nearest']:.1f} m outside a missile's range, less than the navigation error")
     return notes
 
 
@@ -194,7 +194,7 @@ def summary_lines(
 ) -> tuple[str, ...]:
     """Write the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings, levels.
 
-    levels: answers of all levels; the verdict's own is last and has the headline.
+    levels: answers of all levels; the last one is the verdict's own answer, whose headline is the first line.
     """
     *other_answers, own_answer = levels
     lines = [own_answer.headline, *_airframe_or_autopilot_lines(levels, deciding, setup)]
@@ -207,16 +207,16 @@ def summary_lines(
         if finding.ok is None and RULE_WORDS[finding.rule].explains_unjudged:
             reasons.setdefault(finding.rule, finding.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
-    # These are the autopilot's own limits, which say nothing about the aircraft.
+    # These limits are the autopilot's, and do not limit the aircraft.
     lines += [
-        f"PX4 would reject it: {finding.reason}"
+        f"PX4 would reject the mission: {finding.reason}"
         for finding in findings
         if finding.rule == "mission" and finding.ok is None and finding.check != NOT_FLOWN
     ]
     checks = setup.autopilot.checks
     missing_ends = missing_ends_text(setup.mission, checks.feasibility) if checks.dialect == "px4" else ""
     if missing_ends and not any(finding.rule == "mission" for finding in findings):
-        lines.append(f"PX4 would reject it: {missing_ends}")
+        lines.append(f"PX4 would reject the mission: {missing_ends}")
     lines += [
         f"{RULE_WORDS[finding.rule].title.capitalize()}: {finding.reason}"
         for finding in findings
@@ -243,12 +243,12 @@ def _airframe_or_autopilot_lines(
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
-    # Other parameters are flown by the law, whoever flew.
+    # Other parameter values are always tried with the simulated control law, even if the autopilot's program flew.
     by_law = setup.autopilot.program is not None
-    reason = "" if by_law or not parameters_note else ": it would pass with none of the parameter values tried"
+    reason = "" if by_law or not parameters_note else ": the flight fails with every parameter value that was tried"
     if deciding is not None:
         reason = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
-    return [f"The aircraft can fly this, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
+    return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
 def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
@@ -277,7 +277,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     )
     not_flown = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
     notes += f"; read but not simulated: {', '.join(not_flown)}" if not_flown else ""
-    notes += f"; beyond {setup.autopilot.title}'s documented ranges, but flown: {', '.join(parameters.beyond)}" * bool(
+    notes += f"; outside {setup.autopilot.title}'s documented ranges, but used: {', '.join(parameters.beyond)}" * bool(
         parameters.beyond
     )
     return [

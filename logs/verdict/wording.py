@@ -63,7 +63,7 @@ def change_text(change: Change) -> str:
     >>> change_text(Change("length", Place("leg", 1), 300.0, 400.0, "m"))
     'make leg 1 400 m long instead of 300 m'
     >>> change_text(Change("airspeed", Place("leg", 2), 36.0, 18.1, "m/s", most=31.5))
-    'command 18.1 to 31.5 m/s on leg 2'
+    'command an airspeed of 18.1 to 31.5 m/s on leg 2'
     >>> change_text(Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m"))
     'pass town 40 m further north'
     >>> change_text(Change("descent", Place("leg", 3), None, 12.0, "m"))
@@ -80,11 +80,13 @@ def change_text(change: Change) -> str:
         case "rise":
             return _rise_text(change)
         case "airspeed" if change.most is not None:
-            return f"command {requested_value:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
+            return (
+                f"command an airspeed of {requested_value:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
+            )
         case "airspeed":
-            return f"fly it at {requested_value:g} m/s instead of {change.current:g} m/s"
+            return f"{_airspeed_text(change)} instead of {change.current:g} m/s"
         case "turn":
-            return f"turn at most {requested_value:.1f}° there"
+            return f"turn at most {requested_value:.1f}° at {place_text(change.place)}"
         case "height" | "descent":
             step = f"{requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
             return f"fly {place_name} {step}" if change.place.kind == "leg" else f"pass {change.place.name} {step}"
@@ -92,7 +94,7 @@ def change_text(change: Change) -> str:
             verb = "stay in" if change.place.kind == "inclusion" else "pass"
             return f"{verb} {change.place.name} {requested_value:.0f} m further {change.what}"
         case "inset":
-            return f"bring the path {requested_value:.0f} m further inside"
+            return f"bring the path {requested_value:.0f} m further inside the area"
         case "distance":
             return f"pass {threat_text(change.place)} {requested_value:.0f} m further away"
     return _other_change_text(change)
@@ -117,8 +119,17 @@ def _other_change_text(change: Change) -> str:
     return f"use a {change.what} {requested_value:.2f} times as large"
 
 
+def _airspeed_text(change: Change) -> str:
+    """Name the place of a change of airspeed, and the new airspeed."""
+    if change.place.kind == "leg":
+        return f"fly {place_text_within(change.place)} at {change.wanted:g} m/s"
+    where = f" through {place_text(change.place)}" if change.place.kind == "waypoint" else ""
+    return f"fly{where} at {change.wanted:g} m/s"
+
+
 def _rise_text(change: Change) -> str:
-    verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "fall"
+    """Phrase a change of a leg's climb or descent as an instruction."""
+    verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "descend"
     if change.current is None:
         return f"{verb} {abs(change.wanted):.0f} m on {place_text(change.place)}"
     return (
@@ -127,8 +138,9 @@ def _rise_text(change: Change) -> str:
 
 
 def _length_text(change: Change) -> str:
+    """Name a leg, its new length, and its present length."""
     current = change.current or 0.0
-    comparison = "; it has no length now" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
+    comparison = " (now it is vertical)" if current < MIN_LEG_LENGTH_M else f" instead of {current:.0f} m"
     return f"{place_text_within(change.place)} {change.wanted:.0f} m long{comparison}"
 
 
@@ -149,7 +161,7 @@ def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
 
     >>> slower = Change("airspeed", Place("leg", 1), 25.0, 20.5, "m/s")
     >>> suggestions_text(((Change("length", Place("leg", 1), 300.0, 400.0, "m"),), (slower,)))
-    'make leg 1 400 m long instead of 300 m, or fly it at 20.5 m/s instead of 25 m/s'
+    'make leg 1 400 m long instead of 300 m, or fly leg 1 at 20.5 m/s instead of 25 m/s'
     """
     return ", or ".join(map(suggestion_text, suggestions))
 
@@ -173,18 +185,22 @@ def disagreement_text(disagreement: Disagreement) -> str:
 
 
 def deciding_text(deciding: DecidingParameter) -> str:
-    """Describe the deciding parameter, the effect of its value, and the value that would pass.
+    """Describe the autopilot parameter that decides, the effect of its value, and the value that would pass.
 
     >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
-    'TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass'
+    'with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass'
     """
     place_name, error = place_text(deciding.place), deciding.off
-    effect = f"fails {deciding.rule} at {place_name}"
+    effect = f"the flight fails {deciding.rule} at {place_name}"
     if error is not None and deciding.rule == "corridor":
-        effect = f"takes it {abs(error):.0f} m off {place_name}"
+        effect = f"the aircraft is {abs(error):.0f} m off {place_name}"
     elif error is not None:
-        effect = f"puts it {abs(error):.0f} m {'low' if error < 0.0 else 'high'} on {place_name}"
-    return f"{deciding.name} {deciding.current:g} {effect}; {deciding.passing:g} would pass"
+        effect = f"the aircraft is {abs(error):.0f} m too {'low' if error < 0.0 else 'high'} on {place_name}"
+    suffix = _unit_suffix(deciding.unit)
+    return (
+        f"with {deciding.name} {deciding.current:g}{suffix} {effect};"
+        f" with {deciding.passing:g}{suffix} the flight would pass"
+    )
 
 
 def gentle_launch_text(acceleration: float, trigger: tuple[float, str]) -> str:
@@ -214,7 +230,12 @@ def quantity_text(value: float, unit: str) -> str:
     >>> quantity_text(11.87, "deg"), quantity_text(1_140_000.0, "Wh")
     ('11.9°', '1140000 Wh')
     """
-    return _significant_digits(value, 3) + UNITS.get(unit, f" {unit}" if unit else "")
+    return _significant_digits(value, 3) + _unit_suffix(unit)
+
+
+def _unit_suffix(unit: str) -> str:
+    """Return the text of a unit after a number; "" without a unit."""
+    return UNITS.get(unit, f" {unit}" if unit else "")
 
 
 # Largest number of significant digits of two numbers that are compared.
@@ -236,7 +257,7 @@ def compared_texts(value: float, limit: float, unit: str) -> tuple[str, str]:
         and _significant_digits(value, digits) == _significant_digits(limit, digits)
     ):
         digits += 1
-    suffix = UNITS.get(unit, f" {unit}" if unit else "")
+    suffix = _unit_suffix(unit)
     return _significant_digits(value, digits) + suffix, _significant_digits(limit, digits) + suffix
 
 

@@ -29,6 +29,7 @@ def corridor_findings(
 
 
 def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
+    """Judge the greatest distance of the flight, or of the planned turns if ``geometric``, from a leg."""
     limit, source = corridor_limit(requirements, leg)
     planned_distance, flown_distance, ok = float(corner_depths(requirements)[leg : leg + 2].max()), math.nan, None
     faults, facts = [], []
@@ -37,7 +38,7 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         facts.append(f"its turns are planned within {planned_distance:.1f} m of the legs")
         if not ok:
             faults.append(
-                message(f"its turns lead {planned_distance:.0f} m off the legs", f"; the corridor is {limit:.0f} m")
+                message(f"its turns lead {planned_distance:.0f} m off the legs", f"; the corridor allows {limit:.0f} m")
             )
     elif aligned is None or not aligned.has_flown(leg):
         facts.append("the leg was not flown")
@@ -50,7 +51,7 @@ def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, 
         facts.append(f"within {flown_distance:.1f} m of the legs, the farthest {time_and_place}")
         if not ok:
             faults.append(
-                message(f"{flown_distance:.0f} m off the legs {time_and_place}", f"; the corridor is {limit:.0f} m")
+                message(f"{flown_distance:.0f} m off the legs {time_and_place}", f"; the corridor allows {limit:.0f} m")
             )
     return make_finding(
         "corridor",
@@ -85,6 +86,7 @@ def _rows_after_takeoff(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 
 def _time_and_place_text(aligned: AlignedTrack, row: int) -> str:
+    """Describe the time and the position of a row of the track."""
     east, north, _ = aligned.track.position[row]
     return f"at {aligned.track.time[row]:.1f} s, east {east:.0f} m, north {north:.0f} m"
 

@@ -52,7 +52,7 @@ def fence_findings(
     findings = []
     if airspace.fence_fault:
         findings.append(
-            make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fence_fault}")
+            make_finding("fence", MISSION, ok=None, reason=f"the mission's fence is not judged: {airspace.fence_fault}")
         )
     if not airspace.zones:
         return findings
@@ -128,13 +128,19 @@ def _compliance_finding(
 def _zone_finding(
     requirements: RouteRequirements, zone_number: int, planned_visit: Record, flown_visit: Record | None
 ) -> Finding:
+    """Judge the depth of the flight in a violation of one zone, or of the planned path if nothing was flown.
+
+    The finding is not judged if no violation is known and the terrain below the zone is unknown in places.
+    """
     airspace = requirements.airspace
     zone = airspace.zones[zone_number]
     visit = planned_visit if flown_visit is None else flown_visit
     ok: bool | None = visit.depth <= ROUNDING_M
     if ok and visit.unknown:
         ok = None
-    side_text, entry_text = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
+    side_text, entry_text, exit_text = ("inside", "enters it", "leaves it")
+    if zone.kind == "inclusion":
+        side_text, entry_text, exit_text = ("outside", "leaves it", "enters it again")
     faults, notes = [], []
     if visit.depth > ROUNDING_M:
         faults.append(
@@ -142,14 +148,14 @@ def _zone_finding(
                 f"{visit.depth:.1f} m {side_text}",
                 f" at {_event_text(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
                 f" {entry_text} at {_event_text(requirements, visit, 'entry')}"
-                f" and is back at {_event_text(requirements, visit, 'exit')}"
-                + (f"; {visit.entries} times" if visit.entries > 1 else ""),
+                f" and {exit_text} at {_event_text(requirements, visit, 'exit')}"
+                + (f"; {visit.entries} violations" if visit.entries > 1 else ""),
             )
         )
     elif visit.depth > 0.0:
-        notes.append("touches it")
+        notes.append("touches the zone's edge")
     if visit.unknown:
-        notes.append("the terrain from which its height is measured is unknown in places")
+        notes.append("the zone's limits are heights above ground, and the terrain is unknown in places")
     if flown_visit is not None and planned_visit.depth > ROUNDING_M:
         notes.append(
             f"the planned path is {planned_visit.depth:.1f} m {side_text}"

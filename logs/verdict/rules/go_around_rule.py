@@ -49,7 +49,7 @@ _MAX_HEIGHT_M = 1000.0
 _ABORT_SPACING_M = 50.0
 # Maximum number of simulated abort places.
 _MAX_ABORT_PLACES = 12
-_NO_HEIGHT_TEXT = "no height would be sufficient"
+_NO_HEIGHT_TEXT = f"no climb up to {_MAX_HEIGHT_M:.0f} m above home would be sufficient"
 # Pitch of the climb if the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
 _CLIMB_PITCH_RAD = math.radians(10.0)
 
@@ -247,8 +247,8 @@ def _go_around_finding(
     requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool
 ) -> Finding:
     place, height = requirements.waypoint(landing.waypoint), landing.climb_height
-    climb_text = f"it climbs to {height:.0f} m over home"
-    climb_text += f", which is {landing.home_altitude + height - landing.ground_altitude:.0f} m over the landing point"
+    climb_text = f"the aircraft climbs to {height:.0f} m above home"
+    climb_text += f", which is {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
     # A go-around flies to no rally point.
     setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
@@ -265,7 +265,7 @@ def _go_around_finding(
         "climb above ground", min((go_around.min_climb_height for go_around in go_arounds), default=math.inf), "m"
     )
     if worst is None or (unknown_text and worst.is_free):
-        unknown_text = unknown_text or "its glide is below the ground, or the terrain below it is unknown"
+        unknown_text = unknown_text or "the glide is below the ground, or the terrain below the glide is unknown"
         unjudged = message("a go-around is not judged", f": {climb_text}; {unknown_text}")
         check = GROUND_PATH if is_required else ""
         return make_finding(
@@ -275,7 +275,10 @@ def _go_around_finding(
         fault = message(f"{climb_text}; at least {worst.lowest_height:.0f} m above ground on the way back")
     else:
         sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.abort_distance)
-        remedy_text = f"{sufficient_height:.0f} m would be sufficient (parameter 1 of item {landing.item.seq})"
+        remedy_text = (
+            f"a climb to {sufficient_height:.0f} m above home would be sufficient"
+            f" (parameter 1 of item {landing.item.seq})"
+        )
         fault = message(
             _brief_outcome(worst),
             f": {climb_text}, and {_outcome_text(worst)};"
@@ -388,7 +391,8 @@ def _judge_go_around(
         # Its path on a glide that may begin anywhere is unknown; the path before the glide is known.
         positions, end_status = positions[: rows + 1], 0
         go_around = go_around._replace(
-            is_lost=False, unknown_part_text=f"its landing sequence begins with the landing (item {destination.item})"
+            is_lost=False,
+            unknown_part_text=f"the landing sequence begins with the landing itself (item {destination.item})",
         )
     if len(positions) < 2:
         # It was aborted at its destination, or above the end of its climb.
@@ -432,9 +436,9 @@ def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
     if end_status != RETURN_OFF_TERRAIN:
         return ""
     return (
-        "it leads to where the terrain is unknown"
+        "the way back leaves the terrain data"
         if has_climbed
-        else "it leaves the terrain data before it reaches its height"
+        else "the aircraft leaves the terrain data before it reaches that height"
     )
 
 
@@ -482,7 +486,9 @@ def _brief_outcome(worst: _GoAround) -> str:
     if worst.entered_hazard:
         return f"a go-around enters {worst.entered_hazard}"
     return (
-        "a go-around does not return to the line-up" if worst.is_lost else "a go-around comes too close to the ground"
+        "a go-around does not get back to the approach"
+        if worst.is_lost
+        else "a go-around comes too close to the ground"
     )
 
 
@@ -491,16 +497,16 @@ def _outcome_text(worst: _GoAround) -> str:
     abort_text = (
         f"aborted {worst.abort_distance:.0f} m before the landing point, {worst.abort_height:.0f} m above ground,"
     )
-    turn_text = " is already at this height, turns at once" if worst.turns_at_once else ""
+    turn_text = " is already above this height, turns at once and" if worst.turns_at_once else ""
     if not math.isnan(worst.impact_time):
         outcome = f"hits the ground {worst.impact_time:.0f} s later"
     elif worst.entered_hazard:
         outcome = f"enters {worst.entered_hazard}"
     elif worst.is_lost:
-        outcome = "does not return to the line-up"
+        outcome = "does not get back to the approach"
     else:
         outcome = f"descends to {worst.lowest_height:.0f} m above ground on the way back"
-    return f"{abort_text}{turn_text} and {outcome}" if turn_text else f"{abort_text} {outcome}"
+    return f"{abort_text} the aircraft{turn_text} {outcome}"
 
 
 RULE = Rule(

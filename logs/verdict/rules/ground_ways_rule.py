@@ -78,7 +78,7 @@ class _Obstacles(NamedTuple):
         if self.entered_hazard:
             return message(f"{subject} enters {self.entered_hazard}")
         return message(
-            f"{subject} hits the ground", f", {-self.clearance:.0f} m below its surface, {self.distance:.0f} m {origin}"
+            f"{subject} hits the ground", f", {-self.clearance:.0f} m below the surface {self.distance:.0f} m {origin}"
         )
 
 
@@ -137,7 +137,10 @@ def climbout_findings(
         return [_air_start_finding(place, _find_obstacles(requirements, path))]
     takeoff_altitude = float(requirements.points[0, 2])
     if takeoff_altitude <= ground_altitude:
-        reason = f"the take-off's height is not above the ground at home, which is at {ground_altitude:.0f} m AMSL"
+        reason = (
+            f"the take-off climbs to {takeoff_altitude:.0f} m AMSL, which is not above the ground at home,"
+            f" {ground_altitude:.0f} m AMSL"
+        )
         return [_unjudged_finding("climbout", place, reason, is_undecided=True)]
     obstacles, obstacles_at_min_climb = (
         _find_obstacles(
@@ -254,7 +257,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
             True,
         )
     else:
-        fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
         return _path_finding("climbout", place, obstacles, None, fault, GROUND_PATH)
     return _path_finding("climbout", place, obstacles, ok, message(reason), check)
 
@@ -283,13 +286,13 @@ def _launch_finding(
         reason = message(f"the terrain below {subject} is unknown")
         return _path_finding("climbout", place, obstacles, None, reason)
     if not obstacles.is_free:
-        fault = obstacles.obstacle_message(subject, "from home, at the steepest climb")
+        fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
         other_courses_text = _free_courses_text(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other_courses_text)
         return _path_finding(
             "climbout", place, obstacles, False if is_known else None, fault, "" if is_known else GROUND_PATH
         )
-    min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest,"
+    min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest climb,"
     if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered_hazard:
         return _path_finding(
             "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the terrain is unknown")
@@ -333,7 +336,7 @@ def _free_courses_text(
     courses = list(range(0, 360, _COURSE_STEP_DEG))
     is_course_free = [is_free(math.radians(course)) for course in courses]
     if not any(is_course_free):
-        return "; no launch course climbs clear"
+        return "; no launch course is clear of obstacles"
     # Begin after a course with obstacles, so that no range is cut at north.
     start = is_course_free.index(False) if False in is_course_free else 0
     courses_from_start = [
@@ -346,8 +349,8 @@ def _free_courses_text(
     ]
     widest_range = max(ranges, key=len)
     if len(widest_range) == 1:
-        return f"; launched on {widest_range[0]:03d}° it would climb clear"
-    return f"; launched on {widest_range[0]:03d}° to {widest_range[-1]:03d}° it would climb clear"
+        return f"; a launch on {widest_range[0]:03d}° would be clear of obstacles"
+    return f"; a launch on {widest_range[0]:03d}° to {widest_range[-1]:03d}° would be clear of obstacles"
 
 
 # ----------------------------------------------------------------------
@@ -379,7 +382,10 @@ def approach_findings(
         reason = "the terrain height at the landing point is unknown"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     if start_altitude <= point_altitude:
-        reason = "it begins no higher than the landing point"
+        reason = (
+            f"the glide begins at {start_altitude:.0f} m AMSL, which is not above the landing point,"
+            f" {point_altitude:.0f} m AMSL"
+        )
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     glide = setup.autopilot.ground.glide(
         start_altitude - point_altitude, length, setup.scenario.wind.along(course, point_altitude)[0], point_altitude
@@ -420,13 +426,13 @@ def approach_findings(
     if clearance < GLIDE_PATH_TOLERANCE_M:
         fault = message(
             f"{subject} clears the ground by only {clearance:.1f} m",
-            f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than laid out",
+            f", and may be flown {GLIDE_PATH_TOLERANCE_M:.0f} m lower than planned",
         )
         return [_path_finding("approach", place, obstacles, None, fault, GROUND_PATH)]
     reason = f"glides down at {math.degrees(math.atan(glide.slope)):.1f}°"
     if glide.flare_distance > 0.0:
         reason += (
-            f", flares {glide.flare_height:.1f} m over the landing point and {glide.flare_distance:.0f} m before it"
+            f", flares {glide.flare_height:.1f} m above the landing point and {glide.flare_distance:.0f} m before it"
         )
     reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
     reason += "" if setup.ground_phases.approach is not None else "; not flown, because the flight ends in the air"
@@ -437,11 +443,12 @@ def approach_findings(
 
 
 def _item_text(place: Place) -> str:
-    """Name the item of a waypoint."""
+    """Name the mission item of a waypoint, or "the first waypoint" if the waypoint has no item."""
     return "the first waypoint" if place.item is None else f"item {place.item}"
 
 
 def _clearance_text(obstacles: _Obstacles) -> str:
+    """Describe the minimum height above ground on a free path, if it leads over ground that is judged."""
     return (
         "no obstacle" if math.isinf(obstacles.clearance) else f"{obstacles.clearance:.0f} m above ground at the lowest"
     )
@@ -450,6 +457,7 @@ def _clearance_text(obstacles: _Obstacles) -> str:
 def _path_finding(
     rule: str, place: Place, obstacles: _Obstacles, ok: bool | None, outcome: Message, check: str = ""
 ) -> Finding:
+    """Make the finding on a climb-out or an approach; `outcome` is its reason."""
     return make_finding(
         rule,
         place,

@@ -149,7 +149,7 @@ def _leg_finding(
         and planned_maximum is not judged_maximum
         and planned_maximum.height > limit + HEIGHT_TOLERANCE_M
     ):
-        facts.append(f"the planned path rises to {planned_maximum.height:.1f} m")
+        facts.append(f"the planned path rises to {planned_maximum.height:.1f} m above ground")
     return make_finding(
         "height",
         requirements.leg(leg),

@@ -52,7 +52,7 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     top_altitude = float(position[:, 2].max())
     if top_altitude <= take_off.end_altitude:
         brief = f"the take-off ended {top_altitude - take_off.home_altitude:.0f} m above home"
-        faults.append(message(brief, f", short of {take_off.end_altitude - take_off.home_altitude:.0f} m"))
+        faults.append(message(brief, f"; it must reach {take_off.end_altitude - take_off.home_altitude:.0f} m"))
     if height_lost > MAX_LAUNCH_HEIGHT_LOSS_M:
         faults.append(
             message(f"sinks {height_lost:.1f} m after the launch", f"; {MAX_LAUNCH_HEIGHT_LOSS_M:g} m are allowed")
@@ -66,7 +66,8 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
         )
         faults.append(message(brief, runway_text))
     if clearance < LAUNCH_CLEARANCE_M:
-        faults.append(message(f"{clearance:.1f} m above ground", f" {distance:.0f} m from home, on the course flown"))
+        place_text = f" {distance:.0f} m from home, on the course flown; {LAUNCH_CLEARANCE_M:g} m are required"
+        faults.append(message(f"{clearance:.1f} m above ground", place_text))
     entered_hazard = first_hazard_on_path(requirements, path)
     if entered_hazard:
         faults.append(message(f"the climb enters {entered_hazard}"))
@@ -74,7 +75,10 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
     undecided_messages = []
     if not faults and LAUNCH_CLEARANCE_M <= clearance < LAUNCH_CLEARANCE_M + CLIMB_MODEL_ERROR_M:
         brief = f"the launch passes {clearance:.1f} m above ground {distance:.0f} m from home"
-        undecided_messages.append(message(brief, ", less than the error of the simulated climb"))
+        error_text = (
+            f"; {LAUNCH_CLEARANCE_M:g} m are required, and the simulated climb may be {CLIMB_MODEL_ERROR_M:g} m off"
+        )
+        undecided_messages.append(message(brief, error_text))
     elif not faults and math.isnan(clearance):
         undecided_messages.append(message("the terrain below the launch's climb is unknown"))
     return make_finding(
@@ -141,8 +145,11 @@ def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clear
         notes = [f"launched {method_text} on {course}° at {take_off.speed:.1f} m/s, {take_off.acceleration:.1f} m/s²"]
     if distances[-1] > 1.0:
         altitude_gain = float(track.position[-1, 2] - track.position[0, 2])
+        verb = "climbs" if altitude_gain >= 0.0 else "sinks"
         course = round(math.degrees(math.atan2(*track.velocity[-1, :2].tolist()))) % 360
-        notes.append(f"climbs at {altitude_gain / distances[-1]:.2f}, finally on {course}°")
+        notes.append(
+            f"{verb} {abs(100.0 * altitude_gain / distances[-1]):.0f} m in 100 m, finally on a course of {course}°"
+        )
     if math.isfinite(clearance):
         notes.append(f"{clearance:.0f} m above ground at the lowest, once {LAUNCH_RUN_M:.0f} m from the launch")
     return notes

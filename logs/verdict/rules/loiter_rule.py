@@ -138,16 +138,16 @@ def end_findings(
     if hazards is None:
         return []
     reach, descriptions = hazards
-    reason = f"after it {requirements.setup.autopilot.title} circles, up to {reach:.0f} m from it"
+    reason = f"{requirements.setup.autopilot.title} then circles here, up to {reach:.0f} m from this waypoint"
     if descriptions:
-        reason += f": {', '.join(descriptions)}; only a simulated flight shows how close it comes"
+        reason += f": {', '.join(descriptions)}; only a simulated flight shows how close the aircraft comes"
     return [
         make_finding(
             "loiter",
             requirements.waypoint(requirements.legs),
             ok=None if descriptions else True,
             reason=reason,
-            method="the area that its circles may reach, at the height of the last waypoint",
+            method="the area that its circles may reach, at the altitude of the last waypoint",
             check=UNKNOWN_PATH if descriptions else "",
         )
     ]
@@ -165,14 +165,14 @@ def _loiter_finding(
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
         failed_corners = []
     faults = _small_radius_faults(requirements, circle, min_radius) if is_known else []
-    facts = [f"{circle.laps:.2f} turns with {circle.radius:.0f} m"]
+    facts = [f"{circle.laps:.2f} laps with a radius of {circle.radius:.0f} m"]
     hazards_text, parameter_name = "", requirements.setup.autopilot.loiters.radius_name
     if uses_parameter and faults and math.isfinite(min_radius):
         # If the parameter makes the loiter too tight, the autopilot flies it wider, as at the end of a return.
         bank = _held_bank(requirements, circle, min_radius, corner_findings)
         if bank <= requirements.limits.max_bank + BANK_TOLERANCE_RAD + 1e-9:
             facts.append(
-                f"{parameter_name} is smaller than the {min_radius:.0f} m that the bank limit allows: flown wider"
+                f"{parameter_name} is smaller than the {min_radius:.0f} m that the bank limit needs: flown wider"
             )
             faults = []
             hazards_text = "" if aligned is not None else _hazards_text(requirements, circle, min_radius)
@@ -188,10 +188,10 @@ def _loiter_finding(
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
     if radii.size:
-        facts.append(f"flown with {radii.min():.1f} to {radii.max():.1f} m")
+        facts.append(f"flown at {radii.min():.1f} to {radii.max():.1f} m from the center")
         max_radius = circle.radius * (1.0 + LOITER_WIDENING_FRACTION) + WAYPOINT_PASS_MARGIN_M
         if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
-            faults.append(message(f"flown with {mean_radius:.0f} m where {circle.radius:.0f} m is required"))
+            faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
     ok: bool | None = not (faults or failed_corners)
     if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
@@ -264,8 +264,8 @@ def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_rad
     hazards = find_hazards(requirements, circle.center, float(heights.min()), float(heights.max()), reach)
     if not hazards:
         return ""
-    reach_text = f"it may get {reach:.0f} m from its center, and there"
-    return f"{reach_text}, {', '.join(hazards)}; only a simulated flight shows where it circles"
+    reach_text = f"the aircraft may get {reach:.0f} m from the center, and there"
+    return f"{reach_text}, {', '.join(hazards)}; only a simulated flight shows where the aircraft circles"
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:

@@ -22,18 +22,21 @@ def departure_findings(
     if geometric:
         return []
     if aligned is None:
-        return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
+        return [make_finding("departure", FLIGHT, ok=None, reason="the log has no usable rows", unit="deg")]
     track = aligned.track
     bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
     max_bank, airspeed_faults = _max_finite(bank), _low_airspeed_faults(requirements, aligned)
     faults = []
     if aligned.bad_rows:
         faults.append(
-            message(f"{aligned.bad_rows} rows without usable numbers, the first {_time_text(aligned.first_bad)}")
+            message(
+                f"{aligned.bad_rows} rows of the log have no usable numbers, the first {_time_text(aligned.first_bad)}"
+            )
         )
     if (bank > MAX_CONTROLLED_BANK_RAD).any():
         k = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
-        faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s"))
+        limit_text = f", beyond {math.degrees(MAX_CONTROLLED_BANK_RAD):.0f}°"
+        faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s", limit_text))
     faults += airspeed_faults
     if (aligned.clearance <= 0.0).any():
         k = int(np.argmax(aligned.clearance <= 0.0))
@@ -91,6 +94,7 @@ def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack)
 
 
 def _time_text(time: float) -> str:
+    """Describe a time (s); a time that is not finite is "without a time"."""
     return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
 
 

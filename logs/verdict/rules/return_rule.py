@@ -92,15 +92,15 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
         world, return_starts = return_world(setup), starts(interval)
         answers = [judge(world, return_starts, interval) for judge in demands]
     except MissionError as error:
-        # Without a home nothing returns; what a glide could reach is not known.
+        # Without a home no RTL is safe, and the places that a glide reaches are unknown.
         answers = [_Answer(False if "rtl" in requirement.require else None, str(error), _METHOD)]
     results = {answer.ok for answer in answers}
     ok = False if False in results else None if None in results else True
-    # Failures come first, then what is not known.
+    # Failures come first, then unknown answers.
     answers.sort(key=lambda answer: (answer.ok is not False, answer.ok is not None))
     reason, method = "; ".join(answer.reason for answer in answers), "; ".join(answer.method for answer in answers)
     method = f"one return every {interval:.0f} s of the route, {method}"
-    # A verdict that requires them is undecided without them.
+    # An unknown answer to a requirement leaves the verdict undecided.
     faults, check = ([Message(reason, _NOT_KNOWN)], UNKNOWN_RETURN) if ok is None else ([], "")
     return [
         make_finding(
@@ -135,7 +135,9 @@ def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer
     """
     is_low = heights_above_ground(world, starts) < world.limit
     glides = judge_glides(world, starts.subset(np.flatnonzero(~is_low)))
-    left_out = f"; {is_low.sum()} lower than {world.limit:.0f} m above ground are omitted" if is_low.any() else ""
+    left_out = (
+        f"; {is_low.sum()} starts lower than {world.limit:.0f} m above ground are omitted" if is_low.any() else ""
+    )
     reason = f"without the engine: {glides_headline(glides)}{left_out}"
     return _Answer(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
@@ -172,12 +174,20 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
 
 
 def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
+    """Return the finding on a flown RTL, which passes if the aircraft arrived and is unjudged otherwise.
+
+    reason: text on how the flight ended, appended if the aircraft did not arrive.
+    """
     outcome = "flown to its end" if has_arrived else f"the flight did not reach its end{reason}"
     return _rtl_findings(requirements, True if has_arrived else None, outcome)
 
 
 def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
-    """Return one finding if the mission ends with an RTL, otherwise []."""
+    """Return one finding on the path of the mission's RTL, or [] for a mission without an RTL.
+
+    ok: result of the finding; None, too, if the destination of the RTL is unknown.
+    outcome: text on how far the RTL was flown.
+    """
     route = requirements.setup.route
     if route.return_from < 0:
         return []
@@ -187,7 +197,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     unknown_reason = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
     faults = []
     if unknown_reason and requirements.setup.source is None:
-        # What was flown instead does not show where the autopilot goes.
+        # The path flown instead does not show where the autopilot flies.
         faults, ok = [message("the destination of the return is unknown", f": {unknown_reason}")], None
         reason = f"{faults[0].text}; {reason}"
     return [

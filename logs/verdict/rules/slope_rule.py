@@ -114,7 +114,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
     limits, certain_limits, verb, deviation = (
         (requirements.climb, requirements.certain_climb, "climbs", envelope.climb_sd)
         if planned_slope >= 0.0
-        else (requirements.dive, requirements.certain_dive, "falls", envelope.descent_sd)
+        else (requirements.dive, requirements.certain_dive, "descends", envelope.descent_sd)
     )
     limit, certain_limit = float(limits[leg]), float(certain_limits[leg])
     # Without the aircraft's limits there is no uncertain limit.
@@ -132,7 +132,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
     corner = leg + 1
     place = requirements.waypoint(corner)
     length = float(requirements.radius[corner]) * abs(float(requirements.turns[corner]))
-    verb = "climbs" if arc.tangent > 0.0 else "falls"
+    verb = "climbs" if arc.tangent > 0.0 else "descends"
     legs = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, corner))
     slope, missing_height = math.degrees(math.atan(abs(arc.tangent))), (abs(arc.tangent) - arc.limit) * length
     arc_text = (
@@ -159,11 +159,11 @@ def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
     """Describe a planned slope beyond its limit, and the limit."""
     planned_slope = float(requirements.slopes[leg])
-    verb = "climbs" if planned_slope >= 0.0 else "falls"
+    verb = "climbs" if planned_slope >= 0.0 else "descends"
     slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
     if requirements.runs[leg] < MIN_LEG_LENGTH_M:
         height = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
-        slope_text = f"{round(height, 1):g} m on the spot, {math.degrees(abs(planned_slope)):.1f}°"
+        slope_text = f"{round(height, 1):g} m vertically, {math.degrees(abs(planned_slope)):.1f}°"
     return message(f"leg {leg} {verb} {slope_text}", f"; {_limit_text(requirements, leg, limit, source)}", placed=True)
 
 
@@ -173,7 +173,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.airspeed[leg])
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
-    condition = f"at {speed:.0f} m/s and {altitude:.0f} m"
+    condition = f"at {speed:.0f} m/s and {altitude:.0f} m AMSL"
     if limit <= 0.0:
         return f"{condition} the aircraft cannot fly steadily on this course"
     wind = requirements.setup.scenario.wind
@@ -208,7 +208,7 @@ def _flown_facts(measure: SlopeMeasure) -> list[tuple[str, str]]:
     if measure.slope is not None:
         facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
     if measure.height_error is not None:
-        facts.append(("height", f"height within {abs(measure.height_error):.1f} m of the leg"))
+        facts.append(("height", f"altitude within {abs(measure.height_error):.1f} m of the leg"))
     facts += [
         (name, f"throttle at {name} for {duration:.0f} s")
         for name, duration, _, _ in _throttle_times(measure)
@@ -253,9 +253,10 @@ def _flown_faults(
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None:
         error = abs(measure.height_error)
-        if error > (SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M):
+        max_height_error = SHORT_LEG_HEIGHT_ERROR_LIMIT_M if measure.is_short else HEIGHT_ERROR_LIMIT_M
+        if error > max_height_error:
             side = "above" if measure.height_error > 0.0 else "below"
-            faults["height"] = message(f"{error:.0f} m {side} the leg")
+            faults["height"] = message(f"{error:.0f} m {side} the leg", f" (at most {max_height_error:.0f} m)")
     has_ability = not performance_faults and measure.ability is not None and measure.ability.exceeds(planned_slope)
     max_error = SPEED_TOLERANCE_MPS + GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
     for name, duration, error, direction in _throttle_times(measure):
@@ -265,7 +266,8 @@ def _flown_faults(
             and error > max_error
             and not (has_ability and name == _throttle_limit(planned_slope))
         ):
-            faults[name] = message(f"throttle at {name} for {duration:.0f} s and {error:.1f} m/s too {direction}")
+            brief = f"throttle at {name} for {duration:.0f} s and {error:.1f} m/s too {direction}"
+            faults[name] = message(brief, f" (at most {max_error:.1f} m/s)")
     return faults
 
 

@@ -138,7 +138,7 @@ def _slope_finding(
     waypoint_place = requirements.waypoint(last)
     distance = float(requirements.runs[first:last].sum())
     if math.isnan(first_altitude) or math.isnan(last_altitude):
-        return _unjudged_finding(rule, waypoint_place, "the height of the terrain there is unknown")
+        return _unjudged_finding(rule, waypoint_place, "the altitude of the terrain there is unknown")
     slope = math.atan2(last_altitude - first_altitude, distance)
     limit, source = _slope_limit(requirements, first, first_altitude, last_altitude, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
@@ -146,7 +146,7 @@ def _slope_finding(
     is_within = abs(slope) <= limit + PLAN_TOLERANCE_RAD
     ground_phases = requirements.setup.ground_phases
     is_flown = (ground_phases.take_off if rule == "takeoff" else ground_phases.approach) is not None
-    reason = f"{text} of {math.degrees(limit):.1f}°"
+    reason = f"{text} (at most {math.degrees(limit):.1f}°)"
     reason += "" if is_flown else f"; not flown, because the flight {_PHASE_VERBS[rule]} in the air"
     fault = message(
         f"the {_PHASE_TITLES[rule]} {text}",

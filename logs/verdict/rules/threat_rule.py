@@ -86,11 +86,12 @@ class _Visit:
     closest_time: float = math.nan
 
 
-def _sphere_visit(visits: SphereVisits | None, m: int) -> _Visit:
+def _sphere_visit(visits: SphereVisits | None, threat: int) -> _Visit:
+    """Return the visit to one threat's sphere; all its values are NaN if there are no visits."""
     if visits is None:
         return _Visit()
     columns = (visits.time_inside, visits.exposure, visits.closest, visits.closest_time)
-    return _Visit(*(float(column[m]) for column in columns))
+    return _Visit(*(float(column[threat]) for column in columns))
 
 
 def _nearest_place_text(
@@ -113,8 +114,9 @@ def _no_entry_finding(
 ) -> Finding:
     """Report that no missile sphere is entered.
 
-    nearest_distance: distance outside the sphere of the threat called `name`, m.
+    nearest_distance: distance outside the sphere of the threat called `nearest_name`, m; inf without a sphere.
     navigation_error: navigation error, m.
+    is_judged: False if nothing was flown, so that the finding is not judged.
     """
     reason = (
         f"none of the missile spheres of {threat_count} threats is entered"
@@ -151,17 +153,26 @@ def _no_entry_finding(
 
 
 def _sphere_finding(
-    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, place_text: str
+    place: Place, planned_visit: _Visit, flown_visit: _Visit | None, radius: float, nearest_place: str
 ) -> Finding:
+    """Judge a missile's sphere by whether it was entered, and report a radar's sphere, which always passes.
+
+    flown_visit: None before a flight; the planned visit is then judged.
+    radius: radius of the sphere, m.
+    nearest_place: text on the leg and position nearest to the center, or "".
+    """
     judged_visit = planned_visit if flown_visit is None else flown_visit
     is_missing = math.isnan(judged_visit.closest)
-    facts = f"planned {planned_visit.time_inside:.1f} s inside {radius:.0f} m, exposure {planned_visit.exposure:.3g} s"
+    facts = (
+        f"planned {planned_visit.time_inside:.1f} s inside the radius of {radius:.0f} m, exposure"
+        f" {planned_visit.exposure:.3g} s"
+    )
     if flown_visit is not None and not is_missing:
         facts += (
-            f"; flown {flown_visit.time_inside:.1f} s, exposure {flown_visit.exposure:.3g} s, nearest"
-            f" {flown_visit.closest:.0f} m"
+            f"; flown {flown_visit.time_inside:.1f} s inside, exposure {flown_visit.exposure:.3g} s, nearest to the"
+            f" center {flown_visit.closest:.0f} m"
         )
-        facts += f" at {flown_visit.closest_time:.1f} s{place_text}"
+        facts += f" at {flown_visit.closest_time:.1f} s{nearest_place}"
     flown_time = None if flown_visit is None else flown_visit.time_inside
     if place.kind == "radar":
         return make_finding(
@@ -179,7 +190,7 @@ def _sphere_finding(
         "threat",
         place,
         ok=ok,
-        reason=facts if ok is not False else f"inside the missile's reach: {facts}",
+        reason=facts if ok is not False else f"inside the missile's range: {facts}",
         planned=planned_visit.time_inside,
         flown=flown_time,
         limit=0.0,

@@ -205,7 +205,7 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) ->
 
 
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
-    """Return the minimum height above ground before flare or touch-down, m, as in `_Landing.room`."""
+    """Return the minimum height above ground before flare or touch-down, m, as in `_Landing.final_clearance`."""
     point_altitude = float(approach.point[2])
     glide = requirements.setup.autopilot.ground.glide(
         approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
@@ -241,11 +241,13 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
         brief = f"comes to rest {half_length - stop[0]:.0f} m before the strip's end"
         if stop[0] > half_length:
             brief = f"runs {stop[0] - half_length:.0f} m beyond the strip's end"
-        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m must be left"))
+        faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m of the strip must be left"))
     lateral_offset = max(abs(touch[1]), abs(stop[1]))
     if lateral_offset > half_width:
         faults.append(
-            message(f"{lateral_offset:.0f} m off the strip's center line", f"; it is {2.0 * half_width:.0f} m wide")
+            message(
+                f"{lateral_offset:.0f} m off the strip's center line", f"; the strip is {2.0 * half_width:.0f} m wide"
+            )
         )
     return faults
 

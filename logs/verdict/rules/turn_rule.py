@@ -55,7 +55,7 @@ def _turn_finding(
         reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
         return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
-    faults, facts = [], [turn_text + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")]
+    faults, facts = [], [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink(requirements, i)
         if lateral is None:
@@ -131,7 +131,7 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
         return []
     lateral = radius * (1.0 - math.cos(turn))
     return [
-        f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
+        f"flown over, because its arc would pass at {offset:.0f} m and its acceptance radius is {acceptance:.0f} m;"
         f" the turn then swings up to {lateral:.0f} m off the next leg"
     ]
 
@@ -154,11 +154,11 @@ def _sharp_turn_message(
         )
     length_text = "no leg would be long enough"
     if requirements.length_after[i] < MAX_FLY_BY_OFFSET_RADII * radius:
-        length_text = f"that takes {requirements.length_after[i]:.0f} m of each leg"
+        length_text = f"the turn takes {requirements.length_after[i]:.0f} m of each leg"
         if requirements.setup.route.fly_over[i]:
             length_text = f"flying over it takes {requirements.length_after[i]:.0f} m of the next leg"
     length_before, length_after = requirements.runs[i - 1], requirements.runs[i]
-    room_text = f"its neighbours leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
+    room_text = f"the neighbouring turns leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
     return message(
         f"{turn_text} between legs of {length_before:.0f} m and {length_after:.0f} m:"
         f" at {speed:.0f} m/s and {bank:.0f}° bank",
@@ -170,7 +170,7 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
     """Describe how the turn was flown: quantities and their texts."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
-        facts.append(("course change", f"flown {math.degrees(measure.angle):.2f}°"))
+        facts.append(("course change", f"flown course change {math.degrees(measure.angle):.2f}°"))
     if measure.peak_bank is not None and measure.held_bank is not None:
         facts.append(("bank", f"bank up to {math.degrees(measure.peak_bank):.1f}°"))
     if measure.radius is not None and measure.radius < STRAIGHT_RADIUS_RATIO * requirements.radius[i]:
@@ -181,10 +181,10 @@ def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) 
         facts.append(("overshoot", f"overshoot {measure.overshoot:.1f} m"))
     if measure.corner is not None and measure.corner.overrun:
         facts.append(
-            ("overrun", f"that is {measure.corner.overrun:.0f} m past the end of the next leg, which was not joined")
+            ("overrun", f"passed {measure.corner.overrun:.0f} m beyond the end of the next leg, which was not joined")
         )
     if measure.settled_distance is not None and measure.is_complete:
-        facts.append(("settled", f"settled to {measure.settled_distance:.2f} m"))
+        facts.append(("settled", f"settled to {measure.settled_distance:.2f} m from the next leg"))
     return facts
 
 

@@ -43,7 +43,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         faults.append(
             message(
                 f"the arc of its {turn:.0f}° corner passes it at {offset:.0f} m",
-                f" (radius {radius:.0f} m); it counts as reached within {condition.radius:.0f} m",
+                f" (radius {radius:.0f} m); the waypoint counts as reached within {condition.radius:.0f} m",
             )
         )
     return make_finding(
@@ -88,11 +88,12 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         crossing = math.inf if ok or setup.autopilot.turns.follows_path else _crossing_offset(requirements, aligned, i)
         if crossing <= setup.corridor:
             ok = True
-        reason = f"passed at {distance:.1f} m, {abs(height_error):.1f} m {'above' if height_error >= 0.0 else 'below'}"
+        side = "above" if height_error >= 0.0 else "below"
+        reason = f"passed at {distance:.1f} m, {abs(height_error):.1f} m {side} its altitude"
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
         if math.isfinite(crossing):
-            reason += f"; the line across the leg at the waypoint was crossed {crossing:.0f} m to its side"
+            reason += f"; the line across the leg at the waypoint was crossed {crossing:.0f} m to the side"
         if i > 0 and not aligned.passed[i]:
             last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
             text = (
@@ -137,9 +138,9 @@ def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: 
 
 def _acceptance_text(condition: AcceptanceCondition) -> str:
     """Describe the acceptance distance and its source."""
-    owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(condition.source, "the path's")
+    owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(condition.source, "the fly-by path's")
     error_text = f" plus {condition.tolerance:.1f} m for navigation and gusts" if condition.tolerance else ""
-    return f"it counts as reached within {condition.radius:.0f} m{error_text} ({owner})"
+    return f"the waypoint counts as reached within {condition.radius:.0f} m ({owner} radius){error_text}"
 
 
 def _closest_approach(

@@ -92,9 +92,8 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     verdict = aside(autopilot, 70.0, ReferenceFlights(PASSED, DECIDING))
     assert verdict.lines[:2] == (
         "not flyable: corridor on leg 1, to item 2 (70 m > 60 m)",
-        "The aircraft can fly this, but ArduPlane with these parameters cannot: NAVL1_PERIOD 17 takes it"
-        " 70 m off leg 1; 14 would"
-        " pass",
+        "The aircraft can fly this mission, but ArduPlane with these parameters cannot: with NAVL1_PERIOD 17 s the"
+        " aircraft is 70 m off leg 1; with 14 s the flight would pass",
     )
     assert [level.flyable for level in verdict.levels] == [True, True, False]
     for level in verdict.levels[:2]:
@@ -108,7 +107,7 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     assert written["deciding_parameter"]["name"] == "NAVL1_PERIOD"
     assert written["deciding_parameter"]["text"] == deciding_text(DECIDING)
     undecided = aside(autopilot, 70.0, ReferenceFlights(PASSED))
-    assert undecided.lines[1].endswith("cannot: it would pass with none of the parameter values tried")
+    assert undecided.lines[1].endswith("cannot: the flight fails with every parameter value that was tried")
 
 
 def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:
@@ -142,10 +141,26 @@ def test_where_only_the_aircraft_fails_the_verdict_is_the_autopilots(autopilot: 
 @pytest.mark.parametrize(
     ("rule", "off", "text"),
     [
-        ("clearance", -8.2, "TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass"),
-        ("clearance", 8.2, "TECS_HDEM_TCONST 3 puts it 8 m high on leg 4; 1.2 would pass"),
-        ("corridor", 41.0, "TECS_HDEM_TCONST 3 takes it 41 m off leg 4; 1.2 would pass"),
-        ("waypoint", None, "TECS_HDEM_TCONST 3 fails waypoint at leg 4; 1.2 would pass"),
+        (
+            "clearance",
+            -8.2,
+            "with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass",
+        ),
+        (
+            "clearance",
+            8.2,
+            "with TECS_HDEM_TCONST 3 s the aircraft is 8 m too high on leg 4; with 1.2 s the flight would pass",
+        ),
+        (
+            "corridor",
+            41.0,
+            "with TECS_HDEM_TCONST 3 s the aircraft is 41 m off leg 4; with 1.2 s the flight would pass",
+        ),
+        (
+            "waypoint",
+            None,
+            "with TECS_HDEM_TCONST 3 s the flight fails waypoint at leg 4; with 1.2 s the flight would pass",
+        ),
     ],
 )
 def test_words_of_a_deciding_parameter(rule: str, off: float | None, text: str) -> None:

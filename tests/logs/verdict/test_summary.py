@@ -57,8 +57,8 @@ def test_a_threat_is_named_once() -> None:
     places = (missile("Alfa"), Place("missile", 1), missile("threatening hill"))
     items = [make_finding("threat", place, ok=False, reason="", flown=3.0) for place in places]
     assert headline(items, False) == (
-        "not flyable: threat Alfa (missile) (3.0 s inside), threat 2 (missile) (3.0 s inside),"
-        " threat threatening hill (missile) (3.0 s inside)"
+        "not flyable: threat Alfa (missile) (3.0 s inside its range), threat 2 (missile) (3.0 s inside its range),"
+        " threat threatening hill (missile) (3.0 s inside its range)"
     )
 
 
@@ -151,7 +151,7 @@ def test_what_would_pass_stands_beside_what_fails() -> None:
     failing = make_finding("turn", TURN, ok=False, reason="too far")
     mended = replace(failing, suggestions=((change,),))
     text = Verdict((mended,), flyable=False, complete=True, lines=("no",), level="flown")._repr_html_()
-    assert "turn at most 60.0° there" in text
+    assert "turn at most 60.0° at waypoint" in text
 
 
 def test_the_failed_findings_are_at_hand() -> None:

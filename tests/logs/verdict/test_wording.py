@@ -115,15 +115,15 @@ def test_places(place: Place, text: str) -> None:
     ("change", "text"),
     [
         (LONGER, "make leg 1 300 m long instead of 150 m"),
-        (Change("length", leg(1), 0.2, 300.0, "m"), "make leg 1 300 m long; it has no length now"),
+        (Change("length", leg(1), 0.2, 300.0, "m"), "make leg 1 300 m long (now it is vertical)"),
         (Change("rise", leg(2), 60.0, 44.0, "m"), "climb 44 m on leg 2 instead of 60 m"),
-        (Change("rise", leg(2), -60.0, -44.0, "m"), "fall 44 m on leg 2 instead of 60 m"),
-        (Change("rise", leg(2), None, -0.0, "m"), "fall 0 m on leg 2"),
-        (Change("airspeed", waypoint(1), 25.0, 20.5, "m/s"), "fly it at 20.5 m/s instead of 25 m/s"),
-        (Change("airspeed", leg(3), 35.0, 18.1, "m/s", most=31.0), "command 18.1 to 31.0 m/s on leg 3"),
-        (Change("turn", waypoint(1), 90.0, 61.2, "deg"), "turn at most 61.2° there"),
+        (Change("rise", leg(2), -60.0, -44.0, "m"), "descend 44 m on leg 2 instead of 60 m"),
+        (Change("rise", leg(2), None, -0.0, "m"), "descend 0 m on leg 2"),
+        (Change("airspeed", waypoint(1), 25.0, 20.5, "m/s"), "fly through waypoint 1 at 20.5 m/s instead of 25 m/s"),
+        (Change("airspeed", leg(3), 35.0, 18.1, "m/s", most=31.0), "command an airspeed of 18.1 to 31.0 m/s on leg 3"),
+        (Change("turn", waypoint(1), 90.0, 61.2, "deg"), "turn at most 61.2° at waypoint 1"),
         (Change("height", leg(4), None, 12.0, "m"), "fly leg 4 12 m higher"),
-        (Change("inset", FLIGHT, None, 7.0, "m"), "bring the path 7 m further inside"),
+        (Change("inset", FLIGHT, None, 7.0, "m"), "bring the path 7 m further inside the area"),
         (Change("distance", missile("Alfa"), None, 41.0, "m"), "pass Alfa 41 m further away"),
         (Change("distance", Place("missile", 1), None, 41.0, "m"), "pass threat 2 41 m further away"),
         (Change("duration", FLIGHT, None, 12.0, "%"), "shorten the flight by 12 %"),
@@ -137,7 +137,7 @@ def test_changes(change: Change, text: str) -> None:
 
 def test_changes_together_and_alternatives() -> None:
     gentler = tuple(Change("rise", leg(k), None, -20.0, "m") for k in (1, 2))
-    assert suggestion_text(gentler) == "fall 20 m on leg 1 and fall 20 m on leg 2"
+    assert suggestion_text(gentler) == "descend 20 m on leg 1 and descend 20 m on leg 2"
     text = "make leg 1 300 m long instead of 150 m and leg 1 300 m long instead of 150 m"
     assert suggestion_text((LONGER, LONGER)) == text
     assert suggestions_text((gentler, (LONGER, LONGER))) == f"{suggestion_text(gentler)}, or {text}"
@@ -170,7 +170,7 @@ SUGGESTED = {
         lambda: make_setup(STEEP[::-1]),
         "slope",
         leg(1),
-        r"fall ([\d.]+) m on leg 1, to item 2, instead of 300 m",
+        r"descend ([\d.]+) m on leg 1, to item 2, instead of 300 m",
         0,
     ),
     "length": (
@@ -180,15 +180,21 @@ SUGGESTED = {
         r"make leg 1, to item 2, ([\d.]+) m long instead of 1000 m",
         0,
     ),
-    "airspeed": (lambda: make_setup(SHORT), "turn", waypoint(1), r"fly it at ([\d.]+) m/s instead of 25 m/s", 1),
+    "airspeed": (
+        lambda: make_setup(SHORT),
+        "turn",
+        waypoint(1),
+        r"fly through waypoint 1 \(item 1\) at ([\d.]+) m/s instead of 25 m/s",
+        1,
+    ),
     "range": (
         lambda: make_setup(STRAIGHT, airspeed=33.0),
         "speed",
         leg(0),
-        r"command ([\d.]+) to [\d.]+ m/s on leg 0, to item 1$",
+        r"command an airspeed of ([\d.]+) to [\d.]+ m/s on leg 0, to item 1$",
         1,
     ),
-    "turn": (lambda: make_setup(SHORT), "turn", waypoint(1), r"turn at most ([\d.]+)° there", 1),
+    "turn": (lambda: make_setup(SHORT), "turn", waypoint(1), r"turn at most ([\d.]+)° at waypoint 1", 1),
     "height": (
         lambda: make_setup([[0, 0, 20], [0, 6000, 20]]),
         "clearance",
@@ -200,7 +206,7 @@ SUGGESTED = {
         lambda: make_setup([[0, 0, 4900], [0, 3000, 5040], [0, 6000, 4900]]),
         "bounds",
         None,
-        r"bring the path ([\d.]+) m further inside",
+        r"bring the path ([\d.]+) m further inside the area",
         0,
     ),
     "distance": (

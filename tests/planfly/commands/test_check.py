@@ -19,7 +19,7 @@ MISSION = """QGC WPL 110
 """
 
 
-@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (80, "falls"), (1434, "climbs"), (210.5, "climbs")])
+@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (80, "descends"), (1434, "climbs"), (210.5, "climbs")])
 def test_a_climb_on_the_spot_is_judged_and_not_flyable(
     up: float, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -31,10 +31,10 @@ def test_a_climb_on_the_spot_is_judged_and_not_flyable(
     assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1, to item 3")]
     rise, angle = abs(up - 200), "89.9" if up == 210.5 else "90.0"
     assert abs(failed[0]["planned"]) == pytest.approx(float(angle), abs=0.1)
-    assert f"leg 1 {verb} {rise:g} m on the spot, {angle}°; at 2" in failed[0]["reason"]
-    assert "m long; it has no length now" in failed[0]["suggestion"]
+    assert f"leg 1 {verb} {rise:g} m vertically, {angle}°; at 2" in failed[0]["reason"]
+    assert "m long (now it is vertical)" in failed[0]["suggestion"]
     assert main(["fly", str(mission), "--log", str(tmp_path / "flight.mcap")]) == 4
-    assert "on the spot" in capsys.readouterr().out
+    assert "vertically" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("up", [201.5, 209.5, 190.5])
@@ -138,7 +138,7 @@ def test_a_leg_through_the_missions_own_fence_is_not_flyable(
     file, log = tmp_path / "m.waypoints", tmp_path / "flight.mcap"
     file.write_text(FENCED.format(lon=lon), encoding="utf-8")
     assert main(["check", str(file)]) == code
-    assert ("fence item 0 (exclusion) violated (100.0 m beyond it)" in capsys.readouterr().out) == (code == 4)
+    assert ("fence item 0 (exclusion) violated (100.0 m inside)" in capsys.readouterr().out) == (code == 4)
     assert main(["fly", str(file), "--log", str(log)]) == code
     capsys.readouterr()
     assert main(["check", str(log)]) == code

@@ -44,7 +44,10 @@ def test_of_a_verdict_the_worst_comes_first_and_the_rest_is_counted() -> None:
     assert texts[5:] == (("and 2 more findings", WARNING),)
     late = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2)
     decided = verdict_texts("flown", replace(verdict, deciding=late))
-    assert decided[1] == ("TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass", WARNING)
+    assert decided[1] == (
+        "with TECS_HDEM_TCONST 3 s the aircraft is 8 m too low on leg 4; with 1.2 s the flight would pass",
+        WARNING,
+    )
     assert decided[2:] == texts[1:]
     clean = Verdict((), True, True, ("flyable",), "flown")
     assert verdict_texts("flown", clean) == (("verdict (flown): FLYABLE", INFO),)

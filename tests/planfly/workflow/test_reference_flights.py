@@ -208,9 +208,10 @@ def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path])
     assert deciding.off == pytest.approx(-3.0 * climb, abs=2.5)
     second = judged.verdict.lines[1]
     assert second.startswith(
-        "The aircraft can fly this, but ArduPlane with these parameters cannot: TECS_HDEM_TCONST 3 puts it "
+        "The aircraft can fly this mission, but ArduPlane with these parameters cannot: with TECS_HDEM_TCONST 3 s the "
+        "aircraft is "
     )
-    assert second.endswith(f"m low on leg 1, to item 2; {deciding.passing:g} would pass")
+    assert second.endswith(f"m too low on leg 1, to item 2; with {deciding.passing:g} s the flight would pass")
 
 
 def test_a_served_flight_tells_stations_which_parameter_decides(

@@ -187,7 +187,7 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     rows = ((1, 0.0, 10), (2, 2000.0, 210), (3, 3000.0, 500))
     way = HEAD + "".join(f"{k}\t0\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up}\t1\n" for k, x, up in rows)
     found = demanded(tmp_path, mission=way)
-    assert "; 9 lower than 30 m above ground are omitted" in found.reason
+    assert "; 9 starts lower than 30 m above ground are omitted" in found.reason
     # 3 km at 25 m/s, and the start.
     assert f"of {121 - 9} places, home" in found.reason
     setup = hill_setup(tmp_path, '[returns]\nrequire = ["glide"]\n')

@@ -138,7 +138,7 @@ def test_unknown_ground_is_not_judged() -> None:
     setup = within_zones(Zone("low", "exclusion", Cylinder(0.0, 1000.0, 200.0), None, ZoneLevel(120.0, "ground")))
     rest, item = findings(replace(setup, scenario=replace(setup.scenario, terrain=None)))
     assert (item.ok, item.place.name) == (None, "low")
-    assert item.reason == "the terrain from which its height is measured is unknown in places"
+    assert item.reason == "the zone's limits are heights above ground, and the terrain is unknown in places"
     assert rest.ok is True
 
 
@@ -165,7 +165,7 @@ def test_a_zone_that_is_touched_within_rounding_is_told_and_kept_to() -> None:
     setup = within_zones(Zone("edge", "exclusion", edge), far)
     for track in (None, fly_path(setup)):
         kept, item = findings(setup, track)
-        assert (kept.ok, item.ok, item.reason) == (True, True, "touches it")
+        assert (kept.ok, item.ok, item.reason) == (True, True, "touches the zone's edge")
         assert kept.planned == pytest.approx(0.015, abs=0.011)
         assert kept.planned > 0.0
         if track is not None:

@@ -35,9 +35,9 @@ def test_a_go_around_from_a_field_above_home_is_too_low_and_the_height_that_woul
     assert warned.ok is None
     # From below 50 m it climbs there, from above it sinks no deeper than it was.
     assert warned.planned == pytest.approx(13.0, abs=2.5)
-    assert "which is 13 m over the landing point" in warned.reason
+    assert "which is 13 m above the landing point" in warned.reason
     assert "m above ground on the way back" in warned.reason
-    assert warned.reason.endswith("60 m would be sufficient (parameter 1 of item 3)")
+    assert warned.reason.endswith("a climb to 60 m above home would be sufficient (parameter 1 of item 3)")
     # It decides no verdict, and is said.
     assert verdict.flyable
     assert f"Go-around: {warned.reason}" in verdict.lines
@@ -50,7 +50,7 @@ def test_a_hill_ahead_of_the_landing_leaves_no_height_for_a_go_around() -> None:
     found, _ = go_around(wall(POINT + 150.0, 300.0), *landing())
     assert found.ok is None
     assert "hits the ground" in found.reason
-    assert found.reason.endswith("no height would be sufficient")
+    assert found.reason.endswith("no climb up to 1000 m above home would be sufficient")
 
 
 def test_a_go_around_flies_back_to_where_the_landing_sequence_begins_and_on_to_the_line_up() -> None:
@@ -107,7 +107,7 @@ def test_a_go_around_whose_landing_sequence_begins_with_the_landing_is_left_open
     lines = landing(p="60 0 0 0")
     found, verdict = go_around(LEVEL, lines[0], lines[1], MARK, lines[2], **REQUIRED)
     assert found.ok is None
-    assert "its landing sequence begins with the landing (item 4)" in found.reason
+    assert "the landing sequence begins with the landing itself (item 4)" in found.reason
     assert verdict.headline.startswith("not judged in full: a go-around is not judged")
     # What it meets before that is known.
     assert go_around(wall(POINT + 150.0, 300.0), lines[0], lines[1], MARK, lines[2], **REQUIRED)[0].ok is False
@@ -117,7 +117,7 @@ def test_a_go_around_that_does_not_get_back_fails() -> None:
     # As fast against the wind as that blows: south of the field it gets nowhere.
     found, _ = go_around(LEVEL, *landing(p="60 0 0 0"), wind={"speed_mps": 25.0, "from_deg": 180.0}, **REQUIRED)
     assert found.ok is False
-    assert found.reason.startswith("a go-around does not return to the line-up: ")
+    assert found.reason.startswith("a go-around does not get back to the approach: ")
 
 
 def test_a_go_around_goes_to_the_landing_sequence_that_is_nearest_where_its_climb_is_over() -> None:
@@ -162,7 +162,7 @@ def test_a_climb_that_passes_the_ground_beyond_the_landing_point_by_too_little_i
 def test_a_go_around_that_leaves_the_known_ground_in_its_climb_is_left_open() -> None:
     found, verdict = go_around(LEVEL, *landing(p="3000 0 0 0"), **REQUIRED)
     assert (found.ok, verdict.undecided) == (None, True)
-    assert found.reason.endswith("it leaves the terrain data before it reaches its height")
+    assert found.reason.endswith("the aircraft leaves the terrain data before it reaches that height")
 
 
 def test_a_low_place_of_the_landing_sequence_lowers_what_is_asked_for_only_near_it() -> None:

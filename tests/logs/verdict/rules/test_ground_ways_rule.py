@@ -81,7 +81,7 @@ def test_the_way_to_the_first_waypoint_is_left_open_where_a_wall_stands_in_it() 
     assert into_it.ok is None
     assert verdict.undecided
     assert verdict.headline == "not judged in full: the climb from home to item 1 hits the ground"
-    assert into_it.reason.endswith("2 m below its surface, 1000 m from home, at the steepest climb")
+    assert into_it.reason.endswith("2 m below the surface 1000 m from home, even at the steepest climb")
 
 
 def test_beyond_the_climb_the_way_to_the_first_waypoint_is_level() -> None:
@@ -122,7 +122,7 @@ def test_a_take_off_into_a_wall_fails_and_one_that_only_its_steepest_climb_clear
     failed, verdict = judged("climbout", wall(500.0, steepest + 30.0), *TAKEOFF)
     assert "the climb from home towards item 2 hits the ground" in verdict.headline
     assert failed.planned == pytest.approx(-30.0, abs=0.5)
-    assert ", 30 m below its surface, 500 m from home, at the steepest climb; launched on " in failed.reason
+    assert ", 30 m below the surface 500 m from home, even at the steepest climb; a launch on " in failed.reason
 
 
 def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:
@@ -130,13 +130,13 @@ def test_courses_are_named_on_which_a_launch_would_climb_free() -> None:
     # it from acos(1 / 1.03) = 13.9 degrees on.
     top = 100.0 + 1.03 * 500.0 * climb()
     assert judged("climbout", wall(500.0, top), *TAKEOFF)[0].reason.endswith(
-        "launched on 020° to 340° it would climb clear"
+        "a launch on 020° to 340° would be clear of obstacles"
     )
 
     def basin(east: Floats, at: Floats) -> Floats:
         return np.where(np.hypot(east, at) > 300.0, 2000.0, 100.0)
 
-    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("no launch course climbs clear")
+    assert judged("climbout", basin, *TAKEOFF)[0].reason.endswith("no launch course is clear of obstacles")
 
 
 def test_no_ground_stands_in_the_way_for_the_first_50_metres() -> None:
@@ -220,7 +220,7 @@ def test_ground_that_is_met_counts_where_that_beyond_it_is_not_known() -> None:
     assert (left_open.ok, left_open.check) == (None, "ground way")
     unknown, _ = judged("climbout", cut(100.0, 1450.0), *TAKEOFF)
     assert (unknown.ok, unknown.check) == (None, "")
-    assert unknown.reason.endswith("at 70 % of the steepest, leads to where the terrain is unknown")
+    assert unknown.reason.endswith("at 70 % of the steepest climb, leads to where the terrain is unknown")
 
 
 def test_where_no_way_up_is_known_there_is_no_finding_or_it_is_not_judged() -> None:
@@ -275,7 +275,7 @@ def test_a_glide_into_a_wall_fails_and_one_that_only_just_clears_it_is_left_open
     failed, verdict = judged("approach", wall(POINT - 600.0, up + 60.0), *landing())
     assert "approach at waypoint 2 (item 3) (the glide to item 3 hits the ground)" in verdict.headline
     assert failed.reason == (
-        "the glide to item 3 hits the ground, 60 m below its surface, 600 m before the landing point"
+        "the glide to item 3 hits the ground, 60 m below the surface 600 m before the landing point"
     )
     _, verdict = judged("approach", wall(POINT - 600.0, up - 3.0), *landing())
     assert verdict.headline == "not judged in full: the glide to item 3 clears the ground by only 3.0 m"

@@ -78,10 +78,10 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     share = (math.sqrt(2000.0**2 - 200.0**2) + way - WIDER_FROM) / way
     assert item.flown == pytest.approx(200.0 + share * wider, abs=0.05)
     assert item.planned == 200.0
-    low, high = (float(word) for word in item.reason.split("flown with ")[1].split(" m")[0].split(" to "))
+    low, high = (float(word) for word in item.reason.split("flown at ")[1].split(" m")[0].split(" to "))
     assert low == pytest.approx(200.0 + min(wider, 0.0), abs=0.06)
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
-    assert f"{circle.laps:.2f} turns with 200 m" in item.reason
+    assert f"{circle.laps:.2f} laps with a radius of 200 m" in item.reason
     assert item.margin == pytest.approx(200.0 - float(requirements.min_radius[circle.first : circle.last + 1].max()))
 
 
@@ -92,7 +92,7 @@ def test_a_circle_flown_more_than_a_quarter_and_10_m_wider_is_told(mean: float, 
     _, aligned, _ = laid(setup, mean - 200.0, begins=1000.0)
     item = of(judge(setup, aligned.track), "loiter")
     assert item.flown == pytest.approx(mean, abs=0.9)
-    assert (f"flown with {mean:.0f} m where 200 m is required" in item.reason) is told
+    assert (f"flown with a mean radius of {mean:.0f} m; at most 260 m" in item.reason) is told
 
 
 def finding(rule: str, place: Place, ok: bool | None, margin: float | None) -> Finding:
@@ -161,7 +161,7 @@ def test_a_circle_that_was_left_early_has_no_radius() -> None:
     corner = requirements.waypoint(circle.first)
     (one,) = merge_loiter_findings(requirements, aligned, [finding("turn", corner, None, None)])
     assert one.flown is None
-    assert "flown with" not in one.reason
+    assert "flown at" not in one.reason
 
 
 def test_a_circle_where_the_wind_leaves_no_way_around_says_so() -> None:

@@ -114,7 +114,7 @@ def test_px4_refuses(case: str) -> None:
 def test_px4s_own_limits_are_named_and_are_no_verdict_on_the_aircraft(case: str) -> None:
     check, lines, _, _ = REFUSED[case]
     verdict = judge_geometry(setup_of(*lines))
-    named = [line for line in verdict.lines if line.startswith("PX4 would reject it: ") and check in line]
+    named = [line for line in verdict.lines if line.startswith("PX4 would reject the mission: ") and check in line]
     assert len(named) == (0 if case in NOBODY else 1), verdict.lines
     assert not [item for item in verdict.findings if item.rule == "mission" and item.ok is False] or case in NOBODY
 
@@ -180,7 +180,7 @@ def test_px4_asks_for_a_takeoff_or_a_landing(text: str, lines: tuple[str, ...], 
 
 def test_without_a_landing_a_default_px4_flies_and_the_verdict_says_so() -> None:
     verdict = judge_geometry(replace(setup_of(*GOOD), autopilot=Px4(Px4Parameters.defaults())))
-    said = "PX4 would reject it: PX4's fixed-wing default refuses a mission without a landing"
+    said = "PX4 would reject the mission: PX4's fixed-wing default refuses a mission without a landing"
     # Its take-off is not flown, and leaves the verdict open.
     assert verdict.undecided
     assert not verdict.failed

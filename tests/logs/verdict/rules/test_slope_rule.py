@@ -42,7 +42,7 @@ def test_a_steep_leg_is_explained() -> None:
     assert verdict.summary.startswith("not flyable: slope on leg 1, to item 2 (18.3° > 13.8°)")
     reason = of(verdict, "slope", leg(1)).reason
     assert reason.startswith(
-        "leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m the aircraft can fly at most 13.7° in calm air"
+        "leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m AMSL the aircraft can fly at most 13.7° in calm air"
     )
 
 
@@ -141,9 +141,8 @@ def test_the_arc_and_both_legs_are_named() -> None:
     # The heights at the arc's ends over its own length.
     steep = math.atan(tangent * (math.tan(math.radians(7.0)) + math.tan(math.radians(6.0))) / (bank_radius() * turn))
     length = bank_radius() * turn
-    asks = (
-        f"the arc at waypoint 1 (item 1) falls {math.degrees(steep):.1f}° for {length:.0f} m, where legs 0 and 1 have"
-    )
+    arc_slope = f"{math.degrees(steep):.1f}° for {length:.0f} m"
+    asks = f"the arc at waypoint 1 (item 1) descends {arc_slope}, where legs 0 and 1 have"
     assert item.reason.startswith(asks)
     assert item.brief == "the arc at waypoint 1"
     assert "have 7.0° and 6.0°" in item.reason

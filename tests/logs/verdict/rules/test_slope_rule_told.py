@@ -135,7 +135,7 @@ def test_the_wind_on_a_steep_leg_is_named_beside_what_calm_air_allows(
     level = math.sqrt((25.0 * math.cos(calm)) ** 2 - cross**2) + tail
     limit = math.degrees(math.atan2(25.0 * math.sin(calm), level))
     assert abs(item.limit or 0.0) == pytest.approx(limit, abs=0.01)
-    asks = f"leg 1 {'climbs' if slope > 0.0 else 'falls'} {abs(slope):.1f}° for 2.0 km; at 25 m/s"
+    asks = f"leg 1 {'climbs' if slope > 0.0 else 'descends'} {abs(slope):.1f}° for 2.0 km; at 25 m/s"
     assert item.reason.startswith(asks)
     assert f"{math.degrees(calm):.1f}° in calm air, but" in item.reason
     assert f"in this {blows}" in item.reason
@@ -149,4 +149,4 @@ def test_a_kilometre_is_said_in_kilometres(run: float, said: str) -> None:
 def test_a_leg_straight_up_says_its_height() -> None:
     points = [[0, 0, 300], [0, 1500, 300], [0, 1500.45, 360], [0, 3000, 360]]
     reason = of(judge_geometry(make_setup(points)), "slope", leg(1)).reason
-    assert reason.startswith("leg 1 climbs 60 m on the spot")
+    assert reason.startswith("leg 1 climbs 60 m vertically")

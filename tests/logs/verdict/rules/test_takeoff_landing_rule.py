@@ -101,7 +101,7 @@ def test_a_landing_without_a_place_or_a_height_is_not_judged() -> None:
     assert here.headline.startswith("not judged in full: item 3: NAV_LAND without a position: not flown")
     above_terrain = wp(0, 3000, 0, command=21, frame=10)
     unknown = judge_geometry(setup_of(wp(0, 0, frame=0), wp(0, 2000, frame=0), above_terrain, terrain={"kind": "none"}))
-    assert of(unknown, "landing").reason == "the height of the terrain there is unknown"
+    assert of(unknown, "landing").reason == "the altitude of the terrain there is unknown"
 
 
 def test_a_take_off_in_the_air_and_a_mission_without_ends_have_no_finding() -> None:

@@ -43,7 +43,7 @@ def test_time_and_exposure_inside_a_threat_are_exact(rate: float) -> None:
     assert seen.ok is True
     assert seen.limit is None
     assert seen.flown == pytest.approx(2 * math.sqrt(700.0**2 - 300.0**2) / 25.0, abs=1e-3)
-    assert "threat Alfa (missile) (32.0 s inside)" in verdict.summary
+    assert "threat Alfa (missile) (32.0 s inside its range)" in verdict.summary
 
 
 def test_threats_out_of_reach_give_one_finding() -> None:
@@ -67,7 +67,9 @@ def test_a_sphere_missed_by_less_than_navigation_may_be_off_is_luck(nav: Any, aw
     setup = replace(made, nav=nav)
     for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
         assert verdict.flyable
-        assert (f"a missile missed by {away:.1f} m, less than the navigation error" in verdict.headline) is luck
+        assert (
+            f"passes {away:.1f} m outside a missile's range, less than the navigation error" in verdict.headline
+        ) is luck
         item = of(verdict, "threat", FLIGHT)
         facts = {fact.what: fact.value for fact in item.facts}
         assert facts["nearest"] == pytest.approx(away, abs=1e-3)

@@ -122,7 +122,7 @@ def test_past_the_line_beside_it_counts_for_arduplane_within_the_corridor(aside:
     track = fly_path(setup, across=bump(3000.0, aside, 150.0))
     item = of(judge(setup, track), "waypoint", waypoint(1))
     assert item.ok is ok
-    assert f"the line across the leg at the waypoint was crossed {abs(aside):.0f} m to its side" in item.reason
+    assert f"the line across the leg at the waypoint was crossed {abs(aside):.0f} m to the side" in item.reason
     # Planfly's own guidance has to come near.
     assert not of(judge(accepting(stated, 10.0), track), "waypoint", waypoint(1)).ok
 
@@ -171,7 +171,8 @@ def test_a_waypoints_margin_is_what_is_left_of_its_radius(aside: float, ok: bool
     item = of(judge(setup, fly_path(setup, across=bump(3000.0, aside, 150.0))), "waypoint", waypoint(1))
     assert (item.ok, item.margin) == (ok, pytest.approx(margin, abs=0.02))
     assert (
-        "it counts as reached within 20 m plus 0.6 m for navigation and gusts (the mission's)" in item.reason
+        "the waypoint counts as reached within 20 m (the mission's radius) plus 0.6 m for navigation and gusts"
+        in item.reason
     ) is not ok
 
 
