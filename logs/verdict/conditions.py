@@ -99,6 +99,7 @@ def _autopilot_source(flight_table: FlightTable) -> str:
 
 
 def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource:
+    """Return the source of the cruise airspeed: the scenario, else the autopilot's parameters, else the aircraft."""
     if scenario.flight.airspeed_mps is not None:
         return "scenario"
     stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
@@ -141,6 +142,7 @@ def flown_lines(conditions: Conditions) -> list[str]:
 
 
 def _aircraft_line(conditions: Conditions) -> str:
+    """Describe the aircraft and its airspeed, and say if no aircraft was named."""
     speed = (
         f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
         f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
@@ -155,6 +157,7 @@ def _aircraft_line(conditions: Conditions) -> str:
 
 
 def _world_line(conditions: Conditions) -> str:
+    """Describe wind, turbulence, navigation, terrain and the number of zones."""
     wind_text = "no wind"
     if conditions.wind_mps is None:
         wind_text = "wind from each direction"

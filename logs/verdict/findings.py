@@ -236,6 +236,7 @@ def make_finding(
 
 
 def _rounded_or_none(value: float | None) -> float | None:
+    """Round a number to 1e-6; return None for a missing or non-finite number."""
     if value is None or not math.isfinite(value):
         return None
     return round(float(value), 6) + 0.0  # no -0.0

@@ -102,6 +102,7 @@ def _run_rules(
     """
 
     def rule_findings(rule: Rule, judge: Judge) -> Sequence[Finding]:
+        """Run one rule, or take its findings from the flight's findings if they are the same for the plan."""
         if rule.is_same_for_plan and flight_findings is not None:
             return [finding for finding in flight_findings if finding.rule == rule.name]
         return judge(requirements, aligned, geometric=geometric)
@@ -357,6 +358,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
 
 
 def _infeasible_finding(plan: Plan) -> Finding:
+    """Return the failed finding on a plan that is not feasible, with the problems of its certificate."""
     problems = plan.certificate.problems or ("the best path still has violations",)
     first_problem, *other_problems = problems
     fault = message(
@@ -368,6 +370,7 @@ def _infeasible_finding(plan: Plan) -> Finding:
 
 
 def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
+    """Write the summary lines of a run without a feasible plan."""
     failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
     headline_text, further_lines = headline(findings, False), []
     if failed:

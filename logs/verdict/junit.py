@@ -53,11 +53,13 @@ def junit_error_text(name: str, message: str) -> str:
 
 
 def _document_text(root: ElementTree.Element) -> str:
+    """Return the XML text of a document, indented."""
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
 def _answer_case(verdict: Presentation) -> ElementTree.Element:
+    """Make the test case of the verdict's answer, which fails if the answer is not "flyable"."""
     case = ElementTree.Element("testcase", classname="planfly", name="verdict")
     if verdict.state != "ok":
         ElementTree.SubElement(case, "failure", message=_without_control_characters(verdict.headline))
@@ -65,6 +67,7 @@ def _answer_case(verdict: Presentation) -> ElementTree.Element:
 
 
 def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
+    """Make a test case for each finding: failed, skipped if it was not judged, or passed."""
     counts: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:
@@ -88,5 +91,5 @@ def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
 
 
 def _without_control_characters(text: str, keep: str = "") -> str:
-    """Replace each character that XML 1.0 does not permit with a space."""
+    """Replace each non-printable character that is not in `keep` with a space; XML 1.0 permits few of them."""
     return "".join(character if character.isprintable() or character in keep else " " for character in text)

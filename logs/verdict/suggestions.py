@@ -323,6 +323,7 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
     factor = _true_airspeed_ratio(requirements, leg)
 
     def can_hold_slope(speed: float) -> bool:
+        """Return True if the aircraft holds the slope at both ends of the leg at a commanded airspeed, m/s."""
         table = requirements.limits.performance(speed * factor)
         return min(aircraft_slopes(table, course, altitude)[direction] for altitude in altitudes) >= slope
 
@@ -342,6 +343,7 @@ def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
     altitude = float(requirements.points[corner, 2])
 
     def does_turn_fit(speed: float) -> bool:
+        """Return True if the turn fits its legs at a commanded airspeed, m/s."""
         table = requirements.limits.performance(speed * factor)
         radius = turn_radius_between(table, requirements.courses[corner - 1], requirements.courses[corner], altitude)
         lengths = turn_lengths(

@@ -207,6 +207,7 @@ def damage_text(damage: Damage) -> str:
 
 
 def _start_time_text(source: ImportedLog) -> str:
+    """Describe the date and time at which the log's time is 0; return "" if the log does not state it plausibly."""
     if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
         return ""
     return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
@@ -444,6 +445,7 @@ def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[F
 
 
 def _merge_precedence(finding: Finding) -> int:
+    """Return a sort key that is greatest for a failed finding, less for a passed one, least for an unjudged one."""
     return {False: 2, True: 1, None: 0}[finding.ok]
 
 

@@ -169,6 +169,10 @@ def compare_with_model(
 def _flight_profile(
     requirements: RouteRequirements, aligned: AlignedTrack, distances_on_legs: Sequence[Floats]
 ) -> Profile:
+    """Measure a flight at points along its legs; NaN on legs that were not flown.
+
+    distances_on_legs: for each leg, the distances of its points from the leg's start, m.
+    """
     parts: list[Floats] = []
     track = aligned.track
     speed = np.hypot(track.velocity[:, 0], track.velocity[:, 1]).astype(np.float64)
@@ -207,7 +211,13 @@ def _flight_profile(
 
 
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
+    """Compare one leg of the flown profile with the same leg of the model's profile.
+
+    leg: number of the leg in the whole route.  rows: points of the profiles on the leg.
+    """
+
     def pair(name: str, reduce: str) -> tuple[float, float]:
+        """Return one quantity of the flown leg and of the model's leg, each reduced to one number."""
         flown_value, model_value = (_reduce_values(getattr(profile, name)[rows], reduce) for profile in profiles)
         return flown_value, model_value
 
@@ -223,6 +233,11 @@ def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
 
 
 def _reduce_values(values: Floats, reduce: str) -> float:
+    """Reduce the finite values to one number, NaN if there are none.
+
+    reduce: "mean"; "span", the last value less the first; "size", the largest absolute value; or "farthest", the value
+        with the largest absolute value.
+    """
     known_values = values[np.isfinite(values)]
     if not known_values.size:
         return math.nan
@@ -242,10 +257,15 @@ def _turn_pair(
     pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],
     corners: Sequence[Sequence[CornerPass]],
 ) -> TurnPair:
+    """Compare the turn at waypoint k of the stretch as flown and as simulated.
+
+    first: number of the stretch's first waypoint in the whole route.
+    """
     flown_turn, model_turn = (measure_turn(requirements, aligned, k) for requirements, aligned in pairs)
     flown_pass, model_pass = (passes[k] for passes in corners)
 
     def value_pair(flown_value: float | None, model_value: float | None, factor: float = 1.0) -> tuple[float, float]:
+        """Return both values times a factor, with NaN instead of None."""
         return (
             math.nan if flown_value is None else flown_value * factor,
             math.nan if model_value is None else model_value * factor,
@@ -261,6 +281,7 @@ def _turn_pair(
 
 
 def _make_spreads(flown_profile: Profile, model_profile: Profile) -> tuple[Spread, ...]:
+    """Summarise the differences of both flights in each quantity, without quantities that have no common point."""
     spreads = []
     for name, unit, factor in (
         ("cross_track", "m", 1.0),

@@ -69,6 +69,7 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 def _ground_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
+    """Describe ground within reach that is too close, too far below (with a maximum height), or unknown."""
     terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if terrain is None:
         return []
@@ -80,7 +81,9 @@ def _ground_hazards(
         hazards.append("the terrain is unknown")
     min_clearance = float(np.nanmin(clearances, initial=math.inf))
     if min_clearance < requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M:
-        hazards.append(f"the ground is only {min_clearance:.0f} m below")
+        hazards.append(
+            f"the ground is only {min_clearance:.0f} m below ({requirements.limits.min_clearance:.0f} m are required)"
+        )
     if limits.max_height_m is not None:
         # The greatest height above ground is the least height above ground of the same world upside down.
         inverted_clearances, _ = path_clearance(
@@ -95,6 +98,7 @@ def _ground_hazards(
 def _missile_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
+    """Describe the missiles whose sphere overlaps the disc within reach, between both altitudes."""
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
@@ -103,13 +107,14 @@ def _missile_hazards(
         radius, (east, north, up) = float(threats.kill_radius[number]), threats.position[number]
         horizontal_distance = max(0.0, math.hypot(east - center[0], north - center[1]) - reach)
         if radius > 0.0 and math.hypot(horizontal_distance, max(0.0, min_altitude - up, up - max_altitude)) <= radius:
-            hazards.append(f"the missile {threat_label(threat.name or '', number)} reaches it")
+            hazards.append(f"missile {threat_label(threat.name or '', number)} has it in range")
     return hazards
 
 
 def _zone_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
+    """Describe the zones that a flight within reach may violate, checked along rings at several altitudes."""
     airspace = requirements.airspace
     if not airspace.zones:
         return []
@@ -134,6 +139,7 @@ def _zone_hazards(
 
 
 def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float) -> list[str]:
+    """Report that the edge of the scenario's area lies within reach, if it does."""
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
@@ -141,7 +147,7 @@ def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float)
         float(min(coordinate - min_edge, max_edge - coordinate))
         for coordinate, (min_edge, max_edge) in zip(center, scenario.bounds, strict=True)
     )
-    return ["the area ends"] if edge_distance < reach - ROUNDING_M else []
+    return ["the area's edge is in reach"] if edge_distance < reach - ROUNDING_M else []
 
 
 def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:

@@ -27,5 +27,6 @@ def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
 
 
 def _present_ends(has_takeoff: bool, has_landing: bool) -> str:
+    """Name the takeoff and the landing that a mission has."""
     present = [name for name, is_present in (("a takeoff", has_takeoff), ("a landing", has_landing)) if is_present]
     return " and ".join(present) or "neither a takeoff nor a landing"

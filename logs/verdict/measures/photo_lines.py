@@ -86,6 +86,7 @@ class _LineRows:
 def _line_rows(
     requirements: RouteRequirements, aligned: AlignedTrack, survey: Survey, line: PhotoLine
 ) -> _LineRows | None:
+    """Return the rows on which a photo line may have been flown; None if it was not reached or has only one row."""
     axis = LineAxis(requirements.points[line.first : line.last + 1])
     window = _row_window(requirements, aligned, line)
     if window.stop - window.start < 2 or not aligned.passed[line.begins]:
@@ -185,6 +186,7 @@ def _camera_on_rows(
     follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(along))
 
     def first_row_at(waypoint: int, min_along: float, first_row: int = 0) -> int:
+        """Return the first row, from `first_row` on, that reaches a waypoint or is `min_along` (m) along the line."""
         distances = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
         # An autopilot that follows a path is at a waypoint where the path passes it.
         radius = 0.0 if follows_path else acceptance_condition(requirements, waypoint).radius

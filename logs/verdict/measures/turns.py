@@ -195,6 +195,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
 
 
 def _first_row(mask: NDArray[np.bool_], default: int) -> int:
+    """Return the first row of a mask, or `default` if the mask is empty."""
     row = int(np.argmax(mask))
     return row if mask[row] else default
 
@@ -202,6 +203,10 @@ def _first_row(mask: NDArray[np.bool_], default: int) -> int:
 def _course_change(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int
 ) -> tuple[float | None, float | None, bool]:
+    """Return the flown course change at waypoint i and its tolerance, rad, and True if both courses are fits.
+
+    Return None, None, False if either leg was flown too little.
+    """
     course_before, course_after = leg_course(requirements, aligned, i - 1), leg_course(requirements, aligned, i)
     if course_before is None or course_after is None:
         return None, None, False

@@ -44,7 +44,7 @@ def glides_headline(glides: Glides) -> str:
     if glides.not_judged:
         return f"not judged: {_NOT_JUDGED_TEXTS[glides.not_judged]}"
     if not glides.each:
-        return "no place to glide from"
+        return "no position to glide from"
     counts = [(reach, glides.count(reach)) for reach in REACHES]
     # Home is reported even if it is reached from nowhere.
     reach_text = ", ".join(
@@ -54,7 +54,7 @@ def glides_headline(glides: Glides) -> str:
         own_text = "ArduPlane's own return, which would follow the terrain, is not simulated"
     else:
         own_text = f"ArduPlane's own return arrives from {glides.arrivals}"
-    return f"of {len(glides.each)} places, {reach_text}; {own_text}"
+    return f"of {len(glides.each)} positions, {reach_text}; {own_text}"
 
 
 def site_text(site: GlideSite) -> str:
@@ -83,6 +83,7 @@ def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
 
 
 def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
+    """Describe the best destination of a time range, and the altitude to spare or missing."""
     glide = glide_range.lowest_glide
     altitude_left = glides.altitude_left(glide)
     time_text = "" if glide_range.count == 1 else f" at worst, from {glide.time:.0f} s"
@@ -95,14 +96,17 @@ def _range_reach_text(glide_range: GlideRange, glides: Glides) -> str:
             return f"only flat ground, {position_text}, {altitude_left:.0f} m of altitude to spare{time_text}"
         case "nothing":
             shortfall_text = (
-                "no glide path exists" if math.isinf(altitude_left) else f"{-altitude_left:.0f} m are missing at most"
+                "no glide path exists"
+                if math.isinf(altitude_left)
+                else f"at most {-altitude_left:.0f} m of altitude are missing"
             )
             return f"nothing, {shortfall_text}"
         case "unknown":
-            return "unknown, because it lies outside the elevation data"
+            return "unknown, because this part lies outside the elevation data"
 
 
 def _own_return_text(glide: Glide) -> str:
+    """Describe the outcome of ArduPlane's own return without thrust; return "" if it is not simulated."""
     name = glide.own_return.target.name
     match glide.own_return.end:
         case "arrives":

@@ -81,6 +81,7 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
+    """Return a set of no starts."""
     return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), is_flown, np.zeros(0, dtype=np.bool_))
 
 
@@ -166,6 +167,7 @@ def _ground_speeds(setup: FlightSetup) -> Floats:
 
 
 def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:
+    """Return records of dtype `RETURN_START` from positions (n, 3) m, velocities (n, 3) m/s and banks (n,) rad."""
     rows: Records = np.zeros(len(position), RETURN_START)
     for k, name in enumerate(("east", "north", "up")):
         rows[name], rows[f"velocity_{name}"] = position[:, k], velocity[:, k]

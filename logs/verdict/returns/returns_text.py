@@ -5,7 +5,15 @@ from collections.abc import Sequence
 
 from flight.autopilots.arduplane.failsafes import Cause
 from flight.mission.return_path import ReturnPoint
-from logs.verdict.returns.judge_returns import KINDS, Kind, ReturnRange, Returns, SimulatedReturn, UnjudgedPart
+from logs.verdict.returns.judge_returns import (
+    KINDS,
+    POINT_MASS_ERROR_M,
+    Kind,
+    ReturnRange,
+    Returns,
+    SimulatedReturn,
+    UnjudgedPart,
+)
 from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
@@ -117,13 +125,13 @@ def headline(returns: Returns) -> str:
 
     >>> from logs.verdict.measures.route_requirements import Airspace
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
-    'no place to return from'
+    'no position to return from'
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True, unjudged_parts=("terrain",)))
     'not judged: with TERRAIN_FOLLOW returns follow the terrain, which is not simulated'
     """
     reasons = "; ".join(_UNJUDGED_PART_TEXTS[reason] for reason in returns.unjudged_parts)
     if not returns.each:
-        return f"not judged: {reasons}" if reasons else "no place to return from"
+        return f"not judged: {reasons}" if reasons else "no position to return from"
     landing_suffix = "; the landing is not judged" if returns.lands else ""
     omitted_text = (
         f"; {returns.omitted_count} on or near the ground during take-off and landing omitted"
@@ -136,6 +144,7 @@ def headline(returns: Returns) -> str:
 
 
 def _judged_text(returns: Returns) -> str:
+    """Count the outcomes of the judged returns; if all are safe, state the lowest height and the least energy left."""
     total, failure_counts = len(returns.each), counts_text(returns)
     if failure_counts:
         safe_count = returns.count("safe")
@@ -178,7 +187,7 @@ def point_of_no_return_text(returns: Returns) -> str:
         case "never":
             text = f"{name}: none, because every return leaves {reserve} (at least {point.remaining_energy:.0f} Wh)"
     verb = "does" if point.skipped_count == 1 else "do"
-    return text + (f"; {point.skipped_count} that {verb} not arrive are ignored" if point.skipped_count else "")
+    return text + (f"; {point.skipped_count} returns that {verb} not arrive are ignored" if point.skipped_count else "")
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
@@ -194,6 +203,7 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
     """
 
     def setting_text(cause: Cause) -> str:
+        """Return the parameter of an event and its value in brackets."""
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
     returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.returns]
@@ -214,11 +224,11 @@ def describe_landing(returns: Returns) -> list[str]:
     Return [] for another autopilot.
 
     >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
-    ['RTL_AUTOLAND 0: a return stays in its circle']
+    ['RTL_AUTOLAND 0: a return keeps circling at its target']
     """
     if returns.autoland is None:
         return []
-    stays_text = "a return stays in its circle"
+    stays_text = "a return keeps circling at its target"
     items_text = (
         f"item{'s' if len(returns.landings) > 1 else ''} {', '.join(str(landing.item) for landing in returns.landings)}"
     )
@@ -228,7 +238,7 @@ def describe_landing(returns: Returns) -> list[str]:
         case ((1 | 2), False):
             text = f"the mission has no DO_LAND_START: {stays_text}"
         case 1, True:
-            text = f"from its circle a return continues to the landing sequence at {items_text}"
+            text = f"from its loiter a return continues to the landing sequence at {items_text}"
         case 2, True:
             text = f"a return flies straight to the landing sequence at {items_text}"
         case 3, _:
@@ -261,6 +271,7 @@ def range_text(return_range: ReturnRange, returns: Returns, scenario: Scenario) 
 def _range_outcome_text(
     worst_return: SimulatedReturn, return_range: ReturnRange, returns: Returns, scenario: Scenario
 ) -> str:
+    """Describe the outcome of the worst return of a time range, with its position, height or energy."""
     prefix = "" if return_range.count == 1 else f"at worst from {worst_return.time:.0f} s, "
     east, north, up = worst_return.lowest_position
     position_text = f"{east:.0f} m east, {north:.0f} m north"
@@ -277,7 +288,7 @@ def _range_outcome_text(
         case "zone":
             return f"{prefix}violates zone {returns.airspace.zones[worst_return.zone].name}"
         case "lost":
-            end_text = "landing sequence" if worst_return.target.landing is not None else "circle"
+            end_text = "landing sequence" if worst_return.target.landing is not None else "loiter"
             return f"{prefix}does not reach its {end_text} at {worst_return.target.position[2]:.0f} m AMSL"
         case "energy":
             left_text = f"leaves {worst_return.energy_left:.0f} Wh of the required {returns.reserve:.0f} Wh"
@@ -289,11 +300,11 @@ def _range_outcome_text(
             return f"{prefix}flies where the terrain is unknown"
         case "unsure":
             return (
-                f"{prefix}{height_text} by the point mass, but JSBSim flies this return, or one near "
-                "it, too far from there"
+                f"{prefix}{height_text} by the point mass, but JSBSim's flight of this return, or of one near"
+                f" it, differs by more than {POINT_MASS_ERROR_M:.0f} m"
             )
     if worst_return.required_height < returns.limit:
-        height_text += " (taking off or landing: it begins below the required height)"
+        height_text += " (taking off or landing: the return begins below the required height)"
     energy_text = "" if math.isnan(worst_return.energy_left) else f", {worst_return.energy_left:.0f} Wh left"
     sphere_text = (
         ""
@@ -317,5 +328,5 @@ def rally_texts(rally: Sequence[ReturnPoint], scenario: Scenario) -> list[str]:
     texts = []
     for point in rally:
         lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))
-        texts.append(f"{lat:.7f}, {lon:.7f}, {point.up - point.base:.0f} m over home")
+        texts.append(f"{lat:.7f}, {lon:.7f}, {point.up - point.base:.0f} m above home")
     return texts

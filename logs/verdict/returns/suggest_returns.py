@@ -78,6 +78,7 @@ class _ReturnLimits:
     sphere_distance: Floats
 
     def subset(self, indices: NDArray[np.intp]) -> "_ReturnLimits":
+        """Return the limits of the starts with these indices."""
         return _ReturnLimits(self.clearance[indices], self.sphere_distance[indices])
 
 
@@ -136,6 +137,10 @@ def _meets_criterion(
     limits: _ReturnLimits,
     criterion: Criterion,
 ) -> Flags:
+    """Flag each return from a start to its target that meets a criterion, (n,).
+
+    With `_meets_all`, zones and energy are checked too.
+    """
     sphere_distances = limits.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
     results, paths = simulate_returns(world, starts, targets, (limits.clearance, sphere_distances))
     is_met = criterion(world, results, limits)

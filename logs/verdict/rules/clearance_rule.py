@@ -215,6 +215,11 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
 def _planned_clearance(
     requirements: RouteRequirements, leg: int, planned_height: float, limit: float, error: float | None
 ) -> Finding:
+    """Judge the minimum height above ground of a leg's planned path.
+
+    planned_height: m; NaN if the leg leaves the terrain data.  limit: required height, m.
+    error: the terrain's stated error, m; None if not stated.
+    """
     reason = f"{planned_height:.1f} m above ground at the lowest"
     if math.isnan(planned_height):
         reason = "the leg leaves the terrain data"
@@ -245,6 +250,10 @@ def _flown_clearance(
     *,
     is_planned_short: bool,
 ) -> Finding:
+    """Judge the minimum height above ground on a flown leg; the planned height is only reported.
+
+    is_planned_short: True if the planned path is lower than required.
+    """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
     if aligned is not None and aligned.has_flown(leg):
         # The first leg includes what came before it, the last leg what came after.

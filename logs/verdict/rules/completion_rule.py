@@ -74,7 +74,7 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
     steps = np.diff(track.time)
     gap = int(np.argmax(steps))
     if steps[gap] > max(MAX_ROW_GAP_S, MAX_ROW_GAP_TICKS * float(np.median(steps))):
-        faults.append(message(f"rows are missing from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
+        faults.append(message(f"the log has no rows from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
     # Across missing rows the mean velocity is meaningless.
     is_short = steps <= MAX_ROW_GAP_S
     mean_velocity = np.diff(track.position, axis=0)[is_short] / steps[is_short, None]
@@ -111,7 +111,7 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
             faults.append(message(reason))
     elif last_leg in flown_legs and missing_items is not None and missing_items.beyond:
         unknown_texts.append(
-            f"{finished_count} of {leg_count} of the legs in the log flown, the last of them to "
+            f"{finished_count} of the {leg_count} legs in the log flown, the last of them to "
             f"its end: {_missing_items_text(missing_items)}"
         )
     elif last_leg in flown_legs:
@@ -184,7 +184,7 @@ def _gaps_text(flown_stretches: Sequence[FlownLegs]) -> list[str]:
     longest_gap = max(gaps, key=lambda gap: gap.end - gap.start)
     gap_time = sum(gap.end - gap.start for gap in gaps)
     return [
-        f"{len(gaps)} gaps of {gap_time:.1f} s in all,"
+        f"the log has {len(gaps)} gaps of {gap_time:.1f} s in all,"
         f" the longest from {longest_gap.start:.1f} s to {longest_gap.end:.1f} s"
     ]
 
@@ -206,6 +206,7 @@ def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
 
 
 def _missing_items_text(missing: MissingItems) -> str:
+    """State the number of mission items that are not in the log."""
     return (
         f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission are not in the log"
     )
@@ -224,6 +225,7 @@ def _next_waypoint(setup: FlightSetup, legs: FlownLegs) -> int:
 
 
 def _next_waypoint_text(setup: FlightSetup, legs: FlownLegs) -> str:
+    """Name the waypoint to which a stretch was flying when it ended."""
     waypoint = _next_waypoint(setup, legs)
     item = int(setup.route.items[waypoint])
     return f"waypoint {setup.route.stops[waypoint]}" + (f" (item {item})" if item >= 0 else "")

@@ -246,11 +246,13 @@ def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landi
 def _go_around_finding(
     requirements: RouteRequirements, terrain: Terrain, landing: _Landing, *, is_required: bool
 ) -> Finding:
-    place, height = requirements.waypoint(landing.waypoint), landing.climb_height
-    climb_text = f"the aircraft climbs to {height:.0f} m above home"
-    climb_text += f", which is {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
+    """Simulate go-arounds from several positions on the glide, and judge the worst; it fails only if required."""
+    setup, place, height = requirements.setup, requirements.waypoint(landing.waypoint), landing.climb_height
+    climb_text = (
+        f"the aircraft climbs to {height:.0f} m above home, which is"
+        f" {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
+    )
     # A go-around flies to no rally point.
-    setup = requirements.setup
     world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
     go_arounds = (
         []
@@ -298,7 +300,7 @@ def _go_around_finding(
         tolerance=0.0,
         margin=None if worst.entered_hazard or worst.is_lost else worst.lowest_height - worst.required_height,
         unit="m",
-        method=f"flown by the simulated ArduPlane on a point mass from {len(go_arounds)} places of the glide",
+        method=f"flown by the simulated ArduPlane on a point mass from {len(go_arounds)} positions on the glide",
         facts=[climb],
     )
 

@@ -137,10 +137,7 @@ def climbout_findings(
         return [_air_start_finding(place, _find_obstacles(requirements, path))]
     takeoff_altitude = float(requirements.points[0, 2])
     if takeoff_altitude <= ground_altitude:
-        reason = (
-            f"the take-off climbs to {takeoff_altitude:.0f} m AMSL, which is not above the ground at home,"
-            f" {ground_altitude:.0f} m AMSL"
-        )
+        reason = f"the take-off ends {ground_altitude - takeoff_altitude:.0f} m below the ground at home"
         return [_unjudged_finding("climbout", place, reason, is_undecided=True)]
     obstacles, obstacles_at_min_climb = (
         _find_obstacles(
@@ -321,6 +318,7 @@ def _free_courses_text(
     """Describe the widest range of courses on which a launch climbs to the take-off's altitude without obstacles."""
 
     def is_free(course: float) -> bool:
+        """Return True if a launch on a course (rad) climbs to the take-off's altitude without obstacles."""
         climb, _ = _climb_slopes(requirements, 0, course, ground_altitude)
         if not climb > 0.0:
             return False
@@ -382,10 +380,7 @@ def approach_findings(
         reason = "the terrain height at the landing point is unknown"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     if start_altitude <= point_altitude:
-        reason = (
-            f"the glide begins at {start_altitude:.0f} m AMSL, which is not above the landing point,"
-            f" {point_altitude:.0f} m AMSL"
-        )
+        reason = f"the glide begins {point_altitude - start_altitude:.0f} m below the landing point"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
     glide = setup.autopilot.ground.glide(
         start_altitude - point_altitude, length, setup.scenario.wind.along(course, point_altitude)[0], point_altitude

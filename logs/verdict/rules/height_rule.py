@@ -127,6 +127,12 @@ def _leg_finding(
     judged_maximum: _LegMaxima | None,
     path_name: str,
 ) -> Finding:
+    """Judge the maximum height above ground and the maximum altitude of one leg.
+
+    limit: maximum height above ground, m.
+    judged_maximum: maxima of the planned or flown leg; None for a leg that was not flown.
+    path_name: name of the judged path.
+    """
     faults, facts, ok = [], [], None
     if judged_maximum is None:
         facts.append("the leg was not flown")

@@ -40,6 +40,7 @@ def launch_findings(
 
 
 def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_off: TakeOff) -> Finding:
+    """Judge a flown take-off: motor start, height reached and lost, runway, ground clearance and hazards."""
     track = ground.launch
     path = track_path(track)
     position, distances = path

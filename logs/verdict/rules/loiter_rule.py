@@ -156,6 +156,7 @@ def end_findings(
 def _loiter_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, circle: LoiterCircle, corner_findings: list[Finding]
 ) -> Finding:
+    """Judge one loiter by its radius and by the findings on its corners, which this finding replaces."""
     corners = slice(circle.first, circle.last + 1)
     is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
     min_radius = float(requirements.min_radius[corners].max()) if is_known else math.nan
@@ -181,10 +182,7 @@ def _loiter_finding(
     if aligned is not None and failed_corners:
         faults.append(_unheld_corners_message(circle, failed_corners))
     elif failed_corners and not faults:
-        first_corner = failed_corners[0]
-        reason_text = f"{place_text(first_corner.place)}: {first_corner.reason}"
-        is_at_waypoint = first_corner.place == requirements.waypoint(circle.first)
-        faults.append(Message(reason_text, _corner_text(first_corner.place), is_at_waypoint))
+        faults.append(_failed_corner_message(requirements, circle, failed_corners[0]))
     radii = np.zeros(0) if aligned is None else _flown_radii(aligned, circle)
     mean_radius = float(radii.mean()) if radii.size else math.nan
     if radii.size:
@@ -287,6 +285,12 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"
     return [message(f"radius {circle.radius:.0f} m; {need_text} in this wind")]
+
+
+def _failed_corner_message(requirements: RouteRequirements, circle: LoiterCircle, finding: Finding) -> Message:
+    """Name a planned corner that fails, and the reason."""
+    reason_text = f"{place_text(finding.place)}: {finding.reason}"
+    return Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint(circle.first))
 
 
 def _unheld_corners_message(circle: LoiterCircle, failed_corners: list[Finding]) -> Message:

@@ -45,6 +45,7 @@ def slope_findings(
 
 
 def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> Finding:
+    """Judge the slope of a leg, and how the leg was flown.  measure: None before a flight."""
     planned_slope = float(requirements.slopes[leg])
     limit, source = slope_limit(requirements, leg)
     sign = 1.0 if planned_slope >= 0.0 else -1.0
@@ -152,6 +153,7 @@ def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message
 
 
 def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
+    """Return True if the aircraft can fly level at the leg's commanded airspeed."""
     min_speed, max_speed = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
     return min_speed <= float(requirements.route.airspeed[leg]) <= max_speed
 
@@ -191,6 +193,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
 
 
 def _distance_text(metres: float) -> str:
+    """Write a distance in metres, or in kilometres from 1 km on."""
     return f"{metres / 1000.0:.1f} km" if metres >= 1000.0 else f"{metres:.0f} m"
 
 

@@ -146,11 +146,13 @@ def _is_too_tight(requirements: RouteRequirements, i: int) -> bool:
 
 
 def _line_text(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> str:
+    """Name a photo line by its number from 1 and its mission items."""
     items = [int(requirements.setup.route.items[i]) for i in (line.first, line.last)]
     return f"photo line {number} of {len(survey.lines)} (items {items[0]} to {items[1]})"
 
 
 def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
+    """Return the first leg of a photo line as the place of its findings."""
     return requirements.leg(line.first)
 
 
@@ -195,6 +197,7 @@ def _clip_to_length(distance: float, length: float) -> float:
 def _flown_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey, line: PhotoLine, number: int
 ) -> Finding:
+    """Judge the usable fraction of a photo line as flown; a line that was not flown is not judged."""
     name = _line_text(requirements, survey, line, number)
     measure = None if aligned is None else measure_line(requirements, aligned, survey, line)
     if measure is None:
@@ -239,6 +242,11 @@ def _line_finding(
     geometric: bool,
     measure: LineMeasure | None = None,
 ) -> Finding:
+    """Make the finding on a photo line.
+
+    usable_fraction: usable fraction of the line's length; NaN if it was not flown.
+    measure: measurements of the flown line, which are reported as facts.
+    """
     measurements = []
     if measure is not None:
         measurements = [

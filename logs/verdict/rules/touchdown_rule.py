@@ -174,6 +174,7 @@ def _landing_point_text(approach: Approach) -> str:
 
 
 def _as_floats(values: tuple[Floats, Floats]) -> tuple[float, float]:
+    """Convert a pair of arrays with one element each to floats."""
     return float(values[0]), float(values[1])
 
 

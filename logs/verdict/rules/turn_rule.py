@@ -47,6 +47,7 @@ def turn_findings(
 def _turn_finding(
     requirements: RouteRequirements, i: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
+    """Judge the turn at waypoint i.  measure: the flown turn; None before a flight."""
     planned_turn = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
     # A neighbouring turn that needs more than the whole leg is itself at fault: going straight on needs no length.
@@ -139,6 +140,7 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 def _sharp_turn_message(
     requirements: RouteRequirements, i: int, planned_turn: float, limit: float, source: str
 ) -> Message:
+    """Explain why the planned turn (rad) at waypoint i does not fit: its limit, or the leg length that it takes."""
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":
         return message(f"{turn_text}, beyond the scenario's {math.degrees(limit):.1f}°")

@@ -75,6 +75,12 @@ def _turn_text(requirements: RouteRequirements, i: int, condition: AcceptanceCon
 
 
 def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
+    """Judge the closest approach of the track to waypoint i.
+
+    A waypoint to which the flight was not yet flying when it ended is not judged.
+
+    apexes: points at which the planned path passes the waypoints, (w, 3) m.
+    """
     condition, setup = acceptance_condition(requirements, i), requirements.setup
     offset, max_distance = float(requirements.fly_by_offset[i]), condition.radius + condition.tolerance
     distance, reason = math.nan, "missed: nothing was flown"

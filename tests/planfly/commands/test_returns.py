@@ -47,7 +47,7 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     answer = json.loads((hill / "mission.json").read_text(encoding="utf-8"))
     assert answer["conditions"]["aircraft"] == "aerosonde"
     assert answer["ranges"][0]["kind"] == "ground"
-    assert "engine out: of 13 places, home can be reached from" in out
+    assert "engine out: of 13 positions, home can be reached from" in out
     assert "point of no return: none, because every return leaves the reserve of" in out
     assert "which contains no trees, houses or water" in out
     glides = answer["engine_out"]

@@ -34,7 +34,7 @@ def test_an_unfinished_flight_is_never_flyable(setup: FlightSetup) -> None:
 
 def test_a_hole_in_the_record(setup: FlightSetup, track: Track) -> None:
     holed = join_tracks([track.rows(0, 3000), track.rows(3100, len(track))])
-    assert "rows are missing" in of(judge(setup, holed), "completion").reason
+    assert "the log has no rows" in of(judge(setup, holed), "completion").reason
 
 
 def test_an_infeasible_plan_flown_is_not_complete(setup: FlightSetup, track: Track) -> None:
@@ -84,5 +84,5 @@ def test_where_a_record_contradicts_itself_is_told(setup: FlightSetup, track: Tr
 
 def test_what_is_missing_of_a_record_is_told(setup: FlightSetup, track: Track) -> None:
     holed = join_tracks([track.rows(0, 3000), track.rows(3100, 6000), track.rows(6040, len(track))])
-    wanted = f"rows are missing from {track.time[2999]:.1f} s to {track.time[3100]:.1f} s"
+    wanted = f"the log has no rows from {track.time[2999]:.1f} s to {track.time[3100]:.1f} s"
     assert wanted in of(judge(setup, holed), "completion").reason

@@ -30,7 +30,7 @@ def paused(track: Track, seconds: float) -> Track:
 def test_a_pause_between_rows_is_a_loss(setup: FlightSetup, rate: float, pause: float, whole: bool) -> None:
     item = of(judge(setup, paused(fly_path(setup, rate=rate), pause)), "completion")
     assert item.ok is whole
-    assert ("rows are missing" in item.reason) is not whole
+    assert ("the log has no rows" in item.reason) is not whole
 
 
 @pytest.mark.parametrize(("off", "ok"), [(9.8, True), (10.2, False)])
