@@ -6,6 +6,7 @@ parallel runs at equal spacing with short links between them. A run is straight,
 QGroundControl's corridor scan.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -286,6 +287,12 @@ class _Runs:
         """Set up for points (w, 3) m, and runs given by their first and last waypoints."""
         self.points, self.runs = points, runs
         self._distances = np.concatenate([[0.0], np.cumsum(leg_runs(points))]).tolist()
+        # East and north of each waypoint, and course and length of each run, as plain numbers: arrays of two take
+        # ten times as long.
+        self._places: list[list[float]] = points[:, :2].tolist()
+        steps = np.array([points[last, :2] - points[first, :2] for first, last in runs]).reshape(-1, 2)
+        self._directions = [(math.sin(course), math.cos(course)) for course in itertools.starmap(math.atan2, steps)]
+        self.run_lengths: list[float] = np.hypot(*steps.T).tolist()
         self._spacings = dict[tuple[int, int], float | None]()
         self._next_lines = dict[int, list[int]]()
         self._midpoints = dict[_Line, Floats]()
@@ -314,8 +321,33 @@ class _Runs:
     def spacing(self, run: int, other_run: int) -> float | None:
         """Return the distance between two runs, m, or None if they are not parallel neighbors."""
         if (run, other_run) not in self._spacings:
-            self._spacings[run, other_run] = _run_spacing(self.points, self.runs[run], self.runs[other_run])
+            self._spacings[run, other_run] = self._compute_spacing(run, other_run)
         return self._spacings[run, other_run]
+
+    def _compute_spacing(self, run: int, other_run: int) -> float | None:
+        length, other_length = self.run_lengths[run], self.run_lengths[other_run]
+        min_length = min(length, other_length)
+        if min_length < _MIN_LINE_LENGTH_M:
+            return None
+        start, end = (self._along_and_right_of(run, waypoint) for waypoint in self.runs[other_run])
+        if abs(end[0] - start[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
+            return None
+        spacing = abs(0.5 * (start[1] + end[1]))
+        overlap = min(length, max(start[0], end[0])) - max(0.0, min(start[0], end[0]))
+        if (
+            overlap < _MIN_OVERLAP_FRACTION * min_length
+            or spacing < _MIN_LINE_SPACING_M
+            or abs(end[1] - start[1]) > _MAX_SPACING_CHANGE_RATIO * spacing
+        ):
+            return None
+        return spacing
+
+    def _along_and_right_of(self, run: int, waypoint: int) -> tuple[float, float]:
+        """Return a waypoint's distance along a run and to the right of it, m."""
+        (start_east, start_north), (east, north) = self._places[self.runs[run][0]], self._places[waypoint]
+        course_east, course_north = self._directions[run]
+        east, north = east - start_east, north - start_north
+        return east * course_east + north * course_north, east * course_north - north * course_east
 
     def next_lines(self, run: int) -> list[int]:
         """Return the runs after a run with which the next line may start, in flying order."""
@@ -406,31 +438,13 @@ def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool
     ):
         return False
     spacing, bent_spacing = runs.spacing(run, next_run), runs.spacing(run_before, run_after)
-    lengths = [_run_geometry(runs.points, runs.runs[k])[2] for k in (run_before, run_after)]
+    lengths = [runs.run_lengths[k] for k in (run_before, run_after)]
     return (
         spacing is not None
         and bent_spacing is not None
         and max(spacing, bent_spacing) <= _SPACING_RATIO_LIMIT * min(spacing, bent_spacing)
         and max(lengths) <= _SPACING_RATIO_LIMIT * min(lengths)
     )
-
-
-def _run_spacing(points: Floats, own_run: tuple[int, int], other_run: tuple[int, int]) -> float | None:
-    """Return the distance between two runs, m, or None if they are not parallel neighbors."""
-    start, course, length = _run_geometry(points, own_run)
-    along, across = _along_and_right(points[[other_run[0], other_run[1]], :2] - start, course)
-    other_length = float(np.hypot(*(points[other_run[1], :2] - points[other_run[0], :2])))
-    min_length, spacing = min(length, other_length), abs(float(across.mean()))
-    if min_length < _MIN_LINE_LENGTH_M or abs(along[1] - along[0]) < math.cos(_PARALLEL_TOLERANCE_RAD) * other_length:
-        return None
-    overlap = min(length, float(along.max())) - max(0.0, float(along.min()))
-    if (
-        overlap < _MIN_OVERLAP_FRACTION * min_length
-        or spacing < _MIN_LINE_SPACING_M
-        or abs(float(across[1] - across[0])) > _MAX_SPACING_CHANGE_RATIO * spacing
-    ):
-        return None
-    return spacing
 
 
 # ----------------------------------------------------------------------
@@ -454,7 +468,8 @@ def _make_survey(
     line_pairs = pairwise(lines)
     if not has_photos or all((camera[line.last : following.first] != 0.0).all() for line, following in line_pairs):
         lines = _without_leads(points, lines, turn_arounds)
-    course = _run_geometry(points, (run_start, run_start + 1))[1]
+    first_leg = points[run_start + 1, :2] - points[run_start, :2]
+    course = math.atan2(*first_leg)
     return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(gaps)))
 
 
@@ -544,13 +559,6 @@ def _without_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoL
     first = start_points[0] if start_points and line.first == line.begins else line.first
     last = end_points[-1] if end_points and line.last == line.ends else line.last
     return line._replace(first=first, last=last) if first < last else line
-
-
-def _run_geometry(points: Floats, run: tuple[int, int]) -> tuple[Floats, float, float]:
-    """Return the start of a run (2,) m, its course from start to end, rad, and its length, m."""
-    start, end = points[run[0], :2], points[run[1], :2]
-    step = end - start
-    return start, math.atan2(step[0], step[1]), float(np.hypot(*step))
 
 
 def _along_and_right(offsets: Floats, course: float) -> tuple[Floats, Floats]:

@@ -1,6 +1,5 @@
 """Compute the requirements of a route and the aircraft's limits, which are the planned side of every finding."""
 
-import functools
 import math
 from dataclasses import dataclass, replace
 
@@ -381,16 +380,16 @@ class RouteRequirements:
         item = int(self.setup.route.items[waypoint])
         return None if item < 0 else item
 
-    def is_in_turnaround(self, waypoint: int) -> bool:
-        """Return True if a waypoint is part of a survey's turn-around, ends included.
+    def turnaround_waypoints(self) -> set[int]:
+        """Return the waypoints of all surveys' turn-arounds, ends, entries and exits included.
 
         The autopilot decides the path of a turn-around.
         """
-        return waypoint in _turnaround_parts(self.surveys)[0]
+        return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last + 1)}
 
-    def is_turnaround_leg(self, leg: int) -> bool:
-        """Return True if a leg is part of a survey's turn-around."""
-        return leg in _turnaround_parts(self.surveys)[1]
+    def turnaround_legs(self) -> set[int]:
+        """Return the legs of all surveys' turn-arounds, entries and exits included."""
+        return {i for survey in self.surveys for first, last in survey.transitions() for i in range(first, last)}
 
     def leg_unit(self, leg: int) -> Floats:
         """Return the east and north components of a leg's course, (2,)."""
@@ -472,16 +471,6 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
         return ()
     surveys = find_surveys(setup.route, camera, photo_plans)
     return tuple(survey for survey in surveys if mode == "lines" or survey.takes_photos())
-
-
-@functools.lru_cache(maxsize=8)
-def _turnaround_parts(surveys: tuple[Survey, ...]) -> tuple[frozenset[int], frozenset[int]]:
-    """Return the waypoints and legs of all turnarounds, including the paths onto the first line and off the last."""
-    ends = [pair for survey in surveys for pair in survey.transitions()]
-    return (
-        frozenset(i for first, last in ends for i in range(first, last + 1)),
-        frozenset(i for first, last in ends for i in range(first, last)),
-    )
 
 
 def true_route(setup: FlightSetup) -> Route:

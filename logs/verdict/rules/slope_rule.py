@@ -32,10 +32,10 @@ def slope_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge the slope of each leg; if ``geometric``, judge only the route, without a flight."""
-    findings = []
+    findings, turnaround_legs = [], requirements.turnaround_legs()
     for leg in range(requirements.legs):
         # Without a flight the path of a climb that cannot be flown is unknown.
-        if requirements.is_turnaround_leg(leg) and not geometric:
+        if leg in turnaround_legs and not geometric:
             continue
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:

@@ -37,10 +37,11 @@ def turn_findings(
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
+    turnaround_waypoints = requirements.turnaround_waypoints()
     return [
         _turn_finding(requirements, i, measure, aligned)
         for i, measure in enumerate(measures, 1)
-        if not requirements.is_in_turnaround(i)
+        if i not in turnaround_waypoints
     ]
 
 

@@ -23,7 +23,8 @@ def waypoint_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge the distance of the track, or of the planned path (``geometric``), from each waypoint."""
-    judged_waypoints = [i for i in range(len(requirements.points)) if not requirements.is_in_turnaround(i)]
+    turnaround_waypoints = requirements.turnaround_waypoints()
+    judged_waypoints = [i for i in range(len(requirements.points)) if i not in turnaround_waypoints]
     if geometric:
         return [_planned_finding(requirements, i) for i in judged_waypoints]
     apexes = requirements.apexes()

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from flight.mission import surveys as survey_module
 from flight.mission.items import Command, Mission, SurveyPlan
@@ -84,13 +83,13 @@ def test_what_is_no_survey(places: list[Place]) -> None:
 
 def test_rounds_flown_many_times_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each run is laid beside the 13 that follow it, once, though a survey might begin at each of 240 of them."""
-    asked, really = list[tuple[int, ...]](), survey_module._run_spacing
+    asked, really = list[tuple[int, int]](), survey_module._Runs._compute_spacing
 
-    def count(points: NDArray[np.float64], one: tuple[int, int], other: tuple[int, int]) -> float | None:
-        asked.append((*one, *other))
-        return really(points, one, other)
+    def count(runs: survey_module._Runs, one: int, other: int) -> float | None:
+        asked.append((one, other))
+        return really(runs, one, other)
 
-    monkeypatch.setattr(survey_module, "_run_spacing", count)
+    monkeypatch.setattr(survey_module._Runs, "_compute_spacing", count)
     assert surveys([(0, 0), (0, 1500), (1500, 1500), (1500, 0)] * 60) == ()
     assert len(asked) == len(set(asked)) <= 240 * 13
 

@@ -120,6 +120,14 @@ def test_flights_are_few_and_shared(monkeypatch: pytest.MonkeyPatch) -> None:
     assert flights.count == 2
 
 
+def test_no_suggestion_of_a_mission_of_thousands_of_legs_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    legs = SESSION.judged.requirements.legs
+    for max_legs, tried in ((legs, 1), (legs - 1, 0)):
+        monkeypatch.setattr(suggestion_trials, "_MAX_TRIED_LEGS", max_legs)
+        trials, flights = trials_of(monkeypatch, [low(1, higher(1, 12.0))], lambda up: [])
+        assert (len(trials.find_passing()), flights.count) == (tried, tried)
+
+
 def test_by_geometry_every_suggestion_that_is_offered_mends() -> None:
     """And one that leads beyond the ceiling is not offered."""
     context = SESSION.context
