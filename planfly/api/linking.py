@@ -12,7 +12,6 @@ from logs.verdict.measures.link_outages import LinkAlongPath, link_along_path, s
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.rules.link_rule import link_findings
-from logs.views.charts import Chart, Panel, series
 from planfly.api.flying import FlownMission, judge
 from planfly.arguments import check_arguments
 from planfly.flight_options import LogOptions, takes_options
@@ -21,6 +20,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import LINK_FILES, check_output_folder, clean_folder
 from planner.plan import Plan
+from world.arrays import Floats
 from world.errors import ArgumentError
 from world.files import write_whole
 from world.scenario import with_link
@@ -29,19 +29,21 @@ from world.scenario import with_link
 _NEEDED = ("frequency", "power", "sensitivity")
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class LinkResult:
     """Result of `planfly.link`.
 
     setup: the flown mission, in a scenario with the link.
     finding: the verdict's finding on the link.
     along: the link once a second along the flight; None if it cannot be computed.
+    antenna: position of the station's antenna, (3,) m; None without `along`.
     files: files written; empty if no folder was named.
     """
 
     setup: FlightSetup
     finding: Finding
     along: LinkAlongPath | None = None
+    antenna: Floats | None = None
     files: tuple[Path, ...] = ()
 
     @property
@@ -86,7 +88,7 @@ def link(
     frequency: MHz.  power: output of the transmitter, dBm.  sensitivity: of the receiver, dBm.
     station: latitude and longitude of the station's antenna; by default it stands at the mission's home.
     antenna: height of that antenna above ground, m.  fade_margin: power to keep above the sensitivity, dB.
-    out: folder for a picture of the link over time; None writes none.  overwrite: True replaces it.
+    out: folder for pictures of the link over time and on the map; None writes none.  overwrite: True replaces them.
     options: see `planfly.judge`.
     Raises a `planfly.PlanflyError` for bad input, and for a scenario without [link] if frequency, power or sensitivity
     is missing.
@@ -117,14 +119,28 @@ def link(
             raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
     setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries))
     result = _judge_link(setup, judged.track)
-    if out is None or result.along is None:
-        return result
-    # Imported here: only a picture needs matplotlib.
-    from logs.views.drawing import draw_chart, png_bytes
+    return result if out is None else _with_pictures(result, Path(out), overwrite=overwrite)
 
-    file = clean_folder(Path(out), LINK_FILES, overwrite=overwrite) / LINK_FILES[0]
-    write_whole(file, png_bytes(draw_chart(_link_chart(setup, result.along))))
-    return replace(result, files=(file,))
+
+def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> LinkResult:
+    """Write the pictures of a link into a folder, and return the result with their files."""
+    if result.along is None or result.antenna is None:
+        return result
+    # Imported here: only pictures need matplotlib.
+    from logs.views.figures import View, draw_pictures
+    from logs.views.link import link_chart, link_map
+
+    setup = result.setup
+    with stage("drawing", "drawing a link"):
+        views: dict[str, View] = {
+            "link": link_chart(setup, result.along),
+            "link-map": link_map(setup, result.along, result.antenna),
+        }
+        pictures = draw_pictures(views)
+    clean_folder(folder, LINK_FILES, overwrite=overwrite)
+    for name in LINK_FILES:
+        write_whole(folder / name, pictures[name])
+    return replace(result, files=tuple(folder / name for name in LINK_FILES))
 
 
 def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
@@ -133,30 +149,11 @@ def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
         requirements = route_requirements(setup)
         aligned = None if track is None else align_track(requirements, track)
         (finding,) = link_findings(requirements, aligned)
-        return LinkResult(setup, finding, _flown_link(setup, track))
-
-
-def _flown_link(setup: FlightSetup, track: Track | None) -> LinkAlongPath | None:
-    """Return the link along a track; None without a track, a terrain or a known position of the station."""
-    scenario = setup.scenario
-    if track is None or not len(track) or scenario.terrain is None or scenario.link is None:
-        return None
-    antenna = station_antenna(setup, scenario.link, scenario.terrain)
-    if antenna is None:
-        return None
-    return link_along_path(scenario.link, scenario.terrain, antenna, track.time, track.position)
-
-
-def _link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
-    """Return a chart of the margin over the fade margin, the diffraction loss and the distance over time."""
-    points = along.points
-
-    def panel(title: str, unit: str, values: Any, limits: tuple[tuple[str, float], ...] = ()) -> Panel:
-        return Panel(title, unit, (series("flown", "flown", along.time, values),), limits=limits)
-
-    panels = (
-        panel("link margin", "dB", points.margin, (("required", 0.0),)),
-        panel("terrain loss", "dB", points.diffraction_loss),
-        panel("distance", "km", points.distance / 1000.0),
-    )
-    return Chart(f"{setup.scenario.name}: the radio link", "time since the start", "s", panels, timed=True)
+        link_of_scenario, terrain = setup.scenario.link, setup.scenario.terrain
+        antenna = None
+        if terrain is not None and link_of_scenario is not None:
+            antenna = station_antenna(setup, link_of_scenario, terrain)
+        if track is None or not len(track) or terrain is None or link_of_scenario is None or antenna is None:
+            return LinkResult(setup, finding)
+        along = link_along_path(link_of_scenario, terrain, antenna, track.time, track.position)
+        return LinkResult(setup, finding, along, antenna)

@@ -65,7 +65,7 @@ def link_options(command_line: LineParser) -> None:
     steering_options(parser).add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
-    result_options(parser, "folder for a picture of the link over time (default: none)")
+    result_options(parser, "folder for pictures of the link over time and on the map (default: none)")
 
 
 def link(args: argparse.Namespace) -> int:

@@ -54,8 +54,8 @@ RETURN_FILES = (
     "returns.mcap",
     *(f"worst-return-{k}{suffix}" for k in range(1, MAX_BY_PROGRAM + 1) for suffix in (".mcap", ".BIN")),
 )
-# File of `planfly.link`.
-LINK_FILES = ("link.png",)
+# Files of `planfly.link`.
+LINK_FILES = ("link.png", "link-map.png")
 # Maximum number of parts of a flight that are flown again.
 MAX_REFLOWN_PARTS = 9
 # Files of each part that is flown again, numbered from the second part on.

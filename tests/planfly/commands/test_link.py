@@ -73,7 +73,7 @@ def test_the_command_prints_answers_and_draws(log: Path, capsys: pytest.CaptureF
     assert "dB below the fade margin" in out
     answer = json.loads(Path("answer.json").read_text(encoding="utf-8"))
     assert (answer["ok"], answer["exit_code"]) == (False, 4)
-    assert answer["files"] == [str(Path("drawn") / "link.png")]
-    assert Path("drawn", "link.png").exists()
+    assert answer["files"] == [str(Path("drawn") / name) for name in ("link.png", "link-map.png")]
+    assert all(Path(name).exists() for name in answer["files"])
     assert main(["link", str(log), *radio[:4]]) == 2
     assert "--sensitivity missing: expected a number, or a scenario with [link]" in capsys.readouterr().err
