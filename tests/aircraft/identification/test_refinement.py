@@ -1,0 +1,54 @@
+"""Refined moments follow the log, and count the prior of what the log does not show only once."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.identification.alignment import Signals
+from aircraft.identification.estimate import aligned_signals, combine_with_prior
+from aircraft.identification.parameters import INDEX, NAMES, PARAMETERS, prior_sds
+from aircraft.identification.refinement import IS_MOMENT, Refinement, refine_moments
+from tests.aircraft.identification.flown_truth import flown_truth
+
+MOMENTS = [name for name in NAMES if IS_MOMENT[INDEX[name]]]
+
+
+def flown_signals() -> Signals:
+    flown = flown_truth()
+    return aligned_signals(flown.records, flown.estimate.clocks, flown.base)
+
+
+def refine(signals: Signals, **factors: float) -> Refinement:
+    """Refine the moments with some of the base's coefficients changed by factors."""
+    flown = flown_truth()
+    coefficients = flown.base.coefficients
+    changed = {name: factor * getattr(coefficients, name) for name, factor in factors.items()}
+    base = replace(flown.base, coefficients=replace(coefficients, **changed))
+    return refine_moments(signals, base, flown.estimate.values)
+
+
+def test_a_base_of_half_the_moments_needs_twice_the_factors() -> None:
+    """The moments are the same, so their factors double: 2.3 standard deviations from the prior."""
+    signals = flown_signals()
+    whole = refine(signals)
+    half = refine(signals, roll_roll=0.5, roll_aileron=0.5, yaw_beta=0.5)
+    for name in ("roll-damping", "aileron-power", "weathercock"):
+        k = MOMENTS.index(name)
+        assert half.values[k] / whole.values[k] == pytest.approx(2.0, rel=0.05), name
+
+
+def test_a_moment_that_the_log_does_not_show_keeps_nine_tenths_of_its_priors_interval() -> None:
+    """A rudder without effect has only the prior, in the refinement and in Bayes' rule after it.
+
+    Counted twice, a prior would leave 1 / sqrt(2) of its interval; narrower in the refinement, still less.
+    """
+    refinement = refine(flown_signals(), yaw_rudder=1e-6)
+    covariance = np.diag(np.square(prior_sds()))
+    covariance[np.ix_(IS_MOMENT, IS_MOMENT)] = refinement.covariance
+    values = flown_truth().estimate.values.copy()
+    values[IS_MOMENT] = refinement.values
+    combined, spread = combine_with_prior(values, covariance)
+    rudder = INDEX["rudder-power"]
+    assert combined[rudder] == pytest.approx(1.0, abs=1e-3)
+    assert 0.9 < np.sqrt(spread[rudder, rudder]) / PARAMETERS[rudder].sd <= 1.0
