@@ -50,11 +50,18 @@ current = { column = "amp", unit = "A" }
 
 
 def circle() -> dict[str, np.ndarray]:
-    """Return the columns of the flight; a level turn to the right: tan(bank) = V * rate / g."""
+    """Return the columns of the flight; a level turn to the right: tan(bank) = V * rate / g.
+
+    No sensor repeats a value: each has noise of a ten-millionth.
+    """
+    draw = np.random.default_rng(1)
     time = np.arange(0.0, SECONDS, 1.0 / HERTZ)
     yaw = RATE * time
     bank = math.atan(AIRSPEED * RATE / 9.80665)
-    level = np.zeros(len(time))
+
+    def steady(value: float) -> np.ndarray:
+        return value + 1e-7 * draw.standard_normal(len(time))
+
     north = AIRSPEED / RATE * np.sin(yaw)
     east = AIRSPEED / RATE * (1.0 - np.cos(yaw)) + WIND_EAST * time
     degree = math.radians(1.0) * 6_371_000.0
@@ -62,25 +69,25 @@ def circle() -> dict[str, np.ndarray]:
         "t": time,
         "lat": LAT + north / degree,
         "lon": LON + east / degree / math.cos(math.radians(LAT)),
-        "alt": level + 500.0,
+        "alt": steady(500.0),
         "vn": AIRSPEED * np.cos(yaw),
         "ve": AIRSPEED * np.sin(yaw) + WIND_EAST,
-        "vd": level,
-        "roll": level + math.degrees(bank),
-        "pitch": level + 3.0,
+        "vd": steady(0.0),
+        "roll": steady(math.degrees(bank)),
+        "pitch": steady(3.0),
         "yaw": (np.degrees(yaw) + 180.0) % 360.0 - 180.0,
-        "p": level,
-        "q": level + math.degrees(RATE * math.sin(bank)),
-        "r": level + math.degrees(RATE * math.cos(bank)),
-        "ax": level,
-        "ay": level,
-        "az": level - 9.80665 / math.cos(bank),
-        "tas": level + AIRSPEED,
+        "p": steady(0.0),
+        "q": steady(math.degrees(RATE * math.sin(bank))),
+        "r": steady(math.degrees(RATE * math.cos(bank))),
+        "ax": steady(0.0),
+        "ay": steady(0.0),
+        "az": steady(-9.80665 / math.cos(bank)),
+        "tas": steady(AIRSPEED),
         "ele": -5.0 + np.sin(0.7 * time),
         "ail": 2.0 * np.sin(0.9 * time),
         "thr": 60.0 + 30.0 * np.sign(np.sin(0.05 * time + 0.3 * np.sin(0.011 * time))),
-        "volt": level + 11.1,
-        "amp": level + 12.0,
+        "volt": steady(11.1),
+        "amp": steady(12.0),
     }
 
 

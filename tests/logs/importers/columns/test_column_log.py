@@ -73,11 +73,32 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
             "velocity_east: ve runs against the change of",
         ),
         ('"r", unit = "deg/s"', '"ail", unit = "deg/s"', "yaw_rate: ail does not follow the change of .* check column"),
-        ('"tas", unit = "m/s"', '"tas", unit = "m/s", scale = 0', "airspeed: tas is 0 m/s in flight: expected more"),
+        ('"tas", unit = "m/s"', '"tas", unit = "m/s", scale = 0', "airspeed: tas keeps one value from 0 to 239.5 s"),
+        ('"tas", unit = "m/s"', '"tas", unit = "km"', "airspeed.unit: km: expected m/s, km/h"),
+        (
+            '"tas", unit = "m/s"',
+            '"tas", unit = "cm/s"',
+            "airspeed: tas is 0.18 m/s in flight: expected more",
+        ),
         (
             '"tas", unit = "m/s"',
             '"tas", unit = "m/s", scale = 1.944',
             r"airspeed: tas is 1\.9. times the airspeed",
+        ),
+        # Units that are wrong by a factor below 2.
+        ('"vn", unit = "m/s"', '"vn", unit = "m/s", scale = 1.944', "velocity_north: vn is 1.9. times the change of"),
+        ('"ve", unit = "m/s"', '"ve", unit = "kt", scale = 3.6', "velocity_east: ve is 1.85 times the change of"),
+        # A wind to the north-west instead of from there; it blows at 4 m/s to the east.
+        (
+            "airspeed =",
+            'wind_north = { value = 0.0, unit = "m/s" }\nwind_east = { value = -4.0, unit = "m/s" }\nairspeed =',
+            "wind_north: wind_north states -1 times the wind of airspeed, .* check unit and frame",
+        ),
+        (
+            "airspeed =",
+            'wind_speed = { value = 4, unit = "kt", scale = 1.944 }\nwind_direction = { value = 90, unit = "deg" }\n'
+            "airspeed =",
+            "wind_direction: wind_direction states -1 times the wind of airspeed",
         ),
         ('"thr", unit = "%"', '"thr", unit = "%", sign = -1, offset = -100', "throttle: thr runs against the current"),
         ('"thr", unit = "%"', '"thr", unit = "%", scale = 0', "throttle: thr stays at 0 .* current goes from 4"),
@@ -98,6 +119,18 @@ def with_cell(name: str, row: int, value: object) -> dict[str, np.ndarray]:
     return {name: values}
 
 
+def frozen(name: str, begin: float, end: float) -> np.ndarray:
+    """Return a column that keeps one value between two times, s."""
+    values = circle()[name]
+    values[(begin <= TIME) & (end > TIME)] = values[np.searchsorted(TIME, begin)]
+    return values
+
+
+def late(name: str, delay: float) -> np.ndarray:
+    """Return a column that comes later, s."""
+    return np.interp(TIME - delay, TIME, circle()[name])
+
+
 @pytest.mark.parametrize(
     ("columns", "expected"),
     [
@@ -107,6 +140,12 @@ def with_cell(name: str, row: int, value: object) -> dict[str, np.ndarray]:
         ({"t": 0.0 * TIME}, "flight.csv: t: 4800: expected at least two rows at different times"),
         ({"vn": np.full(len(TIME), np.nan)}, "columns.velocity_north: vn: holds no numbers"),
         ({"alt": np.full(len(TIME), np.inf)}, "columns.altitude: alt: holds no numbers"),
+        # Sensors that freeze, and signals that come late.
+        ({"tas": frozen("tas", 100.0, 130.0)}, "airspeed: tas keeps one value from 100 to 130 s, in flight: .*span_s"),
+        ({"tas": 0.0 * TIME + 18.0}, r"airspeed: tas keeps one value from 0 to 239.5 s, in flight"),
+        ({"r": frozen("r", 50.0, 70.0)}, "yaw_rate: r keeps one value from 50 to 70 s, in flight"),
+        ({"vn": late("vn", 1.0)}, "velocity_north: vn comes 1 s after the change of latitude: check its clock"),
+        ({"lat": late("lat", 2.0)}, "velocity_north: vn comes 2 s before the change of latitude: check its clock"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_in_one_line(

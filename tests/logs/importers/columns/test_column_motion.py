@@ -23,7 +23,7 @@ def test_each_column_arrives_in_si_units(tmp_path: Path) -> None:
     assert motion.inertial.values[:, 5] == pytest.approx(np.radians(columns["r"]))
     assert motion.attitude.values[:, 2] == pytest.approx(RATE * columns["t"])
     assert motion.height.values[:, 0] == pytest.approx(columns["alt"])
-    assert motion.battery.values[7].tolist() == [11.1, 12.0]
+    assert motion.battery.values[7] == pytest.approx([11.1, 12.0])
     # Nose up is positive in a `MotionLog`, and an elevator's trailing edge down in a table.
     assert motion.controls.values[:, 0] == pytest.approx(-np.radians(columns["ele"]))
     assert motion.controls.values[:, 1] == pytest.approx(np.radians(columns["ail"]))
