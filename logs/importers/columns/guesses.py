@@ -19,10 +19,24 @@ from world.errors import LogError
 NAMES: dict[str, tuple[str, ...]] = {
     "latitude": ("navlat", "lat", "latitude", "gpslat", "latitudedeg"),
     "longitude": ("navlon", "lon", "lng", "long", "longitude", "gpslon", "gpslng"),
-    "altitude": ("navalt", "altitude", "altmsl", "altamsl", "alt", "height", "gpsalt", "h"),
-    "velocity_north": ("navvn", "vn", "velnorth", "velocitynorth", "vnorth", "veln", "vx"),
-    "velocity_east": ("navve", "ve", "veleast", "velocityeast", "veast", "vele", "vy"),
-    "velocity_down": ("navvd", "vd", "veldown", "velocitydown", "vdown", "veld", "vz"),
+    "altitude": (
+        "navalt",
+        "altitude",
+        "altmsl",
+        "altamsl",
+        "alt",
+        "height",
+        "gpsalt",
+        "h",
+        "altitudemsl",
+        "altitudeamsl",
+        "altitudeabovemsl",
+        "amsl",
+        "gpsaltitude",
+    ),
+    "velocity_north": ("navvn", "vn", "velnorth", "velocitynorth", "vnorth", "veln", "vx", "northvelocity"),
+    "velocity_east": ("navve", "ve", "veleast", "velocityeast", "veast", "vele", "vy", "eastvelocity"),
+    "velocity_down": ("navvd", "vd", "veldown", "velocitydown", "vdown", "veld", "vz", "downvelocity"),
     "ground_speed": ("groundspeed", "gs", "gspd", "sog", "spd"),
     "ground_course": ("groundcourse", "course", "cog", "gcrs", "courseoverground"),
     "roll": ("roll", "phi", "bank", "rollangle"),
@@ -32,13 +46,26 @@ NAMES: dict[str, tuple[str, ...]] = {
     "quaternion_x": ("q1", "qx", "quaternionx", "orientationx"),
     "quaternion_y": ("q2", "qy", "quaterniony", "orientationy"),
     "quaternion_z": ("q3", "qz", "quaternionz", "orientationz"),
-    "roll_rate": ("p", "rollrate", "gyrx", "gyrox", "rollspeed", "wx"),
-    "pitch_rate": ("q", "pitchrate", "gyry", "gyroy", "pitchspeed", "wy"),
-    "yaw_rate": ("r", "yawrate", "gyrz", "gyroz", "yawspeed", "wz"),
-    "acceleration_forward": ("ax", "accx", "accelx", "accelerationx", "xacc"),
-    "acceleration_right": ("ay", "accy", "accely", "accelerationy", "yacc"),
-    "acceleration_down": ("az", "accz", "accelz", "accelerationz", "zacc"),
-    "airspeed": ("ias", "airspeed", "arspd", "eas", "cas", "aspd", "tas", "trueairspeed", "va"),
+    "roll_rate": ("p", "rollrate", "gyrx", "gyrox", "rollspeed", "wx", "angvelx", "angularvelocityx", "omegax"),
+    "pitch_rate": ("q", "pitchrate", "gyry", "gyroy", "pitchspeed", "wy", "angvely", "angularvelocityy", "omegay"),
+    "yaw_rate": ("r", "yawrate", "gyrz", "gyroz", "yawspeed", "wz", "angvelz", "angularvelocityz", "omegaz"),
+    "acceleration_forward": ("ax", "accx", "accelx", "accelerationx", "xacc", "accbx", "bodyaccx", "specificforcex"),
+    "acceleration_right": ("ay", "accy", "accely", "accelerationy", "yacc", "accby", "bodyaccy", "specificforcey"),
+    "acceleration_down": ("az", "accz", "accelz", "accelerationz", "zacc", "accbz", "bodyaccz", "specificforcez"),
+    "airspeed": (
+        "ias",
+        "airspeed",
+        "arspd",
+        "eas",
+        "cas",
+        "aspd",
+        "tas",
+        "trueairspeed",
+        "va",
+        "indicatedairspeed",
+        "calibratedairspeed",
+        "equivalentairspeed",
+    ),
     "wind_north": ("windnorth", "windn", "vwn", "wn"),
     "wind_east": ("windeast", "winde", "vwe", "we"),
     "wind_speed": ("windspeed", "wspd"),
@@ -53,8 +80,8 @@ NAMES: dict[str, tuple[str, ...]] = {
     "elevon_right": ("elevonright", "rightelevon"),
     "rudder": ("rudder", "rud", "dr"),
     "throttle": ("throttle", "dthr", "thr", "throut", "motorthrottle", "dt"),
-    "voltage": ("voltage", "volt", "volts", "vbat", "batteryvoltage", "motorvoltage"),
-    "current": ("current", "curr", "amp", "amps", "ibat", "batterycurrent", "motorcurrent"),
+    "voltage": ("voltage", "volt", "volts", "vbat", "batteryvoltage", "motorvoltage", "batvoltage", "batteryvolt"),
+    "current": ("current", "curr", "amp", "amps", "ibat", "batterycurrent", "motorcurrent", "batcurrent"),
     "mode": ("flightmode", "modenum", "mode"),
 }
 # Names of columns of times.
@@ -263,7 +290,7 @@ def _guess(quantity: str, column: str, clock: _Clock, values: Column, stated: st
     unit = stated if stated in UNITS[entry.dimension] else _plausible_unit(quantity, known)
     if unit is None:
         return None
-    reason = f": largest value {np.abs(known).max():.4g}" + ("" if unit != stated else f", named {stated}")
+    reason = f": largest value {np.abs(known).max():.4g}" + (f", named {stated}" if stated and unit == stated else "")
     return _Guess(quantity, column, clock, unit, _frame(quantity, column, known), reason)
 
 
