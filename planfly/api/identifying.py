@@ -15,7 +15,7 @@ from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_model
-from planfly.identification.checks import check_estimate
+from planfly.identification.checks import check_battery, check_estimate
 from planfly.identification.drive_check import DriveConflict
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
@@ -137,6 +137,7 @@ def identify_aircraft(
         log_parts = [(log, *records_and_outputs(log, prior, until=until)) for log in motion_logs]
         checked = [] if check_motion is None else records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
     records = [record for _, stretches, _ in log_parts for record in stretches]
+    check_battery(records, volts)
     log, _, outputs = log_parts[-1]
     with stage("estimating"):
         has_fast_rows = all(slowest_rows(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)

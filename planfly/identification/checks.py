@@ -1,9 +1,12 @@
 """Check an estimate for impossible results, such as reversed outputs, values at their bounds, or a changing mass."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.estimate import Estimate
+from aircraft.identification.flight_record import FlightRecord
 from aircraft.identification.parameters import INDEX, PARAMETERS
 from world.errors import LogError
 
@@ -17,8 +20,23 @@ LIFT_SLOPE_RANGE = (3.0, 7.0)
 MAX_MASS_CHANGE = 0.05
 # Minimum change of mass that is reported, in standard deviations.
 _MASS_CHANGE_SIGMAS = 4.0
+# Minimum and maximum voltage of a battery in flight, as a ratio to its nominal voltage: 3.0 to 4.35 V of 3.7 V a cell.
+_VOLTAGE_RATIO_RANGE = (0.75, 1.2)
 # Duration of the blocks over which the trend of the mass is averaged, s.
 _BLOCK_SECONDS = 30.0
+
+
+def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
+    """Raise LogError for a voltage in flight that no battery of this nominal voltage has.
+
+    volts: nominal voltage of the battery, V.
+    """
+    min_value, max_value = (ratio * volts for ratio in _VOLTAGE_RATIO_RANGE)
+    for record in records:
+        measured = float(np.median(record.voltage))
+        if np.isfinite(measured) and not min_value <= measured <= max_value:
+            allowed = f"a battery of {volts:g} V has {min_value:.3g}..{max_value:.3g} V; state yours, or check the log"
+            raise LogError.at(record.source, "voltage", measured, allowed, shown=f"{measured:.3g} V in flight")
 
 
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:

@@ -29,7 +29,7 @@ _SHIFTED_CORRELATION = 0.8
 # Share of the unexplained variance that is left at the time that is right.
 _SHIFTED_RESIDUAL = 0.5
 # Least duration for which a sensor that works never repeats a value, s.
-_FROZEN_S = 10.0
+_FROZEN_S = 20.0
 # The same, as a multiple of the 95th percentile of the times between changes of coarsely rounded values.
 _FROZEN_RUNS = 10.0
 # Least mean wind whose direction is checked, m/s.
@@ -46,9 +46,12 @@ _CLEAR_ALIGNMENT = 0.7
 _MAX_HEADING_DIFFERENCE_RAD = math.radians(50.0)
 # Gravity, m/s^2.
 _GRAVITY_MPS2 = 9.80665
-# Quantities that change all the time in flight.
+# Interval over which positions are compared with velocities, s; a place that is rounded to 11 m (four decimals of a
+# degree) still shows the velocity.
+_PLACE_STEP_S = 2.0
+# Quantities that change all the time in flight; the latitude of a flight to the east does not.
 _SENSORS = (
-    *("latitude", "longitude", "altitude", "velocity_north", "velocity_east", "velocity_down", "ground_speed"),
+    *("altitude", "velocity_north", "velocity_east", "velocity_down", "ground_speed"),
     *("roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate", "airspeed", "current"),
     *("acceleration_forward", "acceleration_right", "acceleration_down"),
 )
@@ -142,12 +145,12 @@ def _on_grid(series: Series, grid: Floats, *, turning: bool = False) -> Floats:
     return np.asarray(np.where(end > begin, means, np.interp(grid, time, values)))
 
 
-def _change(series: Series, grid: Floats, *, turning: bool = False) -> Floats:
-    """Return the rate of change of a series over the intervals around the times of a grid."""
+def _change(series: Series, grid: Floats, *, turning: bool = False, step: float = _STEP_S) -> Floats:
+    """Return the rate of change of a series over intervals of `step`, s, around the times of a grid."""
     time, values = _known(series)
     values = np.unwrap(values) if turning else values
-    later, earlier = (np.interp(grid + side * 0.5 * _STEP_S, time, values) for side in (1.0, -1.0))
-    return np.asarray((later - earlier) / _STEP_S)
+    later, earlier = (np.interp(grid + side * 0.5 * step, time, values) for side in (1.0, -1.0))
+    return np.asarray((later - earlier) / step)
 
 
 def _pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
@@ -156,9 +159,10 @@ def _pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
         yield _Pair("velocity_down", "the change of altitude", log.series("velocity_down"), sink)
     if log.has("latitude", "longitude", "velocity_north", "velocity_east"):
         latitude = log.series("latitude")
-        north = _change(latitude, grid) * _EARTH_RADIUS_M
+        north = _change(latitude, grid, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
         yield _Pair("velocity_north", "the change of latitude", log.series("velocity_north"), north)
-        east = _change(log.series("longitude"), grid) * _EARTH_RADIUS_M * np.cos(_on_grid(latitude, grid))
+        east = _change(log.series("longitude"), grid, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
+        east = east * np.cos(_on_grid(latitude, grid))
         yield _Pair("velocity_east", "the change of longitude", log.series("velocity_east"), east)
     if log.has("roll", "pitch", "yaw"):
         yield from _attitude_pairs(log, grid)

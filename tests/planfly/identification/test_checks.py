@@ -7,7 +7,7 @@ import pytest
 
 from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.parameters import INDEX
-from planfly.identification.checks import check_estimate, mass_change
+from planfly.identification.checks import check_battery, check_estimate, mass_change
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
 from tests.aircraft.identification.flown_truth import flown_truth
@@ -42,6 +42,16 @@ def test_a_servo_the_other_way_round_is_named_by_its_output() -> None:
     servos["aileron"] = servos["aileron"].reversed
     records = [record.part(60.0) for record in flight_records(changed(), PRIOR, servos)]
     assert "output 1 seems reversed" in refused(estimate_model(records, flown.base))
+
+
+def test_a_voltage_that_the_battery_does_not_have_is_refused() -> None:
+    """The log has 44.4 V: 12 cells of 3.7 V. In tenths of a volt, or of one cell alone, it is another battery's."""
+    record = flown_truth().records[0]
+    check_battery([record], 44.4)
+    check_battery([replace(record, voltage=np.full_like(record.voltage, np.nan))], 44.4)
+    for factor, said in ((0.1, "4.44 V in flight"), (1.0 / 12.0, "3.7 V in flight"), (10.0, "444 V in flight")):
+        with pytest.raises(LogError, match=f"v3-3.BIN: voltage: {said}: a battery of 44.4 V has 33.3..53.3 V"):
+            check_battery([replace(record, voltage=factor * record.voltage)], 44.4)
 
 
 def test_an_estimate_at_its_bound_is_named() -> None:

@@ -34,6 +34,10 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
         (lambda: changed(airspeed=NONE), "no ARSP of a sensor in use (U = 1), the airspeed"),
         (lambda: changed(wind=NONE), "no XKF2, the wind"),
         (lambda: changed(airspeed=NONE, wind=NONE), "U = 1), the airspeed; no XKF2, the wind"),
+        (
+            lambda: changed(airspeed=Samples(flown_truth().log.airspeed.time, 0.0 * flown_truth().log.airspeed.values)),
+            "the airspeed stays at 0 m/s: expected that of a sensor",
+        ),
         (lambda: changed(vehicle="copter", program="ArduCopter V4.5.7"), "flown by a copter (ArduCopter V4.5.7)"),
         (lambda: changed(vehicle="rover", program="ArduRover V4.5.7"), "flown by a rover"),
         (lambda: changed({"SERVO1_FUNCTION": 24.0}), "output 1 (SERVO1_FUNCTION 24, flaperon) moves"),

@@ -87,7 +87,7 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
         ),
         # Units that are wrong by a factor below 2.
         ('"vn", unit = "m/s"', '"vn", unit = "m/s", scale = 1.944', "velocity_north: vn is 1.9. times the change of"),
-        ('"ve", unit = "m/s"', '"ve", unit = "kt", scale = 3.6', "velocity_east: ve is 1.85 times the change of"),
+        ('"ve", unit = "m/s"', '"ve", unit = "kt", scale = 3.6', "velocity_east: ve is 1.8. times the change of"),
         # A wind to the north-west instead of from there; it blows at 4 m/s to the east.
         (
             "airspeed =",
@@ -143,7 +143,7 @@ def late(name: str, delay: float) -> np.ndarray:
         # Sensors that freeze, and signals that come late.
         ({"tas": frozen("tas", 100.0, 130.0)}, "airspeed: tas keeps one value from 100 to 130 s, in flight: .*span_s"),
         ({"tas": 0.0 * TIME + 18.0}, r"airspeed: tas keeps one value from 0 to 239.5 s, in flight"),
-        ({"r": frozen("r", 50.0, 70.0)}, "yaw_rate: r keeps one value from 50 to 70 s, in flight"),
+        ({"r": frozen("r", 50.0, 80.0)}, "yaw_rate: r keeps one value from 50 to 80 s, in flight"),
         ({"vn": late("vn", 1.0)}, "velocity_north: vn comes 1 s after the change of latitude: check its clock"),
         ({"lat": late("lat", 2.0)}, "velocity_north: vn comes 2 s before the change of latitude: check its clock"),
     ],
@@ -152,6 +152,12 @@ def test_a_file_that_is_wrong_is_refused_in_one_line(
     tmp_path: Path, columns: dict[str, np.ndarray], expected: str
 ) -> None:
     assert re.search(expected, said(write_log(tmp_path, **columns)))
+
+
+def test_places_of_four_decimals_are_read(tmp_path: Path) -> None:
+    """Steps of 11 m, of which the latitude of a leg to the east has none."""
+    places = {name: circle()[name].round(4) for name in ("lat", "lon")}
+    assert len(read_motion(write_log(tmp_path, **places)).velocity.time) == len(TIME)
 
 
 def test_rows_without_a_value_are_left_out(tmp_path: Path) -> None:
