@@ -285,13 +285,18 @@ class BatteryFailsafe(NamedTuple):
     """A failsafe that leaves the mission at a state of the battery.
 
     parameter: name of the parameter of its threshold.
-    threshold: value of that parameter, mAh that remain or V.
-    used_charge: used charge at which it leaves the mission, mAh; NaN for a threshold of the voltage.
+    threshold: value of that parameter, mAh that remain, V, or the fraction that remains.
+    used_charge: used charge at which it leaves the mission, mAh; NaN if it acts by the voltage.
+    shares_charge: True if several batteries are monitored, so that the share of the charge from this one is unknown.
+    remaining_fraction: remaining fraction of the energy, estimated from the voltage, at which it leaves the mission;
+        NaN for a threshold of the charge or of the voltage itself.
     """
 
     parameter: str
     threshold: float
     used_charge: float = math.nan
+    shares_charge: bool = False
+    remaining_fraction: float = math.nan
 
 
 class MissionParts(NamedTuple):

@@ -228,6 +228,7 @@ class Itinerary:
     open_items, px4_open_items: items that leave the verdict undecided for ArduPlane and for PX4.
     last_home: home at the mission's end, the target of an RTL; it differs from ``home`` after a DO_SET_HOME.
     passes_exhausted_jump: True if a jump is passed again after its last repeat, where ArduPlane 4.7 takes it again.
+    unreached: seqs of the items that are never reached.
     """
 
     stops: tuple[RoutePoint, ...]
@@ -242,6 +243,7 @@ class Itinerary:
     px4_open_items: tuple[OpenItem, ...] = ()
     last_home: Home | None = None
     passes_exhausted_jump: bool = False
+    unreached: tuple[int, ...] = ()
 
     @property
     def returns(self) -> bool:
@@ -287,9 +289,13 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
         builder.add_open_item(text, steps.long_jump_chain, arduplane=False)
     for gate in builder.gates:
         builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)
-    for item in mission.items:
-        if item.seq not in steps.reached and not (builder.has_ended and item.command in JUMPS):
-            builder.notes.add(NEVER_REACHED, item.seq)
+    unreached = [
+        item.seq
+        for item in mission.items
+        if item.seq not in steps.reached and not (builder.has_ended and item.command in JUMPS)
+    ]
+    for seq in unreached:
+        builder.notes.add(NEVER_REACHED, seq)
     if not builder.stops:
         raise MissionError(f"{mission.source}: no item has a position; expected at least two", file=mission.source)
     return Itinerary(
@@ -305,6 +311,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
         px4_open_items=tuple(builder.px4_open_items),
         last_home=builder.home,
         passes_exhausted_jump=steps.passes_exhausted_jump,
+        unreached=tuple(unreached),
     )
 
 

@@ -2,7 +2,7 @@
 
 import copy
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -236,7 +236,7 @@ class FlightSetup:
 
     def __post_init__(self) -> None:
         """Build the path here, so that it always matches route and limits."""
-        object.__setattr__(self, "path", fly_by_path(self.route, self.limits, self.scenario.terrain))
+        object.__setattr__(self, "path", fly_by_path(self.demanded_route, self.limits, self.scenario.terrain))
 
     @property
     def name(self) -> str:
@@ -257,6 +257,17 @@ class FlightSetup:
     def airspeed(self) -> float:
         """Airspeed until the mission sets another one, m/s."""
         return self.limits.airspeed
+
+    @property
+    def demanded_route(self) -> Route:
+        """Route with the airspeeds that are demanded in flight, where the autopilot ignores or limits a command.
+
+        An imported flight keeps the commanded airspeeds: the limits of its autopilot may be unknown.
+        """
+        airspeed = self.autopilot.speeds.flown(self.route.airspeed, self.airspeed)
+        if self.source is not None or np.array_equal(airspeed, self.route.airspeed):
+            return self.route
+        return replace(self.route, airspeed=airspeed)
 
     @property
     def min_ground_speeds(self) -> Floats:
@@ -322,7 +333,7 @@ class FlightSetup:
     def with_long_reversals(self) -> "FlightSetup":
         """Return a copy of the setup with the longer turn at each course reversal."""
         setup = copy.copy(self)
-        path = fly_by_path(self.route, self.limits, self.scenario.terrain, swing="long")
+        path = fly_by_path(self.demanded_route, self.limits, self.scenario.terrain, swing="long")
         object.__setattr__(setup, "path", path)
         return setup
 

@@ -177,7 +177,7 @@ def suggest_gentler_slope(
         _slope_speed(requirements, leg, planned_slope + SUGGESTION_ANGLE_MARGIN_RAD) if source == "aircraft" else None
     )
     if speed is not None:
-        current_speed = float(requirements.setup.route.airspeed[leg])
+        current_speed = float(requirements.setup.demanded_route.airspeed[leg])
         alternatives.append(
             (abs(speed - current_speed) / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
         )
@@ -219,7 +219,7 @@ def suggest_gentler_turn(
     if source == "aircraft" and math.isfinite(requirements.length_before[corner]):
         speed = _turn_speed(requirements, corner)
         if speed is not None:
-            current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
+            current_speed = float(max(requirements.setup.demanded_route.airspeed[corner - 1 : corner + 1]))
             alternatives.append(
                 (1.0 - speed / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
             )
@@ -292,7 +292,7 @@ def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float)
 
 def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
     """Return the ratio of true airspeed to the commanded airspeed on a leg."""
-    return float(requirements.route.airspeed[leg] / requirements.setup.route.airspeed[leg])
+    return float(requirements.route.airspeed[leg] / requirements.setup.demanded_route.airspeed[leg])
 
 
 def _level_speeds(requirements: RouteRequirements, amsl: float, current_speed: float, factor: float) -> list[float]:
@@ -327,13 +327,13 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
         table = requirements.limits.performance(speed * factor)
         return min(aircraft_slopes(table, course, altitude)[direction] for altitude in altitudes) >= slope
 
-    commanded = float(requirements.setup.route.airspeed[leg])
+    commanded = float(requirements.setup.demanded_route.airspeed[leg])
     return first_that_passes(_level_speeds(requirements, max(altitudes), commanded, factor), can_hold_slope)
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
     """Return the maximum airspeed below the command at which a waypoint's turn fits its legs, or None."""
-    current_speed = float(max(requirements.setup.route.airspeed[corner - 1 : corner + 1]))
+    current_speed = float(max(requirements.setup.demanded_route.airspeed[corner - 1 : corner + 1]))
     available_length = min(
         available_lengths(
             requirements.runs, requirements.length_before, requirements.length_after, requirements.reversal, corner
@@ -441,7 +441,7 @@ def suggest_flying_faster(
     if finding.limit is None:
         return ()
     leg = int(np.argmin(requirements.route.airspeed))
-    current_speed = float(requirements.setup.route.airspeed[leg])
+    current_speed = float(requirements.setup.demanded_route.airspeed[leg])
     requested_speed = (
         math.ceil(
             10.0 * finding.limit * (1.0 + SUGGESTION_SPEED_MARGIN_FRACTION) / _true_airspeed_ratio(requirements, leg)
@@ -465,7 +465,7 @@ def suggest_level_flight_speed(
     leg = finding.place.index
     if leg is None or finding.limit is None or finding.margin is None:
         return ()
-    commanded = float(requirements.setup.route.airspeed[leg])
+    commanded = float(requirements.setup.demanded_route.airspeed[leg])
     altitude = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     envelope = requirements.setup.envelope
     certain_envelope = envelope.with_margin() if finding.check == UNKNOWN_AIRCRAFT else envelope

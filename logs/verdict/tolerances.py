@@ -216,6 +216,11 @@ STALL_AVERAGING_TIME_S = 1.0
 STALL_TOLERANCE_MPS = 0.2
 # Fraction of the battery or the tank that must be left at the end: the reserve.
 ENERGY_RESERVE_FRACTION = 0.2
+# V.  Nominal voltage of a lithium polymer cell, by which the cells of a battery are counted.
+NOMINAL_CELL_VOLTAGE_V = 3.7
+# V.  Loaded voltage of an empty cell, the default of PX4's BAT1_V_EMPTY: with the reserve left, the loaded voltage of a
+# healthy cell is higher.  A battery failsafe with a higher threshold may act earlier.
+EMPTY_CELL_VOLTAGE_V = 3.6
 
 # Surveys
 

@@ -179,7 +179,7 @@ class ArduPlane(Autopilot):
             follows_terrain=parameters.terrain_enable == 1.0,
             battery_failsafes=battery_failsafes(parameters),
             settings_not_flown=partial(self.settings_not_flown, by_program=False),
-            parameter_notes=parameters.notes,
+            parameter_notes=(*parameters.notes, *_mission_notes(parameters)),
         )
 
     def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
@@ -483,6 +483,8 @@ _BEFORE_RETURN = (
     " judged on the heading to home"
 )
 
+# Bit of MIS_OPTIONS: clear the mission when ArduPlane starts.
+_CLEAR_AT_START = 1 << 0
 # ArduPlane treats a radius up to this as no radius, m.
 _NO_RADIUS_M = 1.0
 # The radius of LOITER_TURNS is stored in a byte, in whole metres or, from this on, in tens of metres.  Loiters without
@@ -520,6 +522,23 @@ def _radius_growth(up: float) -> float:
     It is the square of the ratio of true to equivalent airspeed.
     """
     return float(true_by_equivalent(up)) ** 2
+
+
+def _mission_notes(parameters: ArduPilotParameters) -> list[str]:
+    """Return a note if ArduPlane clears its mission when it starts (`AP_Mission::init`).
+
+    The mission that is uploaded afterwards is flown.
+
+    >>> default = ArduPilotParameters.defaults()
+    >>> [len(_mission_notes(default.changed(MIS_OPTIONS=bits))) for bits in (0, 1, 8)]
+    [0, 1, 0]
+    """
+    if not int(parameters["MIS_OPTIONS"]) & _CLEAR_AT_START:
+        return []
+    return [
+        f"MIS_OPTIONS {parameters['MIS_OPTIONS']:g} clears the mission each time ArduPlane starts: upload it after the"
+        " last power-up"
+    ]
 
 
 def _bank_limit_note(bank: float) -> str:

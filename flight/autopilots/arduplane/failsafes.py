@@ -6,7 +6,7 @@ Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event
 
 from typing import Literal, NamedTuple
 
-from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.arduplane.parameters import OTHER_BATTERY_MONITORS, ArduPilotParameters
 from flight.autopilots.parts import BatteryFailsafe
 
 # Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or else RTL;
@@ -61,6 +61,8 @@ _BATTERY_FAILSAFE: dict[int, FailsafeAction] = {
     6: "land",
     7: "autoland",
 }
+# Values of BATT_MONITOR that measure only the voltage: an analog one, and that of the Bebop (`has_current`).
+_MONITORS_WITHOUT_CURRENT = (3, 6)
 _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
 
 
@@ -114,48 +116,71 @@ def failsafe_causes(
 
 
 def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
-    """Return the reactions to a low and a critical battery.
+    """Return the reactions to a low and a critical battery, for each battery monitor that is on.
 
-    Nothing triggers them without a monitor or without a threshold.  The default of BATT_MONITOR depends on the board,
-    so a file that does not state it is taken to have a monitor.
+    Nothing triggers them without a monitor or without a threshold that the monitor can reach.
     """
-    is_unstated = "BATT_MONITOR" in parameters.by_origin("default")
-    is_monitored = is_unstated or parameters.battery_monitor > 0.0
-    has_low_threshold = parameters.low_voltage > 0.0 or parameters.low_charge > 0.0
-    has_critical_threshold = parameters.critical_voltage > 0.0 or parameters.critical_charge > 0.0
-    causes = []
-    for name, value, parameter, has_threshold in (
-        ("battery low", parameters.low_battery, "BATT_FS_LOW_ACT", has_low_threshold),
-        ("battery critical", parameters.critical_battery, "BATT_FS_CRT_ACT", has_critical_threshold),
-    ):
-        action = _BATTERY_FAILSAFE.get(int(value), "on")
-        if action == "land" and not has_landing:
-            action = "return"
-        if action != "on" and not (is_monitored and has_threshold):
-            action = "never"
-        causes.append(Cause(name, action, parameter, int(value)))
+    monitors, causes = monitored_batteries(parameters), []
+    for monitor in dict.fromkeys(["BATT", *monitors]):
+        number = "" if monitor == "BATT" else f" {monitor.removeprefix('BATT')}"
+        for level, name in (("LOW", "low"), ("CRT", "critical")):
+            parameter = f"{monitor}_FS_{level}_ACT"
+            value = int(parameters[parameter])
+            action = _BATTERY_FAILSAFE.get(value, "on")
+            if action == "land" and not has_landing:
+                action = "return"
+            has_voltage = parameters[f"{monitor}_{level}_VOLT"] > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0
+            has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and _acts_by_charge(parameters, monitor)
+            if action != "on" and not (monitor in monitors and (has_voltage or has_charge)):
+                action = "never"
+            causes.append(Cause(f"battery{number} {name}", action, parameter, value))
     return causes
 
 
 def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe, ...]:
-    r"""Return the failsafes that leave a mission at a charge or a voltage (`AP_BattMonitor_Params`).
+    r"""Return the failsafes of all battery monitors that leave a mission at a charge or a voltage.
+
+    A monitor of the voltage alone never acts by the charge, and BATT_LOW_TIMER 0 switches off the failsafes by the
+    voltage (`AP_BattMonitor_Backend::update_failsafes`, `check_failsafe_types`).
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.of_text("BATT_CAPACITY 8000\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n", "mine.param")
-    >>> battery_failsafes(made)
-    (BatteryFailsafe(parameter='BATT_LOW_MAH', threshold=1500.0, used_charge=6500.0),)
+    >>> [(failsafe.parameter, failsafe.used_charge) for failsafe in battery_failsafes(made)]
+    [('BATT_LOW_MAH', 6500.0)]
     """
-    if parameters.battery_monitor <= 0.0 and "BATT_MONITOR" not in parameters.by_origin("default"):
-        return ()
+    monitors = monitored_batteries(parameters)
     found = []
-    for action, level, voltage, charge in (
-        (parameters.low_battery, "LOW", parameters.low_voltage, parameters.low_charge),
-        (parameters.critical_battery, "CRT", parameters.critical_voltage, parameters.critical_charge),
-    ):
-        if _BATTERY_FAILSAFE.get(int(action), "on") == "on":
-            continue
-        if charge > 0.0:
-            found.append(BatteryFailsafe(f"BATT_{level}_MAH", charge, parameters["BATT_CAPACITY"] - charge))
-        if voltage > 0.0:
-            found.append(BatteryFailsafe(f"BATT_{level}_VOLT", voltage))
+    for monitor in monitors:
+        for level in ("LOW", "CRT"):
+            action = parameters[f"{monitor}_FS_{level}_ACT"]
+            charge, voltage = parameters[f"{monitor}_{level}_MAH"], parameters[f"{monitor}_{level}_VOLT"]
+            if _BATTERY_FAILSAFE.get(int(action), "on") == "on":
+                continue
+            if charge > 0.0 and _acts_by_charge(parameters, monitor):
+                used_charge = parameters[f"{monitor}_CAPACITY"] - charge
+                found.append(BatteryFailsafe(f"{monitor}_{level}_MAH", charge, used_charge, len(monitors) > 1))
+            if voltage > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0:
+                found.append(BatteryFailsafe(f"{monitor}_{level}_VOLT", voltage))
     return tuple(found)
+
+
+def monitored_batteries(parameters: ArduPilotParameters) -> list[str]:
+    """Return the prefixes of the battery monitors that are on.
+
+    The default of BATT_MONITOR depends on the board, so a file that does not state it is taken to have a monitor.
+
+    >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
+    >>> monitored_batteries(ArduPilotParameters.defaults().changed(BATT3_MONITOR=4))
+    ['BATT', 'BATT3']
+    """
+    is_unstated = "BATT_MONITOR" in parameters.by_origin("default")
+    is_monitored = is_unstated or parameters.battery_monitor > 0.0
+    return [
+        *(["BATT"] if is_monitored else []),
+        *(monitor for monitor in OTHER_BATTERY_MONITORS if parameters[f"{monitor}_MONITOR"] > 0.0),
+    ]
+
+
+def _acts_by_charge(parameters: ArduPilotParameters, monitor: str) -> bool:
+    """Return True if a battery monitor measures the current."""
+    return int(parameters[f"{monitor}_MONITOR"]) not in _MONITORS_WITHOUT_CURRENT

@@ -164,6 +164,9 @@ _ORDERS = (
 )
 # Minimum and maximum; the minimum must be lower.
 _PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
+# Prefixes of the parameters of battery monitors after the first (`AP_BattMonitor::var_info`).
+OTHER_BATTERY_MONITORS = tuple(f"BATT{number}" for number in "23456789ABCDEFG")
+_BATTERY_THRESHOLDS = ("LOW_VOLT", "LOW_MAH", "FS_LOW_ACT", "CRT_VOLT", "CRT_MAH", "FS_CRT_ACT")
 # Parameters without a part in the control law that decide verdicts (`flight.autopilots.arduplane.open_settings` and
 # `flight.autopilots.arduplane.failsafes`), with their defaults.
 _WHEN_STATED = {
@@ -205,8 +208,19 @@ _WHEN_STATED = {
     "TKOFF_ACCEL_CNT": 1.0,
     "TKOFF_ALT": 50.0,
     "USE_REV_THRUST": 2.0,
-    # mAh; read for the battery failsafe alone.
+    # Read for the battery failsafes alone; `BATT_MONITOR` and its thresholds have definitions of their own.
     "BATT_CAPACITY": 3300.0,
+    "BATT_LOW_TIMER": 10.0,
+    **{
+        f"{monitor}_{name}": default
+        for monitor in OTHER_BATTERY_MONITORS
+        for name, default in (
+            ("MONITOR", 0.0),
+            ("CAPACITY", 3300.0),
+            ("LOW_TIMER", 10.0),
+            *((name, 0.0) for name in _BATTERY_THRESHOLDS),
+        )
+    },
 }
 # Names of some of them before 4.6, with the factor to the present unit.
 _OLD_NAMES = {"GPS1_TYPE": ("GPS_TYPE", 1.0), "GPS2_TYPE": ("GPS_TYPE2", 1.0)}

@@ -268,10 +268,11 @@ class Px4(Autopilot):
         parameters = self.parameters
         if parameters["COM_LOW_BAT_ACT"] not in _LEAVE_AT_CRITICAL_CHARGE:
             return ()
+        threshold, capacity = parameters["BAT_CRIT_THR"], parameters["BAT1_CAPACITY"]
+        if capacity > 0.0:
+            return (BatteryFailsafe("BAT_CRIT_THR", threshold, (1.0 - threshold) * capacity),)
         # Without a capacity the charge is estimated from the voltage.
-        capacity = parameters["BAT1_CAPACITY"] if parameters["BAT1_CAPACITY"] > 0.0 else math.nan
-        threshold = parameters["BAT_CRIT_THR"]
-        return (BatteryFailsafe("BAT_CRIT_THR", threshold, (1.0 - threshold) * capacity),)
+        return (BatteryFailsafe("BAT_CRIT_THR", threshold, remaining_fraction=threshold),)
 
     @property
     def turns(self) -> TurnRules:

@@ -1,7 +1,33 @@
-"""Check a mission for the takeoff and the landing that PX4 requires."""
+"""Check how a mission ends: with the takeoff and the landing that PX4 requires, or with ArduPlane's own return."""
+
+import math
 
 from flight.autopilots.parts import PX4_DEFAULT_LIMITS, FeasibilityLimits
-from flight.mission.items import LANDINGS, TAKEOFFS, Mission
+from flight.mission.items import LANDINGS, TAKEOFFS, Command, Mission
+from flight.simulation.setup import FlightSetup
+
+# Distance within which a mission ends at the destination of its scenario, m.
+_AT_DESTINATION_M = 1.0
+
+
+def returns_after_last_item(setup: FlightSetup) -> bool:
+    """Return True if ArduPlane returns to launch by itself after the mission's last item.
+
+    It does (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return, a landing, a
+    loiter without end or a jump without end.  A mission that ends at the destination of its scenario is judged up to
+    there.
+    """
+    route, mission, scenario = setup.route, setup.mission, setup.scenario
+    ends_in_flight = route.return_from < 0 and route.endless < 0 and mission.home is not None
+    if setup.source is not None or setup.autopilot.checks.dialect != "ardupilot" or not ends_in_flight:
+        return False
+    last_seq = next((seq for seq in reversed(route.items.tolist()) if seq >= 0), -1)
+    last_item = next((item for item in mission.items if item.seq == last_seq), None)
+    if last_item is None or last_item.command in LANDINGS | {Command.NAV_LOITER_UNLIM}:
+        return False
+    last_position = route.waypoints[route.items.tolist().index(last_seq)]
+    return scenario.external or math.dist(last_position, scenario.destination) > _AT_DESTINATION_M
+
 
 # What each value of MIS_TKO_LAND_REQ requires.
 _REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "both or neither", 5: "both or neither"}

@@ -474,7 +474,7 @@ def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
 
 
 def true_route(setup: FlightSetup) -> Route:
-    """Return a setup's route with true airspeeds.
+    """Return a setup's route with the true airspeeds that are demanded in flight.
 
     ArduPlane's airspeeds are equivalent: they are converted at each leg's mean altitude.
 
@@ -488,7 +488,7 @@ def true_route(setup: FlightSetup) -> Route:
     >>> bool((faster.airspeed > setup.route.airspeed).all())
     True
     """
-    route = setup.route
+    route = setup.demanded_route
     speeds = setup.autopilot.speeds
     if not speeds.equivalent:
         return route

@@ -1,5 +1,6 @@
 """Sample the starts of returns to launch at intervals along a flight or path."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +10,10 @@ from aircraft.envelope import GRAVITY, ground_speed
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_START
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import ROLL, Track
+from logs.verdict.measures.energy import predicted_energy
 from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_moves import path_moves
+from logs.verdict.measures.route_requirements import RouteRequirements
 from world.arrays import Flags, Floats
 from world.geometry import leg_courses
 from world.kernels import Records
@@ -153,6 +156,25 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
     bank = np.arctan(speed * speed * move["curvature"] / GRAVITY)
     unknown_energy, is_low = np.full(len(times), np.nan), np.zeros(len(times), dtype=np.bool_)
     return ReturnStarts(times, _start_records(position, velocity, bank), unknown_energy, False, is_low)
+
+
+def flown_end(track: Track) -> ReturnStarts:
+    """Return the end of a flown track as the start of a return."""
+    row = np.array([len(track) - 1], dtype=np.intp)
+    roll = np.nan_to_num(track.attitude[row, ROLL].astype(np.float64))
+    records = _start_records(track.position[row], _ground_velocities(track, row), roll)
+    is_low = np.zeros(1, dtype=np.bool_)
+    return ReturnStarts(track.time[row], records, track.energy[row].astype(np.float64), True, is_low)
+
+
+def planned_end(requirements: RouteRequirements) -> ReturnStarts:
+    """Return the end of the planned path as the start of a return, in straight flight, with the predicted energy."""
+    course, slope = float(requirements.courses[-1]), math.tan(float(requirements.slopes[-1]))
+    speed = float(_ground_speeds(requirements.setup)[-1])
+    velocity = speed * np.array([[math.sin(course), math.cos(course), slope]])
+    records = _start_records(requirements.points[-1:], velocity, np.zeros(1))
+    time, energy = requirements.path.times[-1:], np.array([predicted_energy(requirements)[0]])
+    return ReturnStarts(time, records, energy, False, np.zeros(1, dtype=np.bool_))
 
 
 def _ground_speeds(setup: FlightSetup) -> Floats:

@@ -1,17 +1,34 @@
 """The energy rule: compare the energy from battery or tank, predicted and flown, with the usable energy."""
 
 import math
+from typing import NamedTuple
 
-from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, Message, finding_reason, make_finding, message
+from flight.autopilots.parts import BatteryFailsafe
+from logs.verdict.findings import (
+    NOT_FLOWN,
+    UNKNOWN_AIRCRAFT,
+    Finding,
+    Message,
+    finding_reason,
+    make_finding,
+    message,
+)
 from logs.verdict.measures.energy import leg_energies, predicted_energy
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.suggestions import suggest_using_less_energy
-from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION, UNDECIDED_FRACTION
+from logs.verdict.tolerances import (
+    EMPTY_CELL_VOLTAGE_V,
+    ENERGY_RESERVE_FRACTION,
+    NOMINAL_CELL_VOLTAGE_V,
+    UNDECIDED_FRACTION,
+)
 
 _MAH_PER_AH = 1000.0
+# V.  Rounding of a threshold for the whole battery, for each cell.
+_VOLTAGE_ROUNDING_V = 0.005
 
 
 def energy_findings(
@@ -29,8 +46,8 @@ def energy_findings(
     is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
     is_measured = setup.source is not None and not geometric
-    failsafe_messages, failsafe_text = _battery_failsafe_messages(requirements, energy)
-    faults += failsafe_messages
+    failsafes = _judge_battery_failsafes(requirements, energy)
+    faults += failsafes.faults
     # Power is log-normal; this is the upper end of 95 %.
     max_energy = energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd)
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
@@ -53,14 +70,19 @@ def energy_findings(
         elif max_energy > energy:
             source = setup.envelope.source
             reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
-        reason += failsafe_text
+        reason += failsafes.unjudged_text
+    undecided_faults = failsafes.undecided if not faults and (is_guessed or energy <= limit) else []
     return [
         make_finding(
             "energy",
             FLIGHT,
-            ok=False if faults else None if is_guessed or is_uncertain or math.isnan(energy) else energy <= limit,
-            reason=finding_reason(faults, [reason]),
-            faults=faults,
+            ok=False
+            if faults
+            else None
+            if is_guessed or is_uncertain or undecided_faults or math.isnan(energy)
+            else energy <= limit,
+            reason=finding_reason(faults or undecided_faults, [reason]),
+            faults=faults or undecided_faults,
             planned=planned_energy,
             flown=None if geometric else energy,
             limit=limit,
@@ -68,7 +90,7 @@ def energy_findings(
             tolerance=0.0,
             margin=math.nan if is_guessed else limit - energy,
             unit="Wh",
-            check=UNKNOWN_AIRCRAFT if is_uncertain else "",
+            check=NOT_FLOWN if undecided_faults else UNKNOWN_AIRCRAFT if is_uncertain else "",
             method="power of steady flight on each leg over its time" if geometric else "power over time",
         )
     ]
@@ -101,28 +123,61 @@ def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None)
     return float(track.energy.max()), float(track.current.max())
 
 
-def _battery_failsafe_messages(requirements: RouteRequirements, energy_used: float) -> tuple[list[Message], str]:
-    """Return messages on battery failsafes that leave the mission, and a clause on voltages that are not judged.
+class _FailsafeAnswer(NamedTuple):
+    """Answer to whether a battery failsafe leaves the mission.
+
+    faults: messages on failsafes that do.  undecided: messages on failsafes that may.
+    unjudged_text: clause on failsafes by a voltage that a healthy battery does not reach, which is not simulated.
+    """
+
+    faults: list[Message]
+    undecided: list[Message]
+    unjudged_text: str = ""
+
+
+def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float) -> _FailsafeAnswer:
+    """Judge whether a battery failsafe leaves the mission.
 
     energy_used: energy of the flight, Wh.  A log of an imported flight shows what its failsafes did.
     """
-    volts = requirements.setup.envelope.volts
-    messages, unjudged = [], []
-    if requirements.setup.source is not None or math.isnan(energy_used):
-        return [], ""
-    for failsafe in requirements.setup.autopilot.checks.battery_failsafes:
+    setup, volts = requirements.setup, requirements.setup.envelope.volts
+    answer, unjudged = _FailsafeAnswer([], []), []
+    if setup.source is not None or math.isnan(energy_used):
+        return answer
+    charge_used = energy_used / volts * _MAH_PER_AH if volts else math.nan
+    for failsafe in setup.autopilot.checks.battery_failsafes:
+        name = f"{failsafe.parameter} {failsafe.threshold:g}"
         if math.isnan(failsafe.used_charge):
-            unjudged.append(f"{failsafe.parameter} {failsafe.threshold:g}")
-        elif volts and energy_used / volts * _MAH_PER_AH > failsafe.used_charge:
-            messages.append(
-                message(
-                    f"{failsafe.parameter} {failsafe.threshold:g} leaves the mission after"
-                    f" {max(0.0, failsafe.used_charge):.0f} mAh, and it needs"
-                    f" {energy_used / volts * _MAH_PER_AH:.0f} mAh"
-                )
-            )
+            if voltage_text := _reachable_voltage_text(requirements, failsafe, energy_used):
+                answer.undecided.append(message(f"{name} may leave the mission", f": {voltage_text}"))
+            else:
+                unjudged.append(name)
+        elif charge_used > failsafe.used_charge:
+            limit_text = f"leaves the mission after {max(0.0, failsafe.used_charge):.0f} mAh"
+            if failsafe.shares_charge:
+                share_text = f", of {charge_used:.0f} mAh from several monitored batteries"
+                answer.undecided.append(message(f"{name} {limit_text}{share_text}"))
+            else:
+                answer.faults.append(message(f"{name} {limit_text}, and it needs {charge_used:.0f} mAh"))
     clause = f"; whether the battery falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
-    return messages, clause if unjudged else ""
+    return answer._replace(unjudged_text=clause if unjudged else "")
+
+
+def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
+    """Explain why a failsafe by the voltage may act before the reserve is reached; return "" if it does not.
+
+    The voltage of a battery under load is not simulated.  A healthy battery with its reserve left has more than
+    `EMPTY_CELL_VOLTAGE_V` in each cell; its cells are counted by `NOMINAL_CELL_VOLTAGE_V`.
+    """
+    setup = requirements.setup
+    if math.isfinite(failsafe.remaining_fraction):
+        left = 1.0 - energy_used / setup.battery
+        return f"{left:.0%} of the battery are left" if left < failsafe.remaining_fraction else ""
+    cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
+    if not cells or failsafe.threshold / cells <= EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
+        return ""
+    cell_text = f"{failsafe.threshold / cells:.2f} V in each of {cells} cells ({setup.envelope.volts:g} V)"
+    return f"{cell_text}, above the {EMPTY_CELL_VOLTAGE_V:g} V of an empty cell, and the voltage is not simulated"
 
 
 def _used_text(requirements: RouteRequirements, energy_used: float, max_current: float) -> str:
@@ -140,7 +195,7 @@ def _used_text(requirements: RouteRequirements, energy_used: float, max_current:
 
 RULE = Rule(
     name="energy",
-    tolerances=("ENERGY_RESERVE_FRACTION", "UNDECIDED_FRACTION"),
+    tolerances=(*("ENERGY_RESERVE_FRACTION", "UNDECIDED_FRACTION", "NOMINAL_CELL_VOLTAGE_V", "EMPTY_CELL_VOLTAGE_V"),),
     judge=energy_findings,
     judges_whole_flight=True,
     suggest=suggest_using_less_energy,

@@ -33,11 +33,13 @@ from flight.mission.items import (
     Mission,
     MissionItem,
     command_name,
+    is_navigation,
 )
+from flight.mission.itinerary import make_itinerary
 from flight.mission.preflight_notes import landing_slopes
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import NOT_FLOWN, Finding, Message, make_finding, message
-from logs.verdict.measures.mission_ends import missing_ends_text
+from logs.verdict.measures.mission_ends import missing_ends_text, returns_after_last_item
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
@@ -74,6 +76,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         *findings,
         *_arduplane_refusals(setup),
         *([_unjoined_finding(setup)] if setup.route.unjoined else []),
+        *_unreached_findings(setup),
         *_unflown_findings(setup),
     ]
 
@@ -159,6 +162,51 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     )
 
 
+# Items behind which a mission continues only if someone acts: sets the next item, or arms again.
+_WAITING_ENDS = LANDINGS | {C.NAV_LOITER_UNLIM}
+# Marks of items that an autopilot reaches by itself after the mission: of a landing sequence and of a return path.
+_REENTRY_MARKS = (C.DO_LAND_START, C.DO_RETURN_PATH_START)
+
+
+def _unreached_findings(setup: FlightSetup) -> list[Finding]:
+    """Report navigation items behind the mission's end, which are never reached.
+
+    Behind a return to launch the plan is not flown; behind a landing or a loiter without end it is only flown if
+    someone acts, so that part is not judged.  Items of a landing sequence or of a return path belong there, and items
+    that a jump leaves out are left out on purpose.
+    """
+    items = setup.mission.items
+    itinerary = make_itinerary(setup.mission, resets_jump_counters=setup.autopilot.checks.resets_jump_counters)
+    # Seqs are unique: every end but a loiter that a jump repeats is passed once.
+    ends = [k for k, item in enumerate(items) if item.seq == itinerary.stops[-1].item]
+    if setup.source is not None or itinerary.endless >= 0 or not ends:
+        return []
+    end = items[ends[0]]
+    if end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
+        return []
+    behind = list(itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[ends[0] + 1 :]))
+    unreached = [item for item in behind if item.seq in itinerary.unreached and is_navigation(item.command)]
+    if not unreached:
+        return []
+    waits, first = end.command in _WAITING_ENDS, unreached[0]
+    more_text = f" (+{len(unreached) - 1} more)" if len(unreached) > 1 else ""
+    rest = f": {command_name(end.command)} (item {end.seq}) ends the mission"
+    rest += " until someone sets the next item" if waits else ""
+    fault = message(f"{command_name(first.command)}{more_text} is never reached", rest)
+    return [
+        make_finding(
+            "mission",
+            Place("mission", item=first.seq),
+            ok=None if waits else False,
+            reason=fault.text,
+            faults=[fault],
+            source="route",
+            method="mission items",
+            check=NOT_FLOWN if waits else "unreached",
+        )
+    ]
+
+
 def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
     """Yield a finding for each item or setting that changes the flight path but is not simulated."""
     remarks = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
@@ -217,7 +265,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
     with suppress(FlightError):
         aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
     return MissionParts(
-        returns=C.NAV_RETURN_TO_LAUNCH in commands,
+        returns=C.NAV_RETURN_TO_LAUNCH in commands or returns_after_last_item(setup),
         has_return_path=C.DO_RETURN_PATH_START in commands,
         takes_off=procedures.take_off is not None,
         lands=procedures.approach is not None,

@@ -18,14 +18,21 @@ from flight.mission.itinerary import UNLIMITED
 from flight.mission.return_path import RETURN_NOT_FLOWN_ON
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
+from logs.verdict.measures.mission_ends import returns_after_last_item
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.glides_text import glides_headline
 from logs.verdict.returns.judge_glides import MARGIN, judge_glides
-from logs.verdict.returns.judge_returns import ReturnWorld, heights_above_ground, judge_returns, return_world
-from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
-from logs.verdict.returns.returns_text import headline
+from logs.verdict.returns.judge_returns import (
+    UNJUDGED,
+    ReturnWorld,
+    heights_above_ground,
+    judge_returns,
+    return_world,
+)
+from logs.verdict.returns.return_starts import ReturnStarts, flown_end, flown_starts, planned_end, planned_starts
+from logs.verdict.returns.returns_text import headline, measured_text
 from logs.verdict.rule import Rule
 from world.errors import MissionError
 from world.scenario_tables import ReturnDemand
@@ -48,7 +55,8 @@ def return_findings(
     """
     if geometric:
         required_findings = _requirement_findings(requirements, partial(planned_starts, requirements.setup))
-        return _rtl_findings(requirements, None, "not flown yet") + required_findings
+        end_findings = _automatic_return_findings(requirements, planned_end(requirements))
+        return [*_rtl_findings(requirements, None, "not flown yet"), *end_findings, *required_findings]
     if requirements.setup.source is None:
         return []
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
@@ -74,7 +82,48 @@ def flown_return_findings(
     starts = partial(planned_starts, requirements.setup)
     if track is not None:
         starts = partial(flown_starts, requirements.setup, track)
-    return _flown_rtl_findings(requirements, has_arrived, reason) + _requirement_findings(requirements, starts)
+    end = flown_end(track) if track is not None and has_arrived else None
+    return [
+        *_flown_rtl_findings(requirements, has_arrived, reason),
+        *_automatic_return_findings(requirements, end),
+        *_requirement_findings(requirements, starts),
+    ]
+
+
+def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStarts | None) -> list[Finding]:
+    """Judge the return to launch that ArduPlane begins by itself after the last item, as it would judge an item's.
+
+    end: the end of the mission, where that return begins; None if the flight did not reach it.
+    """
+    setup = requirements.setup
+    if not returns_after_last_item(setup):
+        return []
+    ok: bool | None = None
+    check, text = "", "the flight did not reach the end of the mission"
+    if end is not None:
+        world = return_world(setup)
+        returns = judge_returns(world, end, 1.0)
+        # The first ending is the one by RTL_AUTOLAND; the others are those of failsafes.
+        simulated = returns.each[0] if returns.each else None
+        if simulated is None or simulated.target.landing is not None:
+            ok, text = None, f"is not judged: {headline(returns)}"
+        else:
+            text = measured_text(simulated, world.limit, setup.scenario)
+            is_without_terrain = simulated.kind == "unknown" and setup.scenario.terrain is None
+            ok = simulated.safe or is_without_terrain or (None if simulated.kind in UNJUDGED else False)
+        check = UNKNOWN_RETURN if ok is None else ""
+    fault = message(f"the return after the last item {text}")
+    return [
+        make_finding(
+            "return",
+            requirements.waypoint(requirements.legs),
+            ok=ok,
+            reason=fault.text,
+            faults=[] if ok else [fault],
+            method=_METHOD,
+            check=check,
+        )
+    ]
 
 
 def _requirement_findings(requirements: RouteRequirements, starts: Callable[[float], ReturnStarts]) -> list[Finding]:

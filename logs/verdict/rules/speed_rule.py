@@ -1,4 +1,4 @@
-"""The speed rule: judge the commanded airspeed by the envelope, the distance to reach it, and the flown airspeed."""
+"""The speed rule: judge the demanded airspeed by the envelope, the distance to reach it, and the flown airspeed."""
 
 import math
 from typing import NamedTuple
@@ -61,9 +61,9 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     commanded = float(requirements.route.airspeed[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
-    command = float(requirements.setup.route.airspeed[leg])
-    notes = [_command_text(command, commanded, min_speed, max_speed)]
-    notes += [*_speed_range_notes(requirements, command), *_short_leg_notes(requirements, leg, commanded)]
+    demanded = float(requirements.setup.demanded_route.airspeed[leg])
+    notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
+    notes += _short_leg_notes(requirements, leg, commanded)
     margin = min(commanded - min_speed, max_speed - commanded)
     at_least = commanded - min_speed <= max_speed - commanded
     limit = min_speed if at_least else max_speed
@@ -88,14 +88,13 @@ def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
                 )
                 notes += [error_text] if requirements.envelope else []
                 faults += [] if requirements.envelope else [message(error_text)]
-            flown_command = _flown_command(requirements, leg)
-            if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, flown_command)):
+            if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, commanded)):
                 # From here on the flown speed is judged by the command, instead of the command by the envelope.
                 mean_speed, allowed_error, source = held_speed.speed, held_speed.allowed_error, "mission"
-                limit = flown_command + math.copysign(allowed_error, mean_speed - flown_command)
-                at_least = mean_speed < flown_command
-                margin, tolerance = allowed_error - abs(mean_speed - flown_command), held_speed.tolerance
-                faults.append(message(f"{mean_speed:.1f} m/s held of the commanded {flown_command:.1f} m/s"))
+                limit = commanded + math.copysign(allowed_error, mean_speed - commanded)
+                at_least = mean_speed < commanded
+                margin, tolerance = allowed_error - abs(mean_speed - commanded), held_speed.tolerance
+                faults.append(message(f"{mean_speed:.1f} m/s held of the commanded {commanded:.1f} m/s"))
         facts.append(Fact("speed error", mean_speed - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
@@ -129,14 +128,6 @@ def _command_text(command: float, commanded: float, min_speed: float, max_speed:
         return f"{command:.1f} m/s{true_speed_text} is commanded, but no level flight is known"
     level_text = f"level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s"
     return f"{command:.1f} m/s{true_speed_text} is commanded; {level_text}"
-
-
-def _flown_command(requirements: RouteRequirements, leg: int) -> float:
-    """Return the airspeed that the autopilot flies on a leg, m/s; it may differ from the command."""
-    setup = requirements.setup
-    command = setup.route.airspeed
-    flown_speeds = setup.autopilot.speeds.flown(command, setup.airspeed)
-    return float(requirements.route.airspeed[leg] * flown_speeds[leg] / command[leg])
 
 
 class _HeldSpeed(NamedTuple):
@@ -193,15 +184,15 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int, commanded: floa
     return f"{commanded:.1f} m/s is commanded; {limit_text} ± {envelope.fastest_sd:.1f} m/s"
 
 
-def _speed_range_notes(requirements: RouteRequirements, command: float) -> list[str]:
-    """Return a note if the autopilot does not accept a commanded speed (m/s)."""
-    autopilot = requirements.setup.autopilot
-    limits = autopilot.speeds.limits
+def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
+    """Return a note if the autopilot does not accept the speed that the mission commands on a leg."""
+    setup, autopilot = requirements.setup, requirements.setup.autopilot
+    command, limits = float(setup.route.airspeed[leg]), autopilot.speeds.limits
     if limits is None or limits.min <= command <= limits.max:
         return []
     range_text = f"{limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
-    behaviour = "flies the nearest one instead" if limits.nearest else "ignores this one"
-    return [f"{autopilot.title} accepts speeds from {range_text}, and {behaviour}"]
+    behaviour = "flies the nearest one instead" if limits.nearest else "ignores the command"
+    return [f"the mission commands {command:g} m/s; {autopilot.title} accepts {range_text}, and {behaviour}"]
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
