@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
+from flight.autopilots.parts import SpeedLimits
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
@@ -167,6 +168,7 @@ def make_setup(
     file_parameters = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
     notes = autopilot.checks.parameter_notes
     notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters)
+    notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
@@ -181,4 +183,28 @@ def make_setup(
         nav=scenario.flight.steering.nav,
         guidance_hz=scenario.flight.guidance_hz,
         fdm_hz=fdm_hz,
+    )
+
+
+def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:
+    """Return a note on each commanded airspeed that the autopilot ignores or replaces by the nearest limit.
+
+    ArduPlane reads an airspeed only from type 0; PX4, which takes the nearest limit, does not read the type.
+
+    >>> from flight.mission.items import MissionItem
+    >>> faster = MissionItem(2, 178, 2, (0.0, 60.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    >>> _speed_limit_notes(Mission(None, (faster,)), SpeedLimits(9.0, 22.0, "MIN", "MAX"), "ArduPlane")
+    ('item 2: DO_CHANGE_SPEED to 60 m/s: outside MIN 9 to MAX 22 m/s, ArduPlane ignores it',)
+    """
+    if limits is None:
+        return ()
+    behaviour = "flies the nearest" if limits.nearest else "ignores it"
+    range_text = f"outside {limits.min_name} {limits.min:g} to {limits.max_name} {limits.max:g} m/s"
+    return tuple(
+        f"item {item.seq}: DO_CHANGE_SPEED to {item.params[1]:g} m/s: {range_text}, {title} {behaviour}"
+        for item in mission.items
+        if item.command == Command.DO_CHANGE_SPEED
+        and (limits.nearest or item.params[0] == 0.0)
+        and item.params[1] > 0.0
+        and not limits.min <= item.params[1] <= limits.max
     )

@@ -98,12 +98,19 @@ def going_back(rng: np.random.Generator, home: Floats, course: float) -> list[st
     return [row(16, near, high), row(16, far, high), "0 20 0 0 0 0 0 0 0"]
 
 
+def last_item(rng: np.random.Generator, home: Floats, course: float) -> list[str] | None:
+    """The same without an item that says so: ArduPlane returns after its last item."""
+    rows = going_back(rng, home, course)
+    return None if rows is None else rows[:-1]
+
+
 Maker = Callable[[np.random.Generator, Floats, float], list[str] | None]
 # Kind, maker, and the least exit code: a mission that begins in the air is at best not judged in full.
 KINDS: dict[str, tuple[Maker, tuple[int, ...], str]] = {
     "take-off": (take_off, (4,), "climb-out"),
     "landing": (landing, (4,), "approach"),
     "return": (going_back, (4,), "clearance"),
+    "last item": (last_item, (4,), "return"),
     "first leg": (from_the_air, (3, 4), "the climb from home"),
 }
 

@@ -72,15 +72,12 @@ def energy_findings(
             reason += f"; at most {max_energy:.1f} Wh with 95 % probability, because the power is from {source}"
         reason += failsafes.unjudged_text
     undecided_faults = failsafes.undecided if not faults and (is_guessed or energy <= limit) else []
+    is_open = is_guessed or is_uncertain or bool(undecided_faults) or math.isnan(energy)
     return [
         make_finding(
             "energy",
             FLIGHT,
-            ok=False
-            if faults
-            else None
-            if is_guessed or is_uncertain or undecided_faults or math.isnan(energy)
-            else energy <= limit,
+            ok=False if faults else None if is_open else energy <= limit,
             reason=finding_reason(faults or undecided_faults, [reason]),
             faults=faults or undecided_faults,
             planned=planned_energy,

@@ -176,15 +176,14 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     that a jump leaves out are left out on purpose.
     """
     items = setup.mission.items
+    if setup.source is not None or not any(item.command in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH} for item in items):
+        return []
     itinerary = make_itinerary(setup.mission, resets_jump_counters=setup.autopilot.checks.resets_jump_counters)
-    # Seqs are unique: every end but a loiter that a jump repeats is passed once.
-    ends = [k for k, item in enumerate(items) if item.seq == itinerary.stops[-1].item]
-    if setup.source is not None or itinerary.endless >= 0 or not ends:
+    last = next((k for k, item in enumerate(items) if item.seq == itinerary.stops[-1].item), -1)
+    end = items[last]
+    if itinerary.endless >= 0 or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
         return []
-    end = items[ends[0]]
-    if end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
-        return []
-    behind = list(itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[ends[0] + 1 :]))
+    behind = itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[last + 1 :])
     unreached = [item for item in behind if item.seq in itinerary.unreached and is_navigation(item.command)]
     if not unreached:
         return []
@@ -192,7 +191,8 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     more_text = f" (+{len(unreached) - 1} more)" if len(unreached) > 1 else ""
     rest = f": {command_name(end.command)} (item {end.seq}) ends the mission"
     rest += " until someone sets the next item" if waits else ""
-    fault = message(f"{command_name(first.command)}{more_text} is never reached", rest)
+    where = f"item {first.seq}: " if waits else ""
+    fault = message(f"{where}{command_name(first.command)}{more_text} is never reached", rest)
     return [
         make_finding(
             "mission",

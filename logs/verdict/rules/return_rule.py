@@ -32,7 +32,7 @@ from logs.verdict.returns.judge_returns import (
     return_world,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, flown_end, flown_starts, planned_end, planned_starts
-from logs.verdict.returns.returns_text import headline, measured_text
+from logs.verdict.returns.returns_text import headline, measured_text, outcome_text
 from logs.verdict.rule import Rule
 from world.errors import MissionError
 from world.scenario_tables import ReturnDemand
@@ -99,20 +99,21 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
     if not returns_after_last_item(setup):
         return []
     ok: bool | None = None
-    check, text = "", "the flight did not reach the end of the mission"
+    check, brief, text = "", "the flight did not reach the end of the mission", ""
     if end is not None:
         world = return_world(setup)
         returns = judge_returns(world, end, 1.0)
         # The first ending is the one by RTL_AUTOLAND; the others are those of failsafes.
         simulated = returns.each[0] if returns.each else None
         if simulated is None or simulated.target.landing is not None:
-            ok, text = None, f"is not judged: {headline(returns)}"
+            brief, text = "the return after the last item is not judged", f": {headline(returns)}"
         else:
-            text = measured_text(simulated, world.limit, setup.scenario)
+            brief = f"the return after the last item {outcome_text(simulated, world.limit)}"
+            text = f": {measured_text(simulated, world.limit, setup.scenario)}"
             is_without_terrain = simulated.kind == "unknown" and setup.scenario.terrain is None
             ok = simulated.safe or is_without_terrain or (None if simulated.kind in UNJUDGED else False)
         check = UNKNOWN_RETURN if ok is None else ""
-    fault = message(f"the return after the last item {text}")
+    fault = message(brief, text)
     return [
         make_finding(
             "return",

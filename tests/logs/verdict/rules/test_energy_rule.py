@@ -10,12 +10,14 @@ from aircraft.catalog import load_aircraft
 from aircraft.envelope import Envelope
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import steady_flight
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
-from logs.verdict.findings import make_finding
+from logs.verdict.findings import Finding, make_finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.energy import air_angle, predicted_energy
 from logs.verdict.measures.route_requirements import route_requirements
@@ -180,3 +182,58 @@ def test_an_aircraft_that_burns_fuel_has_no_current() -> None:
         reason = of(verdict, "energy").reason
         assert "of fuel heat used" in reason
         assert "peak current" not in reason
+
+
+def _energy_with(text: str, share: float = 0.5) -> Finding:
+    """Judge the energy with parameters, of a battery whose share the flight needs."""
+    setup = replace(real_setup(), autopilot=ArduPlane(ArduPilotParameters.of_text(text, "mine.param")))
+    needed, _ = predicted_energy(route_requirements(setup))
+    return of(judge_geometry(replace(setup, battery=needed / share)), "energy")
+
+
+@pytest.mark.parametrize(("monitor", "ok"), [(3, True), (4, False), (6, True), (8, False)])
+def test_a_monitor_of_the_voltage_alone_never_acts_by_the_charge(monitor: int, ok: bool) -> None:
+    """`check_failsafe_types` asks `has_current`; 3 is "Analog Voltage Only", 6 the Bebop's."""
+    text = f"BATT_MONITOR {monitor}\nBATT_CAPACITY 1000\nBATT_LOW_MAH 999\nBATT_FS_LOW_ACT 1\n"
+    assert _energy_with(text).ok is ok
+
+
+def test_a_further_battery_that_leaves_the_mission_leaves_the_energy_open() -> None:
+    """How much of the charge comes from which battery is not known."""
+    text = "BATT_MONITOR 4\n{0}_MONITOR 4\n{0}_CAPACITY 1000\n{0}_CRT_MAH 999\n{0}_FS_CRT_ACT 1\n"
+    for monitor in ("BATT2", "BATT3", "BATTA"):
+        item = _energy_with(text.format(monitor))
+        assert (item.ok, item.check) == (None, "not flown")
+        assert f"{monitor}_CRT_MAH 999 leaves the mission after 1 mAh" in item.reason
+    # The same values of a battery without a monitor, or without an action.
+    assert _energy_with(text.format("BATT2").replace("BATT2_MONITOR 4", "BATT2_MONITOR 0")).ok
+    assert _energy_with(text.format("BATT2").replace("ACT 1", "ACT 0")).ok
+
+
+@pytest.mark.parametrize(
+    ("values", "ok"),
+    [
+        # 44.4 V are 12 cells of 3.7 V: 3.6 V in each are 43.2 V.
+        ("BATT_LOW_VOLT 42\nBATT_FS_LOW_ACT 1", True),
+        ("BATT_LOW_VOLT 43.2\nBATT_FS_LOW_ACT 1", True),
+        ("BATT_LOW_VOLT 43.8\nBATT_FS_LOW_ACT 1", None),
+        ("BATT_LOW_VOLT 43.8\nBATT_FS_LOW_ACT 0", True),
+        ("BATT_CRT_VOLT 43.8\nBATT_FS_CRT_ACT 2", None),
+        # `update_failsafes` asks for a timer above 0.
+        ("BATT_LOW_VOLT 43.8\nBATT_FS_LOW_ACT 1\nBATT_LOW_TIMER 0", True),
+        ("BATT_MONITOR 3\nBATT_LOW_VOLT 43.8\nBATT_FS_LOW_ACT 1", None),
+    ],
+)
+def test_a_voltage_that_a_healthy_battery_may_reach_leaves_the_energy_open(values: str, ok: bool | None) -> None:
+    assert real_setup().envelope.volts == 44.4
+    item = _energy_with(values + "\n")
+    assert (item.ok, item.check) == (ok, "" if ok else "not flown")
+
+
+@pytest.mark.parametrize(("threshold", "ok"), [(0.45, True), (0.55, None)])
+def test_px4_without_a_capacity_reads_the_charge_from_the_voltage(threshold: float, ok: bool | None) -> None:
+    """Half of the battery is left at the end."""
+    made = Px4(Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT_CRIT_THR=threshold))
+    setup = replace(real_setup(), autopilot=made)
+    needed, _ = predicted_energy(route_requirements(setup))
+    assert of(judge_geometry(replace(setup, battery=needed / 0.5)), "energy").ok is ok

@@ -206,3 +206,55 @@ def test_an_imported_return_has_circled_at_its_height(seconds: float, radius: fl
     aligned = align_track(requirements, rows)
     assert aligned is not None
     assert has_completed_return_loiter(requirements, aligned) is arrived
+
+
+BEHIND_THE_HILL = (wp(0, 500, 600), wp(4500, 500, 600))
+UNLIMITED = wp(4500, 500, 600, command=17)
+
+
+def behind_a_hill(*lines: str, summit: float = 450.0, **parameters: float) -> FlightSetup:
+    """A mission over a hill half way: a return sinks evenly to RTL_ALTITUDE, 100 m over home at 100 m."""
+    hill = Peak(2250.0, 250.0, summit, 300.0)
+    ground = peaks_terrain(np.array([[-6000.0, 6000.0], [-6000.0, 6000.0]]), [hill], 100.0)
+    setup = by_arduplane(setup_of(*lines, home="36.5 -84.2 0"), **{"RTL_ALTITUDE": 100.0, **parameters})
+    return setup.in_scenario(replace(setup.scenario, terrain=ground))
+
+
+@pytest.mark.parametrize(
+    ("lines", "parameters", "ok"),
+    [
+        (BEHIND_THE_HILL, {}, False),
+        (BEHIND_THE_HILL, {"RTL_ALTITUDE": 600.0}, True),
+        ((BEHIND_THE_HILL[0], wp(4500, 500, 600, command=19)), {}, False),  # a loiter by time ends, too
+        ((BEHIND_THE_HILL[0], UNLIMITED), {}, None),
+    ],
+)
+def test_the_return_after_the_last_item_counts_as_an_items(
+    lines: tuple[str, ...], parameters: dict[str, float], ok: bool | None
+) -> None:
+    """`Plane::exit_mission_callback`: at 4.5 km from home 600 m, at home 100 m, so at the summit 350 m of 450 m."""
+    setup = behind_a_hill(*lines, **parameters)
+    for verdict in (judge_geometry(setup), flown(setup)[0]):
+        found = [item for item in verdict.findings if item.rule == "return"]
+        assert [item.ok for item in found] == ([] if ok is None else [ok])
+        assert verdict.flyable is not (ok is False), verdict.lines
+        assert ok is not False or "the return after the last item hits the ground" in verdict.headline
+
+
+def test_a_mission_that_ends_at_its_scenarios_destination_is_judged_up_to_there() -> None:
+    setup = behind_a_hill(*BEHIND_THE_HILL)
+    there = replace(setup.scenario, external=False, destination=setup.route.waypoints[-1])
+    elsewhere = replace(there, destination=setup.route.waypoints[-1] + 2.0)
+    assert not [item for item in judge_geometry(setup.in_scenario(there)).findings if item.rule == "return"]
+    assert of(judge_geometry(setup.in_scenario(elsewhere)), "return").ok is False
+
+
+def test_the_return_after_the_last_item_needs_its_energy() -> None:
+    setup = behind_a_hill(*BEHIND_THE_HILL, RTL_ALTITUDE=600.0)
+    needed = of(judge_geometry(setup), "energy").planned
+    assert needed is not None
+    # The mission leaves 30 %; the return is as long again.
+    verdict = judge_geometry(replace(setup, battery=needed / 0.7))
+    assert of(verdict, "energy").ok
+    assert "takes more energy than may be used" in of(verdict, "return").reason
+    assert not verdict.flyable

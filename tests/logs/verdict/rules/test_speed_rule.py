@@ -8,6 +8,8 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
@@ -191,3 +193,20 @@ def test_a_leg_that_is_too_steep_fails_by_its_slope_alone() -> None:
     verdict = judge(setup, fly_path(setup, airspeed=lambda s: 0.0 * s - 5.0))
     assert of(verdict, "slope", leg(0)).ok is False
     assert of(verdict, "speed", leg(0)).ok is True
+
+
+@pytest.mark.parametrize(("speed", "demanded"), [(12.0, 16.0), (60.0, 24.0)])
+def test_the_speed_that_is_demanded_is_judged_not_the_command(speed: float, demanded: float) -> None:
+    """`do_change_speed` ignores a speed outside AIRSPEED_MIN..MAX; PX4 flies the nearest of its own limits."""
+    setup = make_setup(STRAIGHT, airspeed=22.0)
+    commanded = replace(setup, route=replace(setup.route, airspeed=np.full(setup.route.legs, speed)))
+    assert of(judge_geometry(commanded), "speed", leg(0)).ok is False
+    ignoring = ArduPlane(ArduPilotParameters.defaults().changed(AIRSPEED_MIN=16.0, AIRSPEED_MAX=24.0))
+    limiting = Px4(Px4Parameters.defaults().changed(FW_AIRSPD_MIN=16.0, FW_AIRSPD_MAX=24.0))
+    for law, flown in ((ignoring, 22.0), (limiting, demanded)):
+        made = replace(commanded, autopilot=law)
+        factor = law.speeds.true_airspeed_factor(float(made.route.waypoints[:2, 2].mean()))
+        item = of(judge_geometry(made), "speed", leg(0))
+        assert item.planned == pytest.approx(flown * factor, abs=1e-6)
+        assert item.reason.startswith(f"the mission commands {speed:g} m/s; ")
+        assert item.ok
