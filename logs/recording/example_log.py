@@ -98,6 +98,7 @@ def write_example_log(path: Path) -> Path:
 
 
 def _mission(scenario: Scenario) -> Mission:
+    """Return a mission of one waypoint item for each of the waypoints."""
     lat, lon = to_geo(scenario.origin, _WAYPOINTS[:, 0], _WAYPOINTS[:, 1])
     items = tuple(
         MissionItem(k + 1, int(Command.NAV_WAYPOINT), 0, (0.0, 0.0, 0.0, 0.0), float(lat[k]), float(lon[k]), float(up))
@@ -107,6 +108,7 @@ def _mission(scenario: Scenario) -> Mission:
 
 
 def _envelope() -> Envelope:
+    """Return a simplified envelope: constant climb, descent and level speeds."""
     return Envelope(
         aircraft="aerosonde",
         model_hash="",

@@ -119,6 +119,7 @@ def _terrain_mesh(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDA
     """Return corners (n, m, 3) of the mesh, colours (n, m, 3), and flags (n, m) of known corners."""
 
     def axis(min_value: float, max_value: float) -> Floats:
+        """Return the coordinates of the mesh's vertices along one axis, m."""
         return np.linspace(
             min_value, max_value, int(np.clip((max_value - min_value) / terrain.spacing, 2, MAX_VERTICES))
         )
@@ -195,6 +196,7 @@ def _label_position(position: Floats, terrain: Terrain | None) -> Floats:
 
 
 def _make_label(position: Floats, name: str) -> TextPrimitive:
+    """Make the text of a name that always faces the viewer."""
     return TextPrimitive(
         pose=_pose(position),
         billboard=True,
@@ -227,19 +229,23 @@ def track_scene(time_ns: int, positions: Floats) -> bytes:
 
 
 def _encode_update(entity: SceneEntity) -> bytes:
+    """Encode a scene of one entity."""
     return SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
 
 
 def _entity(time_ns: int, name: str) -> SceneEntity:
+    """Make an empty entity in the frame of the map."""
     return SceneEntity(timestamp=timestamp(time_ns), frame_id=MAP_FRAME, id=name, frame_locked=True)
 
 
 def _colour(rgba: tuple[float, float, float, float]) -> Color:
+    """Convert red, green, blue and opacity, 0 to 1, to a Foxglove colour."""
     r, g, b, a = rgba
     return Color(r=r, g=g, b=b, a=a)
 
 
 def _pose(position: ArrayLike) -> Pose:
+    """Make the pose of an object at a position, without rotation."""
     x, y, z = (float(value) for value in np.asarray(position))
     return Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
 
@@ -259,6 +265,7 @@ _TRACK_LINE = _line(_TRACK_COLOUR).SerializeToString(deterministic=True)
 
 
 def _points(points: Floats) -> Iterable[Point3]:
+    """Convert points (n, 3) to Foxglove points."""
     return (Point3(x=x, y=y, z=z) for x, y, z in points.tolist())
 
 
@@ -310,6 +317,7 @@ def _add_parts(entity: SceneEntity, role: str, parts: Sequence[Part], terrain: T
 
 
 def _add_line(entity: SceneEntity, role: str, points: Floats, thickness: float = 3.0) -> None:
+    """Add a line in the colour of a role to an entity; thickness in pixels."""
     line = _line(theme.rgba(role, dark=True))
     line.thickness = thickness
     line.points.extend(_points(points))

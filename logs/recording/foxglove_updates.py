@@ -143,6 +143,7 @@ class FlightEvents:
             self._inside[kind] = is_inside[-1]
 
     def _leg_text(self, leg: int) -> str:
+        """Name a leg, the waypoint to which it leads, and that waypoint's mission item."""
         items = self._route.items
         waypoint = leg + 1
         if not 0 <= waypoint < len(items):
@@ -150,11 +151,13 @@ class FlightEvents:
         return f"leg {leg}, to waypoint {waypoint}" + (f" (item {items[waypoint]})" if items[waypoint] >= 0 else "")
 
     def _threat_record(self, time: int, kind: str, threat: int, has_entered: bool) -> MessageRecords:
+        """Make the event that the aircraft has entered or left the range of a threat."""
         name, level = self._threats.names[threat], "warning" if kind == "missile range" else "info"
         text = f"inside the {kind} of {name}" if has_entered else f"out of the {kind} of {name}"
         return self._event_record(time, text, level if has_entered else "info")
 
     def _event_record(self, time: int, text: str, level: str) -> MessageRecords:
+        """Make the message of one event.  time: log time, ns."""
         message = log_message(time, text, level, EVENT_SOURCE).SerializeToString(deterministic=True)
         return single_record(self._channel, time, message)
 
@@ -172,6 +175,7 @@ _ELEMENT_TYPES = {"f": PackedElementField.FLOAT32, "u": PackedElementField.UINT8
 
 
 def _colour_bytes(role: str) -> Colour:
+    """Return the colour of a role as red, green, blue and opacity, 0 to 255."""
     red, green, blue, opacity = (round(255.0 * part) for part in theme.rgba(role, dark=True))
     return red, green, blue, opacity
 
@@ -393,6 +397,7 @@ class Poses:
         yield self._track_cloud_record(log_time, parts)
 
     def _track_cloud_record(self, log_time: int, parts: list[Floats]) -> MessageRecords:
+        """Make the message with the track as points, from its parts (n, 3) m."""
         points = track_cloud(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
         return single_record(self._channels[TRACK_POINTS], log_time, points)
 

@@ -69,6 +69,7 @@ def read_chunks(file: BinaryIO, container: Container) -> Iterator[bytes]:
 
 
 def _read_sections(file: BinaryIO, container: Container) -> Iterator[bytes]:
+    """Yield the records of each chunk, and collect attachments, until the end record or the first damage."""
     crc = zlib.crc32(MAGIC)
     total = 0
     has_end = is_checked = False
@@ -129,6 +130,7 @@ def _check_data_section(file: BinaryIO, crc: int, start: int) -> None:
 
 
 def _read_record(file: BinaryIO, position: int) -> tuple[bytes, bytes]:
+    """Read one record: its opcode and length, and its content.  Raises _Damage."""
     frame = file.read(FRAME.size)
     if len(frame) < FRAME.size:
         raise _Damage(f"the file ends at byte {position + len(frame):,}, before its end record")
@@ -161,6 +163,7 @@ def record_stream(content: bytes) -> ReadDataStream:
 
 
 def _read_chunk(content: bytes, position: int) -> bytes:
+    """Return the uncompressed records of a chunk, checked by its CRC.  Raises _Damage."""
     try:
         chunk = Chunk.read(record_stream(content))
     except PARSE_ERRORS as error:
@@ -195,6 +198,7 @@ def _decompress(chunk: Chunk, size: int) -> bytes:
 
 
 def _read_attachment(content: bytes, position: int, container: Container) -> None:
+    """Add an attachment to the container, checked by its CRC.  Raises _Damage."""
     try:
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
@@ -211,6 +215,7 @@ def _read_attachment(content: bytes, position: int, container: Container) -> Non
 
 
 def _check_data_end(content: bytes, position: int, crc: int) -> None:
+    """Raise _Damage if the CRC of the data section differs from the stated one."""
     try:
         stated_crc = DataEnd.read(record_stream(content)).data_section_crc
     except PARSE_ERRORS as error:

@@ -224,6 +224,7 @@ class ContainerWriter:
         self._write_bytes(summary + offsets + footer[:-4] + crc.to_bytes(4, "little") + MAGIC)
 
     def _statistics(self) -> Statistics:
+        """Return the counts and times of the log's summary."""
         return Statistics(
             attachment_count=len(self._attachments),
             channel_count=len(self._channels),
@@ -244,6 +245,7 @@ class ContainerWriter:
             raise _with_file_name(error, self._file) from error
 
     def _write_bytes(self, data: bytes) -> None:
+        """Write to the file, and update the CRC and the offset; an OSError names the file."""
         try:
             self._file.write(data)
         except OSError as error:
@@ -258,12 +260,14 @@ def _with_file_name(error: OSError, file: BinaryIO) -> OSError:
 
 
 def _record_bytes(record: McapRecord) -> bytes:
+    """Encode a record with its opcode and length."""
     builder: Any = RecordBuilder()  # mcap leaves some of its methods without annotations
     record.write(builder)
     return bytes(builder.end())
 
 
 def _message_index(channel: int, pairs: Index) -> bytes:
+    """Encode the index of a channel's messages in a chunk: pairs of log time and offset."""
     data = np.ascontiguousarray(pairs, dtype="<u8").tobytes()
     header = channel.to_bytes(2, "little") + len(data).to_bytes(4, "little")
     return FRAME.pack(Opcode.MESSAGE_INDEX, _PAIRS_HEAD + len(data)) + header + data
@@ -348,6 +352,7 @@ def _write_integer(buffer: Bytes, position: int, value: int, size: int) -> int:
 
 @inner
 def _write_varint(buffer: Bytes, position: int, value: int) -> int:
+    """Write a value as a protobuf varint; return the next position."""
     while value > 127:
         buffer[position] = (value & 127) | 128
         value >>= 7
@@ -369,6 +374,7 @@ def _write_message_header(buffer: Bytes, position: int, size: int, channel: int,
 
 @compiled
 def _stamp_messages(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
+    """Encode messages with their log times in front of their bodies; return all bytes and each message's offset."""
     count, body_size = bodies.shape
     # The timestamp takes at most 2 + 12 bytes: tag and length, then two tags and two varints of five bytes.
     buffer = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + body_size), dtype=np.uint8)

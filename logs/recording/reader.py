@@ -121,6 +121,7 @@ def log_channels(path: Path) -> list[LogChannel]:
 
 
 def _parse_messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
+    """Yield the messages of one chunk, and add the schemas and channels that it declares."""
     for opcode, _, content in records(data):
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(record_stream(content))
@@ -243,6 +244,7 @@ class _MessageCollector:
             position = end
 
     def _add_channel(self, channel: Channel) -> None:
+        """Note a channel, and prepare to read state rows if it is the state's."""
         if channel.id in self._channels:
             return
         self._channels[channel.id] = (channel.topic, self._schemas.get(channel.schema_id, ""))
@@ -341,6 +343,7 @@ def read_log(path: Path | str) -> FlightLog:
 
 
 def _check_magic(magic: bytes, path: Path) -> None:
+    """Raise LogError if a file does not begin like an MCAP file."""
     if not magic:
         raise LogError(f"{path}: empty; expected a flight log (.mcap)", file=path)
     if magic != MAGIC:
@@ -389,6 +392,7 @@ def _recorded_loss(recovery: bytes) -> str:
 
 
 def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
+    """Return the recorded verdict, or None, and any fault of its attachment."""
     if VERDICT_FILE not in attachments:
         return None, ""
     verdict = _parse_object(attachments[VERDICT_FILE])
@@ -396,6 +400,7 @@ def _read_verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None,
 
 
 def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
+    """Return the results of reference flights, or None, and any fault of their attachment."""
     if REFERENCE_FILE not in attachments:
         return None, ""
     try:
@@ -405,6 +410,7 @@ def _read_reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | N
 
 
 def _parse_object(data: bytes) -> dict[str, Any]:
+    """Parse a JSON object; return {} for any other text."""
     try:
         document = json.loads(data)
     except (ValueError, RecursionError):

@@ -178,6 +178,7 @@ class Recorder:
             self._append_rows(recorded_rows)
 
     def _append_rows(self, rows: Rows) -> None:
+        """Keep rows for writing, and write all rows of complete batches."""
         self._pending_rows.append(rows)
         previous_ns, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > previous_ns // self._batch_ns:
@@ -236,6 +237,7 @@ class Recorder:
         self._close_file()
 
     def _write_setup(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
+        """Write the setup's attachments, all channels, and the scenes of terrain, threats and plan."""
         for name, data in attachments.items():
             self._write_attachment(name, data, EPOCH_NS)
         self._channels[STATE_TOPIC] = self._writer.add_channel(STATE_TOPIC, STATE_NAME, state_schema())
@@ -282,6 +284,7 @@ class Recorder:
             self._file.close()
 
     def _write_attachment(self, name: str, data: bytes, log_time: int) -> None:
+        """Write an attachment with the media type of its name."""
         self._writer.write_attachment(name, media_type(name), data, log_time)
 
     def _write_pending(self, end_ns: int | None) -> None:
@@ -313,6 +316,7 @@ class Recorder:
 
 
 def _chunk_contents(layout: Layout) -> Iterator[ChunkContent]:
+    """Yield the content of each chunk of a layout."""
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
     # Convert to lists first: reading the fields chunk by chunk costs a microsecond each.
     bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}

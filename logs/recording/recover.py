@@ -65,6 +65,7 @@ def recover_log(path: Path) -> RecoveredLog | None:
 
 
 def _whole_chunks(path: Path) -> tuple[Container, list[bytes]]:
+    """Return the attachments and the chunks of a log before its damage."""
     container = Container()
     with path.open("rb") as file:
         file.seek(len(MAGIC))

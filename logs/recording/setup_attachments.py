@@ -89,6 +89,8 @@ _MAX_PART_HEIGHTS = 4 * 2**20
 
 
 class _TerrainFile(SetupModel):
+    """Content of `terrain.json`: size, source and position of the terrain, and the names of its height parts."""
+
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
     encoding: Annotated[str, Field(max_length=200)] = _ENCODING
@@ -160,11 +162,13 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
 
 
 def _row_blocks(rows: int, cols: int) -> list[tuple[int, int]]:
+    """Return the first row and the end row of each part of the heights."""
     step = max(1, _MAX_PART_HEIGHTS // cols)
     return [(first, min(rows, first + step)) for first in range(0, rows, step)]
 
 
 def _pack_heights(heights: NDArray[np.float32]) -> bytes:
+    """Compress heights without loss, as differences of their bits in byte planes."""
     bits = np.ascontiguousarray(heights, dtype="<f4").view("<u4")
     bits = np.diff(bits, axis=1, prepend=np.zeros((len(bits), 1), dtype="<u4"))
     planes = np.ascontiguousarray(bits.reshape(-1, 1).view(np.uint8).T)
@@ -172,6 +176,7 @@ def _pack_heights(heights: NDArray[np.float32]) -> bytes:
 
 
 def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any]:
+    """Decompress heights; raise LogError if the data are damaged or their size differs."""
     size = rows * cols * 4
     try:
         # Use a reader, not decompress(): the size declared by the frame cannot be trusted.
@@ -185,6 +190,7 @@ def _unpack_heights(data: bytes, rows: int, cols: int, name: str) -> NDArray[Any
 
 
 def _check_coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
+    """Return the rows of the map's coefficients as an array; raise LogError if their shape is invalid."""
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
         shape_text = f"{len(rows)} rows of {size}"
@@ -218,6 +224,8 @@ _PACKAGES = (
 
 
 class _SetupFile(SetupModel):
+    """Content of `setup.json`: all of a setup that has no attachment of its own."""
+
     model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{LOG_SCHEMA}$")] = LOG_SCHEMA
     aircraft: str
@@ -252,6 +260,7 @@ class StoredSetup:
 
 @functools.cache
 def _cached_versions() -> tuple[tuple[str, str], ...]:
+    """Return the versions of the packages, which are looked up only once."""
     return tuple(_find_versions().items())
 
 
@@ -266,6 +275,7 @@ def package_versions() -> dict[str, str]:
 
 
 def _find_versions() -> dict[str, str]:
+    """Look up the versions of Python and of the installed packages of `_PACKAGES`."""
     versions = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:
@@ -361,6 +371,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
 
 
 def _read_autopilot(file: _SetupFile, file_name: str) -> Autopilot:
+    """Rebuild the autopilot; raise LogError if its parameters or its name are invalid."""
     stored_autopilot = StoredAutopilot(
         file.guidance,
         None if file.parameters is None else read_parameters(file.parameters),
@@ -376,6 +387,7 @@ def _read_autopilot(file: _SetupFile, file_name: str) -> Autopilot:
 
 
 def _json_bytes(data: Any) -> bytes:
+    """Write data as JSON, with non-finite numbers as text."""
     return (json.dumps(_finite_or_text(data), indent=1, allow_nan=False) + "\n").encode()
 
 
@@ -391,6 +403,7 @@ def _finite_or_text(data: Any) -> Any:
 
 
 def _decode_text(attachments: dict[str, bytes], name: str, source: str) -> str:
+    """Return an attachment's text; raise LogError if it is missing or not UTF-8."""
     try:
         return attachments[name].decode()
     except KeyError:
@@ -401,6 +414,7 @@ def _decode_text(attachments: dict[str, bytes], name: str, source: str) -> str:
 
 
 def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
+    """Rebuild the scenario with the log's own terrain; raise LogError if it is invalid."""
     file_name = f"{source}: {SCENARIO_FILE}"
     try:
         spec = json.loads(_decode_text(attachments, SCENARIO_FILE, source))
@@ -414,6 +428,7 @@ def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain 
 
 
 def _read_plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
+    """Rebuild the plan with the log's own terrain; raise LogError if it is invalid."""
     file_name = f"{source}: {PLAN_FILE}"
     text = _decode_text(attachments, PLAN_FILE, source)
     try:

@@ -61,6 +61,8 @@ def _make_from_table(data_class: type[Data], table: SetupModel, **replacements: 
 
 
 class _Item(SetupModel):
+    """Table of a mission item."""
+
     seq: int
     command: int
     frame: int
@@ -72,12 +74,16 @@ class _Item(SetupModel):
 
 
 class _Home(SetupModel):
+    """Table of a mission's home."""
+
     lat_deg: float
     lon_deg: float
     alt: Annotated[float, Field(alias="amsl_m")]
 
 
 class _Camera(SetupModel):
+    """Table of a survey's camera."""
+
     across: Annotated[Finite, Field(gt=0.0, alias="across_m_per_m")]
     along: Annotated[Finite, Field(gt=0.0, alias="along_m_per_m")]
     front: Annotated[Finite, Field(ge=0.0, lt=1.0)] | None
@@ -86,6 +92,8 @@ class _Camera(SetupModel):
 
 
 class _SurveyPlan(SetupModel):
+    """Table of the plan of a survey."""
+
     photo: Annotated[Annotated[Finite, Field(ge=0.0)] | None, Field(alias="photo_m")]
     turn_around: Annotated[Finite, Field(ge=0.0, alias="turn_around_m")]
     camera: _Camera | None

@@ -136,6 +136,7 @@ _MESSAGE_FIELDS = [("row", "<u4"), *((field.name, field.kind) for field in FIELD
 
 
 def _make_file() -> descriptor_pb2.FileDescriptorProto:
+    """Make the protobuf file that describes the state message."""
     file = descriptor_pb2.FileDescriptorProto(name="planfly/State.proto", package="planfly", syntax="proto3")
     message = file.message_type.add(name="State")
     for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
@@ -190,6 +191,7 @@ def file_descriptor_set(descriptor: "Descriptor") -> bytes:
     files: dict[str, FileDescriptor] = {}
 
     def visit(file: "FileDescriptor") -> None:
+        """Add a file after the files that it depends on."""
         if file.name not in files:
             for dependency in file.dependencies:
                 visit(dependency)
@@ -208,6 +210,7 @@ def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def _make_template() -> StateRecords:
+    """Make a record of one state message with all tags and lengths set."""
     row: StateRecords = np.zeros(1, dtype=RECORD)
     row["opcode"] = MESSAGE_OPCODE
     row["length"] = MESSAGE_HEADER + STATE_BODY.itemsize

@@ -22,10 +22,11 @@ BELOW_HOME_M = 1.0
 # m.  The altitude of a mission's home may be this far above the terrain there: an ellipsoidal height instead of a
 # height above mean sea level, together with errors of elevation files, is less than this nearly everywhere people fly.
 HOME_ERROR_M = 50.0
-# m.  A leg may be this far above the greatest height above ground, or above the ceiling: the same on steep ground.
+# m.  A leg may be this far above the maximum height above ground, or above the ceiling: the effect of `ROUNDING_M` on
+# steep ground.
 HEIGHT_TOLERANCE_M = 0.1
-# m.  Radius of a loiter: 1e-7 degrees at its center.
-RADIUS_TOLERANCE_FRACTION = 0.02
+# m.  A loiter's radius may be this much smaller than the radius at the bank limit: 1e-7 degrees at its center.
+LOITER_RADIUS_TOLERANCE_M = 0.02
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
 # `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25
@@ -52,7 +53,7 @@ BANK_TOLERANCE_RAD = math.radians(5.0)
 OVERSHOOT_TOLERANCE_M = 5.0
 # m.  Mean distance from the next leg in the last second of a settled turn.
 SETTLED_CROSS_TRACK_M = 1.0
-# m, by turbulence.  Increase of that distance by gusts.
+# m, by turbulence.  Increase of `SETTLED_CROSS_TRACK_M` by gusts.
 GUST_OFFSET_M = {"none": 0.0, "light": 0.5, "moderate": 1.0}
 # Fraction of the passing distance, and m by turbulence.  A turn may pass its waypoint closer than the arc at the bank
 # limit by the sum of both; the second is the cross-track error of an aircraft with good guidance.
@@ -65,25 +66,27 @@ SETTLING_WATCH_TIME_S = 10.0
 # Radii of the planned arc.  A larger flown radius is nearly straight flight, and says nothing about a turn.
 STRAIGHT_RADIUS_RATIO = 10.0
 
-# Fraction of the corridor's half width.  A corner is a negligible kink if the path without it passes it within this: an
-# aircraft on that path, or one that swings out as far again beyond it, is still well inside.
+# Fraction of the corridor's half width.  A corner is a negligible kink if the path without its waypoint passes the
+# waypoint within this: an aircraft on that path, or as far again on the waypoint's other side, is still well inside the
+# corridor.
 KINK_FRACTION = 0.25
-# Waypoints.  At most this many in a row are treated as one kink, or as one step: a survey's shortest lines are longer.
+# Waypoints.  At most this many in a row are treated as one kink, or as one step; a survey's shortest lines are longer.
 KINK_WAYPOINT_COUNT = 8
 
 # The slope rule
 
-# m.  A leg beyond its limit is a step if everything too steep in a row rises or falls by no more than this: an aircraft
-# that begins it early or late is within this of it.  ArduPlane itself flies altitude changes below ALT_SLOPE_MIN, 15
-# m by default, as a step (ArduPilot's parameter reference).
+# m.  A leg beyond its slope limit is a negligible step if it and its neighbours that are too steep as well rise or
+# descend by no more than this in all: an aircraft that begins the step early or late is within this height of it.
+# ArduPlane itself flies altitude changes below ALT_SLOPE_MIN, 15 m by default, as a step (ArduPilot's parameter
+# reference).
 NEGLIGIBLE_STEP_M = 10.0
 # rad.  A fitted slope may differ from the plan by this, in addition to the fit's own tolerance.
 SLOPE_TOLERANCE_RAD = math.radians(0.5)
-# m.  Height error from the leg's line, clear of the blends at its ends.
+# m.  Largest height error from the leg's line, outside the blends at its ends.
 HEIGHT_ERROR_LIMIT_M = 10.0
-# m.  The same if no part of the leg is clear of the blends.
+# m.  Largest height error of a leg without any part outside the blends.
 SHORT_LEG_HEIGHT_ERROR_LIMIT_M = 15.0
-# rad.  A leg within this of level is level.
+# rad.  A leg with a smaller slope is level.
 LEVEL_SLOPE_RAD = math.radians(0.5)
 # m/s.  Less wind than this is called calm air in a reason about the wind's effect on a slope.
 CALM_WIND_MPS = 0.5
@@ -164,8 +167,8 @@ ROUGH_SLOPE_ERROR_RAD = math.radians(0.5)
 
 # The rules on waypoints, speed, departure and completion
 
-# m.  Distance within which a waypoint is reached if neither mission nor autopilot states one: this in addition to the
-# fly-by path's distance.  A corridor is wider than a turn needs by the same.
+# m.  If neither mission nor autopilot states an acceptance radius, a waypoint is reached within the fly-by path's
+# distance from it plus this.  A corridor is wider by this than its turns need.
 WAYPOINT_PASS_MARGIN_M = 10.0
 # m.  Height error at a waypoint that the first line of a verdict names.  At 106 waypoints of the simulated ArduPlane
 # and PX4, on slopes of up to 5 degrees in up to moderate turbulence, the height error was 11.4 m or less.  ArduPlane
@@ -235,7 +238,7 @@ MAX_PHOTO_BANK_RAD = math.radians(10.0)
 # Fraction of the planned height above ground.  A photo may be this far above or below it: the area that a photo shows,
 # and its overlap, depend on the height.
 PHOTO_HEIGHT_FRACTION = 0.1
-# m.  Least value of that tolerance.
+# m.  Least tolerance of a photo's height above ground.
 MIN_PHOTO_HEIGHT_ERROR_M = 5.0
 # rad.  An aircraft flies along a line if its course is within this of the line's course.
 MAX_PHOTO_COURSE_ERROR_RAD = math.radians(30.0)
@@ -284,33 +287,33 @@ GO_AROUND_MODEL_ERROR_M = 6.0
 # m.  Least height above ground of a climb-out beyond `LAUNCH_RUN_M`: less than the usual elevation files' own error,
 # and more than a small aircraft's banked wing reaches down.
 LAUNCH_CLEARANCE_M = 2.0
-# m.  A climb-out that exceeds that by less than this is undecided: the simulated law's height was within 2.3 m of
-# ArduPlane's in the first 14 s of five flights.
+# m.  A climb-out that exceeds `LAUNCH_CLEARANCE_M` by less than this is undecided: the simulated ArduPlane's height was
+# within 2.3 m of the real one's in the first 14 s of five flights.
 CLIMB_MODEL_ERROR_M = 2.5
 # m.  Largest height loss of a launched aircraft: ArduPlane's catapult launches at 14 m/s and more lost none; in a hand
 # launch at 1.8 m a larger loss leaves no room for a wing.
 MAX_LAUNCH_HEIGHT_LOSS_M = 1.0
-# m.  Least runway length left where the aircraft leaves the ground: the simulated law left it after 34 m where
-# ArduPlane did after 37 m, in the one such flight that is known.
+# m.  Least runway length left where the aircraft leaves the ground: the simulated ArduPlane left it after 34 m, and the
+# real one after 37 m, in the one such flight that is known.
 RUNWAY_MARGIN_M = 10.0
 # m.  The legs after a take-off and the legs of a landing sequence are near the ground by nature: they need no more
 # height above ground than a go-around, `GO_AROUND_CLEARANCE_M`, even if the scenario requires more.
 GROUND_LEG_CLEARANCE_M = GO_AROUND_CLEARANCE_M
-# m.  Largest distance from home, or from the landing point, at which that applies: the longest final that a plan lays
-# out.  Beyond it, the scenario's requirement applies to these legs, too.
+# m.  Largest distance from home, or from the landing point, at which `GROUND_LEG_CLEARANCE_M` applies: the length of
+# the longest final that a plan has.  Beyond it, the scenario's requirement applies to these legs, too.
 FIELD_RADIUS_M = 2000.0
-# rad.  A leg after a take-off has to stay in its corridor once the aircraft's course is within this of its own.
+# rad.  After a take-off the first leg's corridor applies once the aircraft's course is within this of the leg's course.
 RUNWAY_COURSE_TOLERANCE_RAD = math.radians(10.0)
 # m.  Within this of its contact height above ground the aircraft has touched down: rows are 1/60 s apart.
 CONTACT_HEIGHT_M = 0.02
-# m.  Error of a simulated touch-down along the strip: 5 touch-downs of ArduPlane in steady wind were within 15 m of it,
-# and 38 of 42 in light turbulence within 30 m.  The strip must be this much longer at either end.
+# m.  Error of a simulated touch-down along the strip: 5 touch-downs of ArduPlane in steady wind were within 15 m of the
+# simulated ones, and 38 of 42 in light turbulence within 30 m.  The strip must be this much longer at either end.
 TOUCHDOWN_ERROR_M = 30.0
 # m.  In turbulence a landing that leaves less of the strip than this is undecided: the 42 touch-downs of ArduPlane were
-# 27 m shorter to 46 m longer than the law's, with an 11 kg Aerosonde as well as a 2 kg wing.
+# 27 m shorter to 46 m longer than the simulated ones, with an 11 kg Aerosonde as well as a 2 kg wing.
 GUST_TOUCHDOWN_ERROR_M = 50.0
-# m.  A final that the simulated law flies lower above ground than this, before its flare may begin, is undecided: five
-# ArduPlane finals reached their flares within 2 m of the law's height.
+# m.  A final that is simulated lower above ground than this, before its flare may begin, is undecided: five ArduPlane
+# finals reached their flares within 2 m of the simulated height.
 FINAL_APPROACH_CLEARANCE_M = 3.0
 # m/s.  A faster sink towards the ground leaves a touch-down undecided: 15 ArduPlane landings touched down at 0.5 to
 # 4.2 m/s, and an aircraft that a flare drops from a height touches down faster than any of them.
@@ -332,9 +335,9 @@ PARTIAL_LEG_MIN_S = 2.0
 MAX_UNSEEN_TIME_S = 10.0
 # m.  A flight that stays further than this from every waypoint of a plan was flown somewhere else.
 PLAN_MISMATCH_DISTANCE_M = 1000.0
-# m.  A waypoint is passed within the corridor's half width when the order of waypoints is checked, but at least this.
+# m.  When the order of waypoints is checked, a waypoint is passed within the corridor's half width, but at least this.
 MIN_NEAR_WAYPOINT_M = 50.0
-# m.  And at most this.
+# m.  Upper limit of that distance, for a corridor that is wider.
 MAX_NEAR_WAYPOINT_M = 150.0
 # Fraction.  If the plan is the one that was flown, this fraction of the passed waypoints was passed in the plan's
 # order.

@@ -69,6 +69,7 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
 
 
 def _draw_slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
+    """Draw the steepest climb and descent over airspeed, a line for each of several altitudes."""
     altitude_columns = np.linspace(0, envelope.amsl.size - 1, len(theme.SHADES)).round().astype(int)
     for k, column in enumerate(altitude_columns):
         style = {"color": theme.SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
@@ -83,6 +84,7 @@ def _draw_slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
 
 
 def _draw_level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
+    """Draw the slowest and fastest speed of level flight over altitude."""
     min_speeds, max_speeds = envelope.level_speed_min, envelope.level_speed_max
     axes.fill_betweenx(envelope.amsl, min_speeds, max_speeds, color=theme.colour("planned"), alpha=0.2, linewidth=0)
     axes.plot(
@@ -102,6 +104,7 @@ def _draw_level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> Non
 
 
 def _draw_slopes_in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
+    """Draw the steepest climb and descent over the ground, a line for each head- or tailwind."""
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 60)
     for k, wind in enumerate(_WINDS):
         climb, dive = np.degrees([envelope.slope_limits(float(speed), TRIM_AMSL, wind) for speed in speeds]).T
@@ -117,6 +120,7 @@ def _draw_slopes_in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> N
 
 
 def _draw_turns(axes: Any, aircraft: Aircraft) -> None:
+    """Draw the turn radius over ground speed, a line for each bank angle."""
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max + 10.0, 80)
     for k, bank in enumerate(_BANKS_DEG):
         radii = [turn_radius(float(speed), math.radians(bank)) for speed in speeds]
@@ -172,6 +176,7 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
 
 
 def _draw_power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRow]) -> None:
+    """Draw throttle and power of level flight over airspeed, with an axis for each."""
     axes.plot(
         speeds,
         [100.0 * row.trim.throttle for row in trims],
@@ -260,6 +265,7 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
 
 
 def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
+    """Draw the change of one quantity after a step; the time for which the step is held is shaded."""
     name, unit, factor = _QUANTITIES[step.quantities[row]]
     values = factor * step.change[:, row]
     axes.axhline(0.0, color=theme.colour("rim"), linewidth=0.6)
@@ -273,6 +279,7 @@ def _draw_step_response(axes: Any, step: StepResponse, row: int) -> None:
 
 
 def _step_title(step: StepResponse) -> str:
+    """Name a control, the size and direction of its step, and the time for which it is held."""
     name = step.control
     if step.control == "throttle":
         size_text = f"{100.0 * step.size:+.0f} %"
@@ -302,6 +309,7 @@ def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:
 
 
 def _set_up_axes(axes: Any, title: str, x_label: str, y_label: str) -> None:
+    """Write title and labels of a panel, and draw its grid."""
     axes.set_title(title, fontsize=9.5)
     axes.set_xlabel(x_label)
     axes.set_ylabel(y_label)
@@ -310,6 +318,7 @@ def _set_up_axes(axes: Any, title: str, x_label: str, y_label: str) -> None:
 
 
 def _write_title(figure: Figure, title: str, subtitle: str) -> None:
+    """Write title and subtitle of a figure."""
     height = figure.get_figheight()
     figure.text(0.06, 1.0 - 0.28 / height, title, fontsize=12, fontweight="bold", va="center")
     figure.text(0.06, 1.0 - 0.55 / height, subtitle, fontsize=8.5, color=theme.colour("quiet"), va="center")

@@ -303,6 +303,7 @@ def panel_json(panel: Panel) -> Json:
 
 
 def _layer_json(layer: Layer) -> Json:
+    """Return a layer as data for the page's own charts."""
     document: Json = {"kind": layer.kind, "name": layer.name, "role": layer.role}
     if layer.flight is None:
         document |= {"x": numbers(layer.x, telling_digits(layer.x)), "y": numbers(layer.y, telling_digits(layer.y))}

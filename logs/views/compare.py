@@ -60,6 +60,7 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
     def both(values: list[Floats]) -> tuple[Layer, ...]:
+        """Return a line of a quantity for each flight over the distance flown."""
         return tuple(
             series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
             for flight, role, distance, value in zip(flights, ROLES, distances, values, strict=True)
@@ -78,23 +79,27 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
 
 
 def _roll_angle(track: Track) -> NDArray[np.float32]:
+    """Return the roll angle of each row, rad."""
     roll: NDArray[np.float32]
     roll, _, _ = track.attitude.T
     return roll
 
 
 def _throttle_fraction(track: Track) -> NDArray[np.float32]:
+    """Return the throttle of each row, 0 to 1."""
     throttle: NDArray[np.float32]
     _, _, _, throttle = track.controls.T
     return throttle
 
 
 def _distance_flown(track: Track) -> Floats:
+    """Return the distance flown over the ground up to each row, m."""
     steps = np.nan_to_num(np.hypot(*np.diff(track.position[:, :2], axis=0).T))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
 def _height_above_ground(flight: NamedFlight) -> Floats:
+    """Return the height above ground of each row, m; NaN without terrain."""
     terrain, position = flight.setup.scenario.terrain, flight.track.position
     if terrain is None:
         return np.full(len(position), np.nan)

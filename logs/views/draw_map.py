@@ -127,6 +127,7 @@ def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: floa
 
 
 def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
+    """Draw the colour bar of the ground's altitude in the column right of the map."""
     figure_height = float(figure.get_figheight())
     bar_height = min(2.6, figure_height - 3.4)
     frame = (
@@ -180,6 +181,7 @@ def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float, lege
 
 
 def _wind_text(named_wind: NamedWind) -> str:
+    """Describe a wind in a few short lines."""
     wind = named_wind.wind
     text = f"{shorten(named_wind.name, 22)}:\n" if named_wind.name else ""
     if wind.speed > 0.0:

@@ -118,6 +118,7 @@ def _widen_bounds(bounds: Floats) -> Floats:
 
 
 def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: bool) -> Projection:
+    """Make the projection that looks across the route from its south side."""
     step = route[-1] - route[0]
     azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
     if math.sin(azimuth) > 0.0:
@@ -127,6 +128,7 @@ def _make_projection(route: Floats, bounds: Floats, stretch: float, is_narrow: b
 
 
 def _compass_name(azimuth: float) -> str:
+    """Name the side from which a viewer looks.  azimuth: rad, counter-clockwise from east."""
     names = ("east", "north-east", "north", "north-west", "west", "south-west", "south", "south-east")
     return names[round(azimuth / (math.pi / 4.0)) % 8]
 
@@ -134,6 +136,7 @@ def _compass_name(azimuth: float) -> str:
 def _make_axes(
     setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None
 ) -> tuple[Figure, Any]:
+    """Make a figure and axes that hold route, threats and ground, with equal scales."""
     min_altitude = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
     corners = np.array([[east, north, min_altitude] for east in bounds[0] for north in bounds[1]])
     threats = setup.scenario.threats
@@ -300,6 +303,7 @@ def _draw_paths(
     failed: Failures,
     placer: LabelPlacer,
 ) -> list[Any]:
+    """Draw route, track, waypoints and their failures; return the handles for the legend."""
     _, samples = route_samples(route, max(float(route_distance(route)[-1]) / 600.0, 1.0))
     if terrain is not None:
         ground = terrain.height(route[:, 0], route[:, 1])
@@ -366,10 +370,12 @@ def _draw_path(
 def _draw_labels(
     setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer
 ) -> None:
+    """Label start, destination, waypoints and threats, as far as the labels fit."""
     corners = projection.project(route)
     last = len(route) - 1
 
     def write(text: str, point: Floats, rank: LabelRank, role: str = "ink") -> None:
+        """Write one label at a projected point."""
         write_label(placer, Label(text, float(point[0]), float(point[1]), rank, role))
 
     write("start", corners[0], "end")

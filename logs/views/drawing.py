@@ -258,6 +258,7 @@ def _panel_extent(chart: Chart, k: int, right_margin: float) -> tuple[float, flo
 
 
 def _axis_label(chart: Chart, panel: Panel, axes: Any) -> str:
+    """Return the label of the horizontal axis, and how much larger altitudes are drawn than distances."""
     label = f"{chart.along} ({chart.unit})" if chart.along else panel.along
     if not chart.scaled:
         return label
@@ -291,6 +292,7 @@ def can_share_legend(panels: Sequence[Panel]) -> bool:
 
 
 def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool) -> None:
+    """Draw one panel of a chart: range, leg marks, layers, labels and note."""
     min_x, max_x = chart.shown_axis_range()
     if chart.shared:
         axes.set_xlim(min_x, max(max_x, min_x + 1e-3))
@@ -318,6 +320,7 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
 
 
 def _title_lines(panel: Panel) -> list[str]:
+    """Wrap a panel's title and unit to short lines."""
     wrapped = textwrap.wrap(panel.title.replace(" +", "\N{NO-BREAK SPACE}+"), 13)
     lines = [line.replace("\N{NO-BREAK SPACE}", " ") for line in wrapped]
     if not panel.unit:
@@ -394,11 +397,13 @@ def draw_layers(axes: Any, panel: Panel, min_zorder: float = 2.0) -> None:
 
 
 def _dash_pattern(look: theme.Look, dashed: bool = False) -> Any:
+    """Return the line style of a look in units of its line width; "-" for a solid line."""
     pattern = look.dash or ((8.0, 3.5) if dashed else ())
     return (0, tuple(part / max(look.width, 0.1) for part in pattern)) if pattern else "-"
 
 
 def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    """Draw a layer as a line, with a light rim if its look has one."""
     is_short = layer.role == "failing-leg" and np.hypot(np.ptp(layer.x), np.ptp(layer.y)) < 0.02 * np.ptp(
         axes.get_xlim()
     )
@@ -419,6 +424,7 @@ def _draw_line(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 
 def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    """Draw a layer as filled bands between its two edges, with gaps where an edge is unknown."""
     lower_edge = layer.lower_edge if layer.lower_edge is not None else np.zeros(len(layer.y))
     is_known = np.isfinite(layer.x) & np.isfinite(layer.y) & np.isfinite(lower_edge)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], is_known, [False]]).astype(np.int8)))
@@ -435,6 +441,7 @@ def _draw_band(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 
 def _area_look(look: theme.Look) -> dict[str, Any]:
+    """Return matplotlib's style of a filled area."""
     edge = (theme.colour(look.edge) if look.edge else look.light) if look.width or look.hatch else "none"
     return {
         "facecolor": (*theme.rgb(look.light), look.fill),
@@ -455,14 +462,17 @@ def _draw_area(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> Non
 
 
 def _draw_bars(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    """Draw a layer as bars from zero."""
     axes.bar(layer.x, layer.y, width=0.62, color=look.light, **options)
 
 
 def _draw_dots(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    """Draw a layer as markers."""
     axes.plot(layer.x, layer.y, **_dot_look(look, len(layer.x)), **options)
 
 
 def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
+    """Return matplotlib's style of markers; many markers are smaller."""
     size = 3.0 if count > _MAX_TICKS and look.size == 5.5 else look.size
     style: dict[str, Any] = {"marker": _MARKERS[look.marker], "linestyle": "", "markersize": size, "color": look.light}
     if look.face:
@@ -472,10 +482,12 @@ def _dot_look(look: theme.Look, count: int = 1) -> dict[str, Any]:
 
 
 def _draw_rings(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    """Draw a layer as hollow circles."""
     axes.plot(layer.x, layer.y, **_ring_look(look), **options)
 
 
 def _ring_look(look: theme.Look) -> dict[str, Any]:
+    """Return matplotlib's style of hollow circles."""
     return {
         "marker": "o",
         "linestyle": "",
@@ -489,6 +501,7 @@ def _ring_look(look: theme.Look) -> dict[str, Any]:
 
 
 def _draw_dashes(axes: Any, layer: Layer, look: theme.Look, **options: Any) -> None:
+    """Draw a layer as short horizontal lines."""
     axes.hlines(layer.y, layer.x - 0.42, layer.x + 0.42, color=look.light, linewidth=2.0, **options)
 
 
@@ -578,6 +591,7 @@ def _legend_column_count(entries: Sequence[LegendEntry]) -> int:
 
 
 def _legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
+    """Return the height of a legend, inches; 0 without entries."""
     if not entries:
         return 0.0
     rows = -(-len(entries) // columns)
@@ -586,6 +600,7 @@ def _legend_height(entries: Sequence[LegendEntry], columns: int) -> float:
 
 
 def _add_legend_beside(axes: Any) -> None:
+    """Draw a panel's legend to its right."""
     handles, labels = axes.get_legend_handles_labels()
     options: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5), "handlelength": 1.6}
     axes.legend(handles, [textwrap.fill(str(label), 23) for label in labels], borderaxespad=0.2, **options)

@@ -83,6 +83,7 @@ class FigureEntry:
 
 
 def _path_arguments(subject: Subject) -> dict[str, Any]:
+    """Return the arguments of plan, route, track and verdict that all views of the path share."""
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
@@ -94,15 +95,18 @@ def _path_arguments(subject: Subject) -> dict[str, Any]:
 
 
 def _make_map(subject: Subject) -> MapChart:
+    """Make the map of a flight."""
     return flight_map(subject.setup.scenario, **_path_arguments(subject), waypoint_texts=waypoint_names(subject.setup))
 
 
 def _make_scene(subject: Subject) -> SceneView:
+    """Make the 3-D view of a flight."""
     waypoints = len(subject.setup.route.waypoints)
     return SceneView(subject.setup, subject.track, failures(subject.verdict, waypoints))
 
 
 def _flight_view(make_chart: Callable[[FlightSetup, Track], Chart | None]) -> Callable[[Subject], Chart | None]:
+    """Make a builder of views that returns None for a plan that was not flown."""
     return lambda subject: None if subject.track is None else make_chart(subject.setup, subject.track)
 
 
@@ -123,7 +127,10 @@ def return_views(setup: FlightSetup, drawn_returns: DrawnReturns, track: Track |
 
 
 def _returns_view(name: str) -> Callable[[Subject], View | None]:
+    """Make a builder of one view on returns."""
+
     def view(subject: Subject) -> View | None:
+        """Return the view, or None if no returns were judged."""
         if subject.returns is None or not subject.returns.returns.each:
             return None
         return RETURN_FIGURES[name](subject.setup, subject.returns, subject.track)
@@ -132,14 +139,17 @@ def _returns_view(name: str) -> Callable[[Subject], View | None]:
 
 
 def _fixed_caption(text: str) -> Callable[[Subject], str]:
+    """Make a caption that is the same for every subject."""
     return lambda _: text
 
 
 def _as_sentence(line: str) -> str:
+    """Write a line as a sentence: with a capital letter and a full stop."""
     return f"{line[:1].upper()}{line[1:]}. "
 
 
 def _map_caption(subject: Subject) -> str:
+    """Describe the lines of the map."""
     arc_text = " At corners the two differ: the aircraft flies an arc inside the waypoint."
     flight_text = "The broad line is the plan, and the thin line on it is the flight." + (
         arc_text if subject.setup.source is None else ""

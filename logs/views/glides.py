@@ -55,6 +55,7 @@ def glide_chart(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart | N
 
 
 def _glide_text(glide: Glide, drawn_returns: DrawnReturns) -> str:
+    """Describe the best destination of one glide, and the altitude to spare."""
     altitude_left = drawn_returns.glides.altitude_left(glide)
     left_text = f", {altitude_left:.0f} m of altitude to spare" if altitude_left >= 0.0 else ""
     return f"{glide.time:.0f} s: {reached_text(glide.reach)}{left_text}"
@@ -79,6 +80,7 @@ def footprint_layers(drawn_returns: DrawnReturns, extent: Extent) -> list[Layer]
 
 
 def _area_layer(name: str, role: str, parts: tuple[Part, ...]) -> Layer:
+    """Make a layer of areas with holes; NaN separates their rings."""
     gap = np.full((1, 2), np.nan)
     x, y = np.vstack([points for part in parts for ring in part for points in (ring, gap)])[:-1].T
     return Layer("area", name, role, x, y, hover_texts=(name,))

@@ -125,11 +125,13 @@ class LabelPlacer:
         self.axes.plot(line_ends[:, 0], line_ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
 
     def _to_pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
+        """Convert positions of the map to pixels of the figure, (n, 2)."""
         points = np.column_stack([np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)])
         return np.asarray(self.axes.transData.transform(points), dtype=np.float64)
 
     @staticmethod
     def _make_box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
+        """Return the box of a label next to a point, in a direction from it.  All in pixels."""
         dx, dy = direction
         # A diagonal label approaches the point with its corner, so it may stand closer.
         offset = distance * (0.7 if dx and dy else 1.0)
@@ -161,6 +163,7 @@ class LabelPlacer:
         return cost
 
     def _box_cost(self, box: Box) -> float:
+        """Rate a box: 0 for a free one, more if it leaves the frame or covers labels or lines."""
         frame = self.axes.get_window_extent()
         cost = 0.0
         if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:
@@ -180,4 +183,5 @@ class LabelPlacer:
 
 
 def _do_overlap(a: Box, b: Box) -> bool:
+    """Return True if two boxes overlap."""
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

@@ -244,6 +244,7 @@ def _path_layers(route: Floats, plan: Floats | None, failed: Failures) -> list[L
 
 
 def _track_layer(drawn_track: DrawnTrack) -> Layer:
+    """Make the layer of a flown track, thinned to what a map can show."""
     count = len(drawn_track.track)
     rows = np.union1d(np.arange(0, count, max(1, count // _MAX_POINTS)), [count - 1])
     east, north, _ = drawn_track.track.position[rows].T
@@ -262,6 +263,7 @@ def _inside_threat_layers(scenario: Scenario, track: Track, failed: Failures) ->
 def _waypoint_layers(
     route: Floats, stops: Sequence[int], failed: Failures, texts_by_waypoint: Sequence[str]
 ) -> list[Layer]:
+    """Make the layers of waypoints, and of waypoints that fail a rule."""
     stop_starts = stop_rows(stops)
     dot_role = "waypoint" if len(stop_starts) <= _MAX_DOTS else "waypoint-small"
     texts = tuple(texts_by_waypoint[k] for k in stop_starts) if texts_by_waypoint else ()
@@ -275,6 +277,7 @@ def _waypoint_layers(
 
 
 def _end_markers(scenario: Scenario) -> list[Layer]:
+    """Make the markers of start and destination."""
     return [
         Layer("dots", name, name, point[:1], point[1:2], hover_texts=(name,))
         for name, point in (("start", scenario.start), ("destination", scenario.destination))
@@ -305,6 +308,7 @@ def _are_close(a: Floats, b: Floats) -> bool:
 
 
 def _waypoint_labels(scenario: Scenario, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+    """Label waypoints by their numbers, as far as they fit, and all that fail a rule; not start and destination."""
     stop_starts = stop_rows(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     last = len(route) - 1

@@ -79,6 +79,7 @@ def waypoint_names(setup: FlightSetup) -> list[str]:
 
 
 def _item_or_none(item: int) -> int | None:
+    """Return the number of a mission item, or None for a waypoint without an item."""
     return item if item >= 0 else None
 
 
@@ -86,6 +87,7 @@ def aircraft_model() -> dict[str, Any]:
     """Return the aircraft model: coloured triangles with corners forward, left, up, one unit wide."""
 
     def rounded_list(values: NDArray[np.float32]) -> Any:
+        """Return values as a list, rounded to four decimals."""
         return np.round(values.astype(np.float64), 4).tolist()
 
     return {"corners": rounded_list(model_corners() / MODEL_SPAN_M), "colours": rounded_list(model_colours()[:, :3])}

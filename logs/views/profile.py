@@ -231,6 +231,7 @@ def _flown_layers(
 
 
 def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
+    """Mark the legs that fail a rule."""
     return [
         Layer(
             "line",
@@ -245,6 +246,7 @@ def _failing_legs(waypoint_distances: Floats, route: Floats, failed: Failures) -
 
 
 def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failures) -> list[Layer]:
+    """Mark the waypoints that fail a rule."""
     if not failed.waypoints:
         return []
     rows = list(failed.waypoints)
@@ -256,6 +258,7 @@ def _failing_waypoints(waypoint_distances: Floats, route: Floats, failed: Failur
 
 
 def _waypoint_labels(waypoint_distances: Floats, route: Floats, stops: Sequence[int], failed: Failures) -> list[Label]:
+    """Label waypoints by their numbers, as far as they fit, and all that fail a rule."""
     stop_starts = stop_rows(stops)
     step = max(1, -(-len(stop_starts) // _MAX_NUMBERS))
     numbered_waypoints = {k for n, k in enumerate(stop_starts) if n % step == 0 or n == len(stop_starts) - 1} | set(

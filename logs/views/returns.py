@@ -55,6 +55,7 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
     limit = drawn_returns.returns.limit
 
     def return_text(ret: SimulatedReturn) -> str:
+        """Describe one return for the pointer: start, target and outcome."""
         return f"{ret.time:.0f} s: to {ret.target.name}: {outcome_text(ret, limit)}"
 
     layers = path_layers(drawn_returns.segments_by_outcome, _LOOKS, lambda ret: ret.start[:2], return_text)
@@ -99,6 +100,7 @@ def returns_map(setup: FlightSetup, drawn_returns: DrawnReturns) -> MapChart:
 
 
 def _target_layers(targets: dict[str, tuple[float, float, float]]) -> list[Layer]:
+    """Mark the targets of returns."""
     if not targets:
         return []
     east, north, _ = np.array(list(targets.values())).T
@@ -142,6 +144,7 @@ def _altitude_span(scenario: Scenario, worst: WorstReturn) -> tuple[float, float
 
 
 def _profile_panel(scenario: Scenario, worst: WorstReturn, number: int, span: tuple[float, float]) -> Panel:
+    """Draw the profile of one of the worst returns, with ground, zones and spheres."""
     path = worst.path
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))]) / 1000.0
     plane = PathPlane(along, path, terrain_altitudes(scenario, path), *span)
@@ -221,6 +224,7 @@ def _glide_margin_panel(glides: Glides) -> Panel:
     time = np.array([glide.time for glide in glides.each])
 
     def line(name: str, role: str, values: list[float]) -> Layer:
+        """Make a line over time, with gaps at values that are not finite."""
         column = np.array(values)
         return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
 

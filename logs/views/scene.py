@@ -151,6 +151,7 @@ def _zone_walls(setup: FlightSetup) -> dict[str, object]:
 
 
 def _ground_data(grid: GroundGrid) -> dict[str, object]:
+    """Encode the ground's altitudes as 16-bit fractions of their range, base64."""
     min_height, max_height = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
     fraction = (grid.heights - min_height) / max(max_height - min_height, 1e-6)
     codes = np.where(np.isfinite(fraction), np.round(fraction * (MISSING - 1)), MISSING).astype("<u2")

@@ -52,11 +52,13 @@ def _survey_panel(
     position: Floats,
     name: str,
 ) -> Panel:
+    """Draw one survey from above: its lines, the flight, and the unusable stretches."""
     origin = requirements.points[survey.first, :2]
     unit = np.array([np.sin(survey.course), np.cos(survey.course)])
     axes = np.stack([unit, [-unit[1], unit[0]]], axis=1)
 
     def to_panel(positions: Floats) -> Floats:
+        """Convert positions to distances along and across the survey's lines, m."""
         return (positions[:, :2] - origin) @ axes
 
     usable_parts, lost_parts = [np.zeros((0, 2))], [np.zeros((0, 2))]

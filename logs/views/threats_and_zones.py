@@ -67,6 +67,7 @@ def threat_circles(threats: Threats, route: Floats | None, failing_threats: froz
 
 
 def _threat_text(name: str, kill_radius: float, detection_radius: float) -> str:
+    """Describe a threat by its name and the radii of its spheres."""
     return "\n".join(
         [
             name,
@@ -233,6 +234,7 @@ def zone_label(zone: Zone) -> str:
 
 
 def _level_text(level: ZoneLevel) -> str:
+    """Write an altitude limit of a zone, and what it is measured from."""
     return f"{level.height:g} m {'AMSL' if level.datum == 'amsl' else 'above ground'}"
 
 

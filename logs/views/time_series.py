@@ -47,6 +47,7 @@ def time_chart(setup: FlightSetup, track: Track) -> Chart:
     turn_limits = (("limit of planned turns; corrections may bank beyond it", bank_limit), ("", -bank_limit))
 
     def one(title: str, unit: str, values: Floats, min_span: float, name: str = "flown") -> Panel:
+        """Make a panel with one line."""
         return Panel(title, unit, (series(name, "flown", time, values),), min_span=min_span)
 
     panels = [
@@ -149,6 +150,7 @@ def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Flo
 
 @compiled
 def _exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
+    """Return the exposure to all missiles on each segment, per second."""
     count = position.shape[0] - 1
     rates = np.zeros(max(0, count))
     for k in range(count):

@@ -68,6 +68,7 @@ def turn_chart(name: str, verdict: Verdict) -> Chart:
 
 
 def _rule_panel(rule: str, title: str, unit: str, place: str, values: list[PlaceValue]) -> Panel:
+    """Draw planned and flown values of a rule and its limits, with failures marked."""
     numbers = np.array([value.number for value in values], dtype=np.float64)
     planned_values, flown_values, limit_values = (
         np.array([getattr(value, name) for value in values]) for name in ("planned", "flown", "limit")

@@ -148,7 +148,8 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
     """Return the distance at which a flyable path without the corner passes it, m, or None if there is no such path.
 
-    The path leaves out the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours, passes each of them within
+    The path omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours, passes each of them within
+    `KINK_FRACTION` of the corridor's half width, and has room for the turns at both ends of the gap.
     """
     max_distance, is_circle = KINK_FRACTION * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
     for count in range(1, KINK_WAYPOINT_COUNT + 1):

@@ -34,6 +34,7 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
 @compiled
 def _segment_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
+    """Return the minimum height above ground on each segment, m, and its fraction of the segment."""
     count = max(0, points.shape[0] - 1)
     clearance, fraction = np.empty(count), np.empty(count)
     for k in range(count):
@@ -82,6 +83,7 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
 
 @compiled
 def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
+    """Measure the visits of a path to all spheres, block by block; see `path_spheres`."""
     boxes = _block_boxes(points)
     count = centres.shape[0]
     visits = SphereVisits(
@@ -119,6 +121,7 @@ def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats,
 
 @inner
 def _block_boxes(points: Floats) -> _Boxes:
+    """Return the bounding boxes of all blocks of segments."""
     segments = max(0, points.shape[0] - 1)
     count = -(-segments // _BLOCK_SEGMENTS)
     boxes = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
@@ -265,6 +268,7 @@ def _is_plausible(position: Floats, k: int) -> bool:
 def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
+    """Return the clearances as `_segment_clearances`, but NaN at rows that are not plausible."""
     count = max(0, position.shape[0] - 1)
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)
@@ -278,6 +282,7 @@ def _plausible_clearances(
 def _sphere_windows(
     position: Floats, centre: Floats, radius: float
 ) -> tuple[Floats, Floats, Floats]:  # pragma: no cover
+    """Return each segment's distance from a center, m, and the fractions at which it enters and leaves the sphere."""
     count = position.shape[0] - 1
     closest = np.full(count, math.inf)
     entry = np.zeros(count)

@@ -47,7 +47,7 @@ class Airspace:
     """Zones in the order in which findings number them.
 
     zones: the scenario's, then the fence's.
-    records: the same, for compiled code.
+    records: the same zones, for compiled code.
     scenario_zone_count: number of zones from the scenario.
     fence_fault: reason why the mission's fence gives no zones; "" if it does, or if there is no fence.
     """
@@ -135,7 +135,7 @@ class TurnRequirements:
 
     turns: (w,) rad, positive to the right, 0 at the ends.
     min_radius: (w,) m, radius of the arc at the bank limit.
-    radius: (w,) m, radius of the arc that is flown: the same, or the radius of a loiter.
+    radius: (w,) m, radius of the arc that is flown: `min_radius`, or the radius of a loiter.
     length_before, length_after: (w,) m of leg that the turn uses on either side, inf for a U-turn.
     reversal: (w - 1,) m of leg that the roll from a turn into one to the other side uses.
     limit: (w,) rad, the sharpest turn there that fits both legs next to the neighbouring turns.
@@ -377,6 +377,7 @@ class RouteRequirements:
         return Place("leg", index, to_item=self._item_number(index + 1), number=number)
 
     def _item_number(self, waypoint: int) -> int | None:
+        """Return the mission item of a waypoint, or None if the waypoint has no item."""
         item = int(self.setup.route.items[waypoint])
         return None if item < 0 else item
 
@@ -499,6 +500,7 @@ def true_route(setup: FlightSetup) -> Route:
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
+    """Return the fly-by path as a chain of points, with the time at each point."""
     points, legs = path_polyline(path)
     speed = np.where(np.isfinite(ground_speed), ground_speed, route.airspeed)
     runs = np.hypot(*np.diff(points[:, :2], axis=0).T)
@@ -583,7 +585,7 @@ def tighter_turn(requirements: RouteRequirements, i: int, aircraft_limit: float)
 def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
     """Return the tighter limit on a leg's climb or dive, rad, positive, and its source.
 
-    The dive applies to a falling leg.
+    The dive limit applies to a descending leg, the climb limit to every other leg.
     """
     is_rising = requirements.slopes[leg] >= 0.0
     scenario_limit = requirements.limits.max_climb if is_rising else requirements.limits.max_dive

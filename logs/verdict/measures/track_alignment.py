@@ -46,10 +46,10 @@ class AlignedTrack:
 
     track: the usable rows.
     bad_rows: number of rows with non-finite or implausible numbers or a time not later than the row before.
-    first_bad: time of the first of them, s; NaN without any.
+    first_bad: time of the first bad row, s; NaN if there are none.
     rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
         did not reach.
-    apex_distance: (w,) m from there to the apex.
+    apex_distance: (w,) distance of that row from the apex, m.
     passed: (w,) bool, the flight passed the waypoint.
     course: (t,) rad over the ground, unwrapped.
     distance_run: (t,) m along the ground track.

@@ -99,8 +99,8 @@ def depth_bounds(
 ) -> tuple[float, float]:
     """Return lower and upper bounds of the distance beyond a zone's limit within a part, m.
 
-    length: length of the part, m.  rise: largest change of its height in the band, m.  farthest: upper bound of its
-    distance beyond the zone's outline, m.
+    length: length of the part, m.  height_change: largest change of its height relative to the zone's band, m.
+    max_distance: upper bound of its distance beyond the zone's outline, m.
     """
     sign = -1.0 if exclusion else 1.0
     outline_sum, band_sum = (
@@ -207,6 +207,7 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 def _visit_zones(
     moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, spacing: float
 ) -> Records:
+    """Fill the visit of a path to each zone, the nearest zone first."""
     count = records.zones.shape[0]
     visits = np.zeros(count, VISIT)
     above_ground = False

@@ -190,6 +190,7 @@ def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: fl
 def _exclude_zone(
     is_flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, height: float
 ) -> None:
+    """Clear the mask in one exclusion zone that reaches down to a height above ground, m."""
     zone = zones.zones[z]
     rows, columns = is_flat.shape
     for i in range(
@@ -279,6 +280,7 @@ def glide_slopes(aircraft: PointMass, airspeed: float, min_altitude: float, max_
 def _fill_slopes(
     aircraft: Record, excess: Floats, airspeed: float, courses: Floats, min_altitude: float, slopes: Floats
 ) -> None:
+    """Fill the table of glide slopes by course and altitude."""
     for h in range(slopes.shape[1]):
         altitude = min_altitude + h * _ALTITUDE_STEP_M
         true_airspeed = airspeed * true_by_equivalent(altitude)

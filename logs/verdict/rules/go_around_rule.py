@@ -23,10 +23,16 @@ from flight.mission.items import Command, MissionItem, command_name
 from flight.mission.placing import home_point, landing_sequence, landing_starts
 from flight.mission.return_path import LandingStart
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, make_finding, message
+from logs.verdict.measures.ground_paths import (
+    GroundPath,
+    first_hazard_on_path,
+    first_item,
+    has_ground_paths,
+    landing_item,
+)
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import GroundPath, first_hazard_on_path, first_item, has_ground_paths, landing_item
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import ReturnWorld, return_world
 from logs.verdict.rule import Rule

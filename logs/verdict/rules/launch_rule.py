@@ -13,9 +13,9 @@ import numpy as np
 from flight.mission.ground_ways import TakeOff
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, finding_reason, make_finding, message
+from logs.verdict.measures.ground_paths import GroundPath, first_hazard_on_path, min_path_clearance, track_path
 from logs.verdict.measures.route_requirements import FlownGround, RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import GroundPath, first_hazard_on_path, min_path_clearance, track_path
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
     CLIMB_MODEL_ERROR_M,

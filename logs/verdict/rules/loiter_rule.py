@@ -19,9 +19,9 @@ from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
 from logs.verdict.tolerances import (
     BANK_TOLERANCE_RAD,
+    LOITER_RADIUS_TOLERANCE_M,
     LOITER_SWING_RADII,
     LOITER_WIDENING_FRACTION,
-    RADIUS_TOLERANCE_FRACTION,
     WAYPOINT_PASS_MARGIN_M,
 )
 from logs.verdict.wording import place_text
@@ -208,7 +208,7 @@ def _loiter_finding(
         limit=min_radius,
         at_least=True,
         source="aircraft" if is_known else "none",
-        tolerance=RADIUS_TOLERANCE_FRACTION,
+        tolerance=LOITER_RADIUS_TOLERANCE_M,
         margin=circle.radius - min_radius,
         unit="m",
         method="radius over the ground, and the radius at the bank limit in this wind; each corner as a turn",
@@ -278,7 +278,7 @@ def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle:
 
 def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, min_radius: float) -> list[Message]:
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
-    if circle.radius >= min_radius - RADIUS_TOLERANCE_FRACTION:
+    if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return []
     speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
     need_text = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {min_radius:.0f} m"
@@ -312,7 +312,7 @@ def _corner_text(place: Place) -> str:
 RULE = Rule(
     name="loiter",
     tolerances=(
-        "RADIUS_TOLERANCE_FRACTION",
+        "LOITER_RADIUS_TOLERANCE_M",
         "WAYPOINT_PASS_MARGIN_M",
         "BANK_TOLERANCE_RAD",
         "LOITER_SWING_RADII",

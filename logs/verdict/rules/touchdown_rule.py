@@ -15,10 +15,10 @@ import numpy as np
 from flight.mission.ground_ways import Approach
 from flight.simulation.track import Track
 from logs.verdict.findings import GROUND_PATH, Fact, Finding, Message, finding_reason, make_finding, message
+from logs.verdict.measures.ground_paths import first_hazard_on_path, track_path
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import first_hazard_on_path, track_path
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (

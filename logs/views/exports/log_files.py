@@ -166,6 +166,7 @@ def px4_log_bytes(log: FlightLog) -> bytes:
 
 
 def _encode_message(letter: bytes, body: bytes) -> bytes:
+    """Encode one message of a ULog file."""
     return struct.pack("<H", len(body)) + letter + body
 
 
@@ -202,11 +203,11 @@ _VALIDITY_FIELDS = ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid", "xy_global
 
 
 def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
+    """Make the ULog topics of some rows of a flight, in PX4's axes and units."""
     track, origin = log.track, log.setup.scenario.origin
     stamp = np.rint(track.time[rows] * 1e6).astype(np.uint64)
-    east, north, up = track.position[rows].T
+    (east, north, up), (v_east, v_north, v_up) = track.position[rows].T, track.velocity[rows].T
     lat, lon = (np.asarray(values) for values in to_geo(origin, east, north))
-    v_east, v_north, v_up = track.velocity[rows].T
     ones, ground_altitude = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
     true_airspeed, height_above_ground = track.airspeed[rows].astype(np.float64), track.clearance[rows]
     calibrated_airspeed = true_airspeed * np.sqrt(np.maximum(1.0 - _DENSITY_LAPSE_PER_M * up, 0.0) ** _DENSITY_EXPONENT)

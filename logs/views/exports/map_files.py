@@ -141,6 +141,7 @@ def return_lines(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapLin
 
 
 def _make_line(setup: FlightSetup, name: str, positions: ArrayLike, folder: str, role: str) -> MapLine:
+    """Make a line on the map from positions (n, 3) m."""
     points = np.asarray(positions, dtype=np.float64)
     lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
     return MapLine(name, np.asarray(lat), np.asarray(lon), points[:, 2], folder=folder, role=role)
@@ -153,6 +154,7 @@ def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZon
         return []
 
     def shape(name: str, role: str, parts: tuple[Part, ...]) -> MapZone:
+        """Make an area on the map from outlines in m."""
         geographic_parts = tuple(tuple(_to_geographic(setup, ring) for ring in part) for part in parts)
         return MapZone(name, geographic_parts, folder="the glide's footprint", role=role)
 
@@ -169,6 +171,7 @@ def glide_shapes(setup: FlightSetup, drawn_returns: DrawnReturns) -> list[MapZon
 
 
 def _to_geographic(setup: FlightSetup, ring: Floats) -> Floats:
+    """Convert an outline (n, 2) in m to latitude and longitude, degrees."""
     return np.stack(to_geo(setup.scenario.origin, ring[:, 0], ring[:, 1]), axis=-1)
 
 
@@ -240,6 +243,7 @@ def _add_style(mark: ElementTree.Element, role: str) -> None:
 
 
 def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
+    """Add a placemark with its outlines for each zone."""
     for zone in zones:
         mark = _add_element(folders.shared_folder(zone.folder), "Placemark")
         _add_element(mark, "name", zone.name)
@@ -256,12 +260,14 @@ def _add_zones(folders: _Folders, zones: Sequence[MapZone]) -> None:
 
 
 def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZone) -> None:
+    """Add one closed outline to a polygon."""
     line = _add_element(_add_element(polygon, kind), "LinearRing")
     up = 0.0 if zone.height is None else zone.height
     _add_element(line, "coordinates", " ".join(f"{lon:.8f},{lat:.8f},{up:.3f}" for lat, lon in ring))
 
 
 def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
+    """Add an element to a KML element, with the printable characters of a text."""
     element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
     element.text = (
         "".join(character for character in text if character.isprintable() or character == " ") if text else None
@@ -270,6 +276,7 @@ def _add_element(parent: ElementTree.Element, name: str, text: str = "") -> Elem
 
 
 def _coordinates_text(line: MapLine, k: int) -> str:
+    """Write longitude, latitude and altitude of a point, as KML wants them."""
     return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
 
 

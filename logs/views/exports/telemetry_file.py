@@ -70,6 +70,7 @@ def _timed_messages(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], An
 
 
 def _upload_messages(log: FlightLog) -> Iterator[Any]:
+    """Yield the messages with which a ground station uploads the mission."""
     items, _, _ = mission_lists(log.setup.mission)
     yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
     yield mavlink.MAVLink_mission_count_message(1, 1, len(items), 0)
@@ -78,6 +79,7 @@ def _upload_messages(log: FlightLog) -> Iterator[Any]:
 
 
 def _flight_messages(log: FlightLog) -> Iterator[tuple[float, Any]]:
+    """Yield the time (s) and the messages of the vehicle during the flight."""
     setup, track = log.setup, log.track
     snapshots = SnapshotMaker(setup, LocalMap.around(setup))
     start = snapshots.start_snapshot(setup)

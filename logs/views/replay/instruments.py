@@ -73,6 +73,7 @@ class Instruments:
         return [shorten(line, columns).rstrip() for line in lines]
 
     def _head_lines(self, k: int, columns: int) -> list[str]:
+        """Write title and time, a bar of the time flown, and the leg with the distance that remains."""
         log, track = self.log, self.log.track
         time, end = float(track.time[k]), log.end_time
         title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
@@ -111,6 +112,7 @@ class Instruments:
         return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
 
     def _readout_lines(self, k: int) -> list[str]:
+        """Write the numbers next to the horizon: speeds, altitude, attitude, path errors, wind and battery."""
         track, setup = self.log.track, self.log.setup
         east, north, up = (float(value) for value in track.velocity[k])
         roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[k])
@@ -161,6 +163,7 @@ class Instruments:
         return lines
 
     def _threat_text(self, k: int) -> str:
+        """Name the missiles and radars in whose range the aircraft is."""
         threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
         distances = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
         threats_in_reach = [
@@ -173,6 +176,7 @@ class Instruments:
         )
 
     def _latest_entries(self, time: float) -> list[str]:
+        """Write the latest entries of the timeline at a time, s."""
         entry_count = bisect.bisect_right([entry.time for entry in self.entries], time + 1e-9)
         return [
             f"{entry.time:8.1f} s  {entry.text}"
@@ -200,17 +204,21 @@ def make_instruments(log: FlightLog) -> Instruments:
 
 
 def _without_control_characters(text: str) -> str:
+    """Replace control characters with spaces, so that they cannot control the terminal."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 def _number_text(value: float, digits: int, sign: str = "") -> str:
+    """Write a number with fixed decimals; "?" if it is not finite."""
     # Zero has no unwanted sign: "+0.0" or "0", never "-0".
     return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
 
 
 def _metres_text(value: float) -> str:
+    """Write a length in whole metres."""
     return f"{_number_text(value, 0)} m"
 
 
 def _course_text(degrees: float) -> str:
+    """Write a course with three digits; "?" if it is not finite."""
     return f"{round(degrees) % 360:03d}°" if math.isfinite(degrees) else "?"

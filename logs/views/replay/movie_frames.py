@@ -134,6 +134,7 @@ class _MovingParts:
         self._figure.draw_artist(self._text)
 
     def _caption_text(self, k: int) -> str:
+        """Write time, leg, airspeed, altitude, height above ground and bank of a row."""
         track = self._track
         roll, _, _ = track.attitude[k].tolist()
         parts = [

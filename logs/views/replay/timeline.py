@@ -131,6 +131,7 @@ def waypoint_name(route: Route, index: int) -> str:
 
 
 def _start_entry(log: FlightLog) -> TimelineEntry:
+    """Describe aircraft, scenario and start of the flight."""
     setup, track = log.setup, log.track
     east, north, up = track.position[0].tolist()
     lat, lon = to_geo(setup.scenario.origin, east, north)
@@ -145,6 +146,7 @@ def _start_entry(log: FlightLog) -> TimelineEntry:
 
 
 def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+    """List the start of each leg with course, length, slope and airspeed; one entry for a whole loiter."""
     route = log.setup.route
     points = log.setup.shown_waypoints
     courses, runs, slopes = leg_courses(points), leg_runs(points), leg_slopes(points)
@@ -193,6 +195,7 @@ def _turn_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
 
 
 def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
+    """List the lowest height above ground of each leg, and whether it is below the required height."""
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is unknown")]
@@ -218,6 +221,7 @@ def _clearance_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEn
 
 
 def _threat_entries(log: FlightLog) -> list[TimelineEntry]:
+    """List each entry into and exit from the range of a missile or a radar."""
     threats, track = log.setup.scenario.threats, log.track
     entries = []
     for k, name in enumerate(threats.names):
@@ -228,6 +232,7 @@ def _threat_entries(log: FlightLog) -> list[TimelineEntry]:
 
 
 def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
+    """List entry and exit of one stay in a sphere, with its duration and the closest distance."""
     entry = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
     stay_text = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
     if not stay.whole:
@@ -236,6 +241,7 @@ def _stay_entries(name: str, unit: str, radius: float, stay: Passage) -> list[Ti
 
 
 def _throttle_entries(track: Track) -> list[TimelineEntry]:
+    """List the times at which the throttle is full or closed for long."""
     _, _, _, throttle = track.commands.T
     entries = []
     for name, is_held in (
@@ -254,6 +260,7 @@ def _throttle_entries(track: Track) -> list[TimelineEntry]:
 
 
 def _end_entries(log: FlightLog) -> list[TimelineEntry]:
+    """Describe how the flight ended, its time, distance and energy, and any fault of the log."""
     track = log.track
     steps = np.diff(track.position, axis=0)
     distance = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))

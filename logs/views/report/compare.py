@@ -103,6 +103,7 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
 
 
 def _judge_log(log: FlightLog) -> Verdict:
+    """Judge the flight of a log."""
     end_reason = log.ended or "the log ends before the flight does"
     return judge_flight(log.setup, log.track, end_reason, log_complete=log.complete, reference=log.reference)
 
@@ -229,6 +230,7 @@ def nearest_distances(points: Floats, track: Floats) -> Floats:
 
 
 def _wind_text(setup: FlightSetup) -> str:
+    """Describe wind speed, direction and turbulence."""
     wind = setup.scenario.wind
     direction_text = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
     return f"{wind.speed:g} m/s{direction_text}, turbulence {wind.turbulence}"

@@ -147,6 +147,7 @@ class PageLibrary:
 
 @cache
 def _load_templates(package: str) -> Environment:
+    """Load the page's templates; an undefined name in a template is an error."""
     return Environment(
         loader=PackageLoader(package),
         autoescape=True,
@@ -269,6 +270,7 @@ def _page_html(
     command: str,
     events: Sequence["LogEvent"] = (),
 ) -> str:
+    """Fill the page's template with verdict, tables, pictures and facts."""
     track, verdict = subject.track, subject.verdict
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings, verdict.deciding)

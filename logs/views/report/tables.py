@@ -88,6 +88,7 @@ def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
 
 
 def _flown_cells(track: Track | None, heights_above_ground: Floats | None, leg: int) -> tuple[str, ...]:
+    """Return the flown values of a leg; dashes for a leg that was not flown."""
     rows = np.flatnonzero(track.leg == leg) if track is not None else np.zeros(0, dtype=np.intp)
     if track is None or rows.size == 0:
         return (NOTHING,) * 7
@@ -130,11 +131,13 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
 
 
 def _max_magnitude(values: NDArray[np.float32]) -> float:
+    """Return the largest finite absolute value, or NaN if there is none."""
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if finite.size else math.nan
 
 
 def _min_finite(values: Floats) -> float:
+    """Return the smallest finite value, or NaN if there is none."""
     finite = values[np.isfinite(values)]
     return float(finite.min()) if finite.size else math.nan
 
@@ -177,14 +180,17 @@ def scenario_facts(setup: FlightSetup) -> Facts:
 
 
 def _position_text(lat_deg: float, lon_deg: float) -> str:
+    """Write latitude and longitude in degrees."""
     ns, ew = "N" if lat_deg >= 0.0 else "S", "E" if lon_deg >= 0.0 else "W"
     return f"{abs(lat_deg):.6f}° {ns}, {abs(lon_deg):.6f}° {ew}"
 
 
 def _limit_facts(setup: FlightSetup) -> Facts:
+    """Return facts on the scenario's limits and wind."""
     limits, wind = setup.scenario.limits, setup.scenario.wind
 
     def angle(value: float | str) -> str:
+        """Write a limit on an angle, or that the aircraft's limit applies."""
         return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
 
     wind_text = f"{quantity(wind.speed, 'm/s')} from {round(math.degrees(wind.from_course)) % 360:03d}°"
@@ -223,6 +229,7 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
 
 
 def _plan_status(feasible: bool, safe: bool) -> str:
+    """Describe whether a plan is feasible, and whether it avoids every missile."""
     if safe:
         return "feasible, and outside every missile's reach"
     return "feasible, but within a missile's reach" if feasible else "not feasible"

@@ -210,6 +210,7 @@ def count_sentence(rows: list[FindingRow]) -> str:
 
 
 def _finding_row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
+    """Write all numbers and texts of one finding.  deciding: as in `finding_rows`."""
     state = finding_state(finding.ok, is_open=bool(undecided_findings([finding])))
     planned_value, flown_value, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.margin)
@@ -288,6 +289,7 @@ def rule_rows(findings: Sequence[Finding]) -> list[RuleRow]:
 
 
 def _rule_row(rule: RuleFindings) -> RuleRow:
+    """Count the findings of one rule, and show the finding closest to its limit."""
     failed_count, judged_count = len(rule.failed), rule.judged
     is_open = bool(undecided_findings(rule.findings))
     state = "fail" if failed_count else "open" if is_open else "pass" if judged_count else "unjudged"
@@ -384,10 +386,12 @@ def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[Mission
 
 
 def _pair_text(pair: tuple[float, float]) -> str:
+    """Write a flown and a simulated value; "-" for an unknown one."""
     return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
 
 
 def _format_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    """Align the cells of a table: the first column left, all others right."""
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
     return [
         "  ".join(

@@ -67,7 +67,7 @@ def variants(content: Content) -> Iterator[tuple[str, ...]]:
 
 
 @dataclass
-class _TerrainFile:
+class _Output:
     """The bytes so far.  padded: whether records have more bytes than they need."""
 
     padded: bool
@@ -101,7 +101,7 @@ def _channel(content: Content) -> bytes:
     return struct.pack("<HH", 1, schema) + _decode_text(topic) + _decode_text(encoding) + _map(metadata)
 
 
-def _put_messages(out: _TerrainFile, content: Content) -> list[tuple[int, int]]:
+def _put_messages(out: _Output, content: Content) -> list[tuple[int, int]]:
     """Write schema, channel and messages: log time and place of each message."""
     if content.schema is not None:
         out.put(SCHEMA, _schema(content))
@@ -113,9 +113,9 @@ def _put_messages(out: _TerrainFile, content: Content) -> list[tuple[int, int]]:
     ]
 
 
-def _put_chunk(out: _TerrainFile, content: Content, indexed: bool) -> bytes:
+def _put_chunk(out: _Output, content: Content, indexed: bool) -> bytes:
     """Write a chunk and its message index: the content of its chunk index."""
-    inside = _TerrainFile(padded=False, data=bytearray())
+    inside = _Output(padded=False, data=bytearray())
     pairs = _put_messages(inside, content)
     times = [at for at, _ in pairs]
     span, size = (min(times), max(times)), len(inside.data)
@@ -132,7 +132,7 @@ def _put_chunk(out: _TerrainFile, content: Content, indexed: bool) -> bytes:
 
 def vector(content: Content, features: tuple[str, ...]) -> bytes:
     """A content as a file with these features."""
-    out = _TerrainFile("pad" in features)
+    out = _Output("pad" in features)
     out.put(HEADER, _decode_text("") + _decode_text(""))
     indexes: dict[int, bytes] = {}
     if "ch" in features:
@@ -155,7 +155,7 @@ def vector(content: Content, features: tuple[str, ...]) -> bytes:
     return bytes(out.data) + MAGIC
 
 
-def _put_summary(out: _TerrainFile, content: Content, features: tuple[str, ...], indexes: dict[int, bytes]) -> None:
+def _put_summary(out: _Output, content: Content, features: tuple[str, ...], indexes: dict[int, bytes]) -> None:
     begin = len(out.data)
     groups = {
         **({SCHEMA: _schema(content)} if "rsh" in features else {}),

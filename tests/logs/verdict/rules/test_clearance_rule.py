@@ -16,7 +16,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.places import FLIGHT
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
-from tests.logs.verdict.rules.test_ground_ways_rule import with_arduplane
+from tests.logs.verdict.rules.test_climbout_approach_rule import with_arduplane
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import (
     bump,

@@ -11,7 +11,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.rules import go_around_rule
 from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import of
-from tests.logs.verdict.rules.test_ground_ways_rule import POINT, RUN, Ground, landing, over, wall, with_arduplane
+from tests.logs.verdict.rules.test_climbout_approach_rule import POINT, RUN, Ground, landing, over, wall, with_arduplane
 from tests.mission_lines import wp
 from tests.soak import scaled
 from world.arrays import Floats

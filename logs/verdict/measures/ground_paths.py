@@ -1,4 +1,4 @@
-"""Check unplanned paths on the map against the ground, missile spheres and zones."""
+"""Check paths from the ground and to the ground against terrain, missile spheres and zones."""
 
 import math
 from collections.abc import Sequence
@@ -98,7 +98,7 @@ def first_hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> s
 
 
 # ----------------------------------------------------------------------
-# The mission items at which such paths begin and end.
+# The mission items at which paths from and to the ground begin and end.
 
 
 def has_ground_paths(requirements: RouteRequirements) -> bool:

@@ -19,9 +19,7 @@ from typing import NamedTuple
 from flight.mission.items import Command
 from flight.mission.placing import SAME_PLACE
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
-from logs.verdict.measures.route_requirements import RouteRequirements
-from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.ways import (
+from logs.verdict.measures.ground_paths import (
     GroundPath,
     Profile,
     first_hazard_on_path,
@@ -31,6 +29,8 @@ from logs.verdict.measures.ways import (
     min_path_clearance,
     straight_path,
 )
+from logs.verdict.measures.route_requirements import RouteRequirements
+from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
