@@ -107,7 +107,7 @@ def _missile_hazards(
         radius, (east, north, up) = float(threats.kill_radius[number]), threats.position[number]
         horizontal_distance = max(0.0, math.hypot(east - center[0], north - center[1]) - reach)
         if radius > 0.0 and math.hypot(horizontal_distance, max(0.0, min_altitude - up, up - max_altitude)) <= radius:
-            hazards.append(f"missile {threat_label(threat.name or '', number)} has it in range")
+            hazards.append(f"missile {threat_label(threat.name or '', number)} is in range")
     return hazards
 
 

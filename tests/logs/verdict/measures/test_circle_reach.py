@@ -51,7 +51,7 @@ def test_the_lowest_height_counts_against_the_ground() -> None:
     """Its least clearance is 30 m, of which 0.1 m is forgiven."""
     limit = route_requirements(loiter(TIME, {})).limits.min_clearance
     assert found(limit - 0.09, 900.0) == []
-    assert found(limit - 0.11, 900.0) == [f"the ground is only {limit - 0.11:.0f} m below"]
+    assert found(limit - 0.11, 900.0) == [f"the ground is only {limit - 0.11:.0f} m below ({limit:.0f} m are required)"]
 
 
 def test_the_highest_height_counts_against_the_greatest_above_ground() -> None:
@@ -60,7 +60,9 @@ def test_the_highest_height_counts_against_the_greatest_above_ground() -> None:
     assert found(500.0, 610.0, limits=limits) == ["the ground is 610 m below, more than the 600 m allowed"]
 
 
-@pytest.mark.parametrize(("up", "what"), [(490.0, "the ground is only 10 m below"), (np.nan, "the terrain is unknown")])
+@pytest.mark.parametrize(
+    ("up", "what"), [(490.0, "the ground is only 10 m below (30 m are required)"), (np.nan, "the terrain is unknown")]
+)
 def test_a_hill_counts_within_its_reach_only(up: float, what: str) -> None:
     ground = route_requirements(loiter(TIME, {})).setup.scenario.terrain
     assert ground is not None
@@ -83,9 +85,9 @@ def test_a_disc_is_looked_at_along_rings_a_step_of_the_ground_apart(reach: float
 def test_a_missile_counts_by_its_height_too() -> None:
     """A sphere of 100 m about 500 m, 250 m away."""
     assert found(650.0, 700.0, **sphere(250.0, 100.0)) == []
-    assert found(590.0, 700.0, **sphere(250.0, 100.0)) == ["the missile m reaches it"]
+    assert found(590.0, 700.0, **sphere(250.0, 100.0)) == ["missile m is in range"]
     assert found(300.0, 390.0, **sphere(250.0, 100.0)) == []
-    assert found(300.0, 410.0, **sphere(250.0, 100.0)) == ["the missile m reaches it"]
+    assert found(300.0, 410.0, **sphere(250.0, 100.0)) == ["missile m is in range"]
 
 
 def test_a_zone_counts_at_any_height_of_a_spiral() -> None:
@@ -100,7 +102,7 @@ def test_a_zone_counts_at_any_height_of_a_spiral() -> None:
 def test_the_area_may_end_on_any_side(side: tuple[int, int]) -> None:
     """West, east, south, north of home; on the other three it ends 9 km away."""
     setup = loiter(TIME, {})
-    for beyond, said in ((1.0, []), (-1.0, ["the area ends"])):
+    for beyond, said in ((1.0, []), (-1.0, ["the area's edge is in reach"])):
         bounds = np.array(setup.scenario.bounds)
         bounds[side] = (REACH + beyond) * (1.0 if side[1] else -1.0)
         scenario = replace(setup.scenario, bounds=bounds)

@@ -98,7 +98,7 @@ def test_a_missile_where_a_wider_circle_may_lead_leaves_geometry_open(away: floa
     item = of(verdict, "loiter")
     assert (item.ok, verdict.flyable, verdict.undecided) == ((True, True, False) if away > 0 else (None, False, True))
     if away < 0.0:
-        assert "the missile m reaches it; only a simulated flight shows" in item.reason
+        assert "missile m is in range; only a simulated flight shows" in item.reason
         assert (
             verdict.headline
             == "not judged in full: only a simulated flight shows how the circle at waypoint 1 (item 2) is flown"
@@ -170,7 +170,7 @@ def test_a_stated_circle_flown_half_again_as_wide_fails() -> None:
     assert item.ok is False
     assert item.flown is not None
     assert item.flown > 1.25 * 136.0 + 10.0
-    assert "m is required" in item.reason
+    assert "at most 181 m" in item.reason
 
 
 def test_the_bank_that_was_flown_counts_before_the_one_that_could_be() -> None:

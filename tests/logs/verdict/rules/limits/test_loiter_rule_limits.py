@@ -33,6 +33,6 @@ def test_circles_at_the_end_have_their_room_of_the_area(room: float, ok: bool | 
     setup = replace(made, scenario=replace(made.scenario, external=False), autopilot=law)
     verdict = judge_geometry(setup)
     item = of(verdict, "loiter")
-    assert (item.ok, "the area ends" in item.reason) == (ok, ok is None)
-    assert f"up to {reach:.0f} m from it" in item.reason
+    assert (item.ok, "the area's edge is in reach" in item.reason) == (ok, ok is None)
+    assert f"up to {reach:.0f} m from this waypoint" in item.reason
     assert bool(verdict.unjudged) is (ok is None)
