@@ -2,11 +2,13 @@
 
 import base64
 import contextlib
+import http.server
 import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -94,6 +96,45 @@ class Studio:
             return
         self.process.send_signal(how)
         self.process.communicate(timeout=20)
+
+
+# What a page of another origin can get of the studio: fetched texts, a frame's document, a script, a session.
+TAKEN = """(async (base, token) => {
+ const text = (path, mode) => fetch(base + path, { mode }).then((r) => r.status + r.type, () => 'refused');
+ const part = (name, more) => new Promise((done) => {
+  const one = Object.assign(document.createElement(name), more);
+  one.onload = () => {
+   try { done(name === 'iframe' ? one.contentDocument.title || 'empty' : 'loaded'); } catch { done('refused'); } };
+  one.onerror = () => done('refused');
+  document.body.append(one); });
+ const session = new Promise((done) => {
+  const socket = new WebSocket(base.replace('http', 'ws') + '/session');
+  socket.onopen = () => socket.send(JSON.stringify({ kind: 'hello', token }));
+  socket.onmessage = () => done('answered');
+  socket.onclose = () => done('refused'); });
+ return [await text('/', 'cors'), await text('/studio.js', 'no-cors'), await part('iframe', { src: base + '/' }),
+  await part('script', { src: base + '/link.js', type: 'module' }), await session]; })"""
+
+
+def test_a_page_of_another_origin_or_name_gets_nothing_even_with_the_token(studio: Studio, tmp_path: Path) -> None:
+    """Another port of this machine, and a name that an attacker lets point to it (DNS rebinding)."""
+    other = http.server.ThreadingHTTPServer(("127.0.0.1", 0), http.server.SimpleHTTPRequestHandler)
+    threading.Thread(target=other.serve_forever, daemon=True).start()
+    token = studio.address.partition("#t=")[2]
+    flags = ("--host-resolver-rules=MAP evil.test 127.0.0.1",)
+    try:
+        with Browser(tmp_path / "profile", 800, 600, flags=flags) as browser:
+            for name in ("127.0.0.1", "evil.test"):
+                browser.go(f"http://{name}:{other.server_port}/")
+                taken = browser.value(f"{TAKEN}('http://127.0.0.1:{studio.port}', '{token}')")
+                assert taken == ["refused"] * 5, name
+            browser.go(f"http://evil.test:{studio.port}/")
+            assert browser.value("document.body.innerText") == "this host is not served here"
+            taken = browser.value(f"{TAKEN}('http://evil.test:{studio.port}', '{token}')")
+            assert taken == ["421basic", "421basic", "refused", "refused", "refused"]
+    finally:
+        other.shutdown()
+        other.server_close()
 
 
 @pytest.fixture(scope="module")
