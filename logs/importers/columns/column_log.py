@@ -34,6 +34,8 @@ from world.files import did_you_mean
 
 # Largest ratio of the stated and the measured rate of a clock, in either direction.
 _MAX_RATE_RATIO = 1.25
+# Longest log, s: checks resample it in steps of 0.2 to 1 s, which takes 100 MB for seven days.
+_MAX_DURATION_S = 604_800.0
 # Share of the values that must lie in a quantity's plausible range.
 _PLAUSIBLE_SHARE = 0.98
 # Largest difference of a quaternion's length from 1.
@@ -219,7 +221,11 @@ class ColumnLog:
             raise LogError.at(data.path, f"{clock.column}[{k}]", f"{time[k]:.6g} s", allowed)
         if len(time) < 2 or time[-1] <= time[0]:
             raise LogError.at(data.path, clock.column, len(time), "expected at least two rows at different times")
-        rate = float(len(time) - 1) / float(time[-1] - time[0])
+        duration = float(time[-1] - time[0])
+        if duration > _MAX_DURATION_S:
+            allowed = f"expected at most {_MAX_DURATION_S:.0f} s from the first row to the last"
+            raise LogError.at(data.path, clock.column, f"{duration:.6g} s", allowed)
+        rate = float(len(time) - 1) / duration
         steps = np.diff(time)
         usual = float(1.0 / np.median(steps[steps > 0.0]))
         if clock.rate is not None and not 1.0 / _MAX_RATE_RATIO <= usual / clock.rate <= _MAX_RATE_RATIO:

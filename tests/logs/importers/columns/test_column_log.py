@@ -134,6 +134,7 @@ def late(name: str, delay: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("columns", "expected"),
     [
+        (with_cell("t", -1, 604_801.0), "flight.csv: t: 604801 s: expected at most 604800 s from the first row"),
         (with_cell("t", 40, 1.5), r"flight.csv: t\[40\]: 1.5 s: after 1.95 s: expected rising times"),
         (with_cell("t", 40, np.nan), r"flight.csv: t\[40\]: nan: expected a time in every row"),
         (with_cell("roll", 7, "n/a?"), r"flight.csv: roll\[7\]: 'n/a\?': expected a number"),
