@@ -11,6 +11,7 @@ import argparse
 import json
 import shutil
 import tempfile
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,9 +19,11 @@ import numpy as np
 
 import planfly
 from aircraft.catalog import find_aircraft
+from aircraft.identification.base_model import BaseModel
 from aircraft.identification.blind import Band
 from aircraft.identification.draws import draw_aircraft, draw_drive_power
 from aircraft.identification.estimate import estimate_model, score_predictions
+from aircraft.identification.flight_record import FlightRecord
 from aircraft.identification.performance import performance
 from logs.importers.motion_log import read_motion
 from logs.views.drawing import draw_chart, png_bytes
@@ -41,6 +44,10 @@ THOR_UNTIL_S = 407.0
 THOR_AIRSPEED_MPS = 17.0
 # Time ahead of the scored predictions, s.
 AHEAD_S = 0.5
+# Aircraft with the wind tunnel's coefficients of Thor.
+WIND_TUNNEL = "ultrastick25e"
+# Axes of the scored rates.
+AXES = ("roll", "pitch", "yaw")
 # Quantities of the picture of the README.
 SHOWN = ("bank", "airspeed", "power")
 
@@ -60,8 +67,7 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
     records = flight_records(motion, sheet)
     earlier = [record.between(0.0, THOR_UNTIL_S) for record in records]
     judged = [record.between(THOR_UNTIL_S, np.inf) for record in records]
-    scores = score_predictions(estimate_model(earlier, numbers), judged, numbers, "base").predictions
-    null, identified = scores[0].rms[AHEAD_S], scores[-1].rms[AHEAD_S]
+    wind_tunnel = base_model(find_aircraft(WIND_TUNNEL))
     unknown = [replace(record, current=np.full_like(record.current, np.nan)) for record in records]
     without_current = estimate_model(unknown, numbers)
     powers = performance(numbers, draw_aircraft(without_current), THOR_AIRSPEED_MPS, DENSITY).power
@@ -71,7 +77,8 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
         "inside": {band.name: round(band.inside, 3) for band in predicted.bands},
         "half_width": {band.name: round(band.half_width, 2) for band in predicted.bands},
         "unchanged": {band.name: round(band.unchanged, 2) for band in predicted.bands},
-        "ahead": dict(zip(("roll", "pitch", "yaw"), (identified / null)[:3].round(3).tolist(), strict=True)),
+        **_score_rates(earlier, judged, numbers, ""),
+        **_score_rates(earlier, judged, wind_tunnel, "_wind_tunnel"),
         "power_without_current": [round(low), round(middle), round(high)],
         "windows": predicted.windows,
     }
@@ -80,6 +87,26 @@ def predict_thor(folder: Path) -> tuple[dict[str, object], Path]:
     picture = folder / "thor" / "predict.png"
     picture.with_name("shown.png").write_bytes(png_bytes(draw_chart(chart)))
     return rows, picture
+
+
+def _score_rates(
+    earlier: list[FlightRecord], judged: list[FlightRecord], base: BaseModel, suffix: str
+) -> dict[str, dict[str, float]]:
+    """Return the errors of roll, pitch and yaw rate over those of constant rates, and the share of white lags.
+
+    earlier, judged: parts of the flight to identify a model with this base, and to predict.
+    suffix: ending of the names of the rows.
+    """
+    null, alone, identified = score_predictions(estimate_model(earlier, base), judged, base, "base").predictions
+
+    def by_axis(values: Iterable[float]) -> dict[str, float]:
+        return {name: round(value, 3) for name, value in zip(AXES, values, strict=True)}
+
+    return {
+        f"ahead{suffix}": by_axis((identified.rms[AHEAD_S] / null.rms[AHEAD_S])[:3].tolist()),
+        f"ahead_base_alone{suffix}": by_axis((alone.rms[AHEAD_S] / null.rms[AHEAD_S])[:3].tolist()),
+        f"white{suffix}": by_axis(identified.whiteness),
+    }
 
 
 def predict_circle(folder: Path) -> tuple[dict[str, object], Path]:

@@ -29,8 +29,11 @@ def test_the_tables_of_bands_are_the_benchmarks(flight: str) -> None:
 def test_the_other_figures_of_thor_are_the_benchmarks() -> None:
     """Errors of short predictions, power without current, and the number of windows."""
     thor = RESULTS["thor"]
-    ahead = ", ".join(f"{thor['ahead'][axis]:g}" for axis in ("roll", "pitch", "yaw"))
-    assert f"| {ahead} |" in PAGE
+    for row in ("ahead", "ahead_base_alone"):
+        ahead = ", ".join(f"{thor[row][axis]:g}" for axis in ("roll", "pitch", "yaw"))
+        assert f"| {ahead} |" in PAGE, row
+    whites = sorted(thor["white"].values())
+    assert f"{100.0 * whites[0]:.0f} to {100.0 * whites[-1]:.0f} % of the lags up to 0.5 s" in PAGE
     low, middle, high = thor["power_without_current"]
     assert f"| {middle} W, {low} to {high} W |" in PAGE
     assert f"in {thor['windows']} windows of 2 s" in PAGE
