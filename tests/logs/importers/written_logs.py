@@ -331,7 +331,10 @@ def _each_second(raw: RawLog) -> list[tuple[tuple[float, float, float], float]]:
 
 
 def columns(path: Path, log: RawLog | None = None) -> Path:
-    """Write a log as a CSV file with its table of columns, which is the path."""
+    """Write a log as a CSV file with its table of columns, which is the path.
+
+    Attitude and airspeed have the noise of a sensor, of a thousand-millionth.
+    """
     raw = example_raw_log() if log is None else log
     time = raw.series["position"].time
     names = {
@@ -350,6 +353,9 @@ def columns(path: Path, log: RawLog | None = None) -> Path:
         for series, quantities in names.items()
         for name, values in zip(quantities, raw.series[series].values.T, strict=True)
     }
+    draw = np.random.default_rng(1)
+    for name in ("roll", "pitch", "yaw", "airspeed"):
+        table[name] = table[name] + 1e-9 * draw.standard_normal(len(time))
     file = path.with_name("columns.csv")
     rows = [",".join(("t", *table))]
     rows += [",".join(f"{value!r}" for value in row) for row in np.column_stack([time, *table.values()]).tolist()]
