@@ -111,7 +111,7 @@ class Aircraft:
         return (self.folder, *(self.folder / name for name in subfolders))
 
     @property
-    def embedded(self) -> bool:
+    def is_embedded(self) -> bool:
         """True if the aircraft ships with planfly."""
         return self.folder.parent == _ROOT
 
@@ -163,12 +163,15 @@ def find_aircraft(name: str) -> Aircraft:
     return read_aircraft(Path(name)) if names_folder(name) else load_aircraft(name)
 
 
-def find_again(name: str, stated_name: str) -> Aircraft:
-    """Return the aircraft ``name`` of a setup or log whose scenario states the name or folder ``stated_name``.
+def find_logged_aircraft(name: str, stated_name: str) -> Aircraft:
+    """Return the aircraft of a setup or log.
+
+    name: name in the setup or log.
+    stated_name: name or folder in its scenario, which is used if it is a folder with the name `name`.
 
     Raises FlightError as `load_aircraft` does.
 
-    >>> find_again("c172x", "aerosonde").name
+    >>> find_logged_aircraft("c172x", "aerosonde").name
     'c172x'
     """
     return find_aircraft(stated_name if names_folder(stated_name) and Path(stated_name).name == name else name)
@@ -218,7 +221,7 @@ def _toml_advice(folder: Path) -> str:
 
 
 def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
-    """Return the numeric fields of `Aircraft`. Raises FlightError without the file's name."""
+    """Return the numeric fields of `Aircraft` in SI units. Raises FlightError, whose message omits the file's name."""
     energy_keys = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
     allowed = {*_FIELD_BY_KEY, *energy_keys}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
@@ -324,8 +327,8 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
 
     overwrite: True accepts an existing folder of an aircraft.
 
-    Raises FlightError if the folder exists otherwise, if its parent does not exist, or if its name is not valid for a
-    model.
+    Raises FlightError if the folder exists (with `overwrite`: if it is not an aircraft's folder), if its parent does
+    not exist, or if its name is not valid for a model.
     """
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _RESERVED_NAMES:
@@ -344,7 +347,7 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
 
 
 def _files_under_new_name(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the content of the new folder's files by path: those of the aircraft and of its model, under the new name.
+    """Return the contents of the files of an aircraft and its model, by their paths under a new name.
 
     model: files of the flight model by path; empty if the new aircraft keeps using the shipped model.
     """

@@ -82,7 +82,7 @@ def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
     return tuple(contacts)
 
 
-def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
+def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
     """Return the contacts of an aircraft's model, or default contacts if the model has none.
 
     Contacts on which the aircraft stands come first.
@@ -90,7 +90,7 @@ def contacts_of(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
     Raises ValueError for a model that is not XML.
 
     >>> from aircraft.catalog import load_aircraft
-    >>> [contact.name for contact in contacts_of(load_aircraft("c172x"), "belly") if contact.wheel]
+    >>> [contact.name for contact in find_contacts(load_aircraft("c172x"), "belly") if contact.wheel]
     ['Nose Gear', 'Left Main Gear', 'Right Main Gear']
     """
     model_contacts = _model_contacts(aircraft.model_file.read_bytes())

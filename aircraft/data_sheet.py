@@ -93,7 +93,7 @@ TOP_RATIO_RANGE = (1.05, 2.5)
 LIFT_RANGE = (0.5, 2.4)
 # Range of the aspect ratio, span^2 / area.
 ASPECT_RANGE = (2.5, 25.0)
-# Largest battery energy per aircraft mass, J/kg: no available cell stores more per its own mass.
+# Largest battery energy per aircraft mass, J/kg: no available cell stores more energy per mass of the cell.
 MAX_BATTERY = 300.0 * 3600.0
 
 
@@ -261,9 +261,9 @@ def _is_within(value: float, min_value: float, max_value: float) -> bool:
 
 
 def check_sheet(sheet: DataSheet) -> DataSheet:
-    """Return a sheet if it describes a small aircraft.
+    """Check that a sheet describes a small aircraft, and return it.
 
-    Raises FlightError otherwise, in one line with the allowed range.
+    Raises FlightError for a value out of range, in one line with the allowed range.
 
     >>> check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)).mass
     2.1
@@ -373,7 +373,7 @@ def size_aircraft(
     jx, jy, jz = (full_sheet.mass * (ratio * full_sheet.span) ** 2 for ratio in aircraft_class.gyration)
     numbers = ModelNumbers(
         title=title or f"{_LAYOUT_TEXTS[sheet.layout]} of {sheet.mass:g} kg, {sheet.span:g} m",
-        source="From a data sheet, scaled from published aircraft of its class: README.md beside this file.",
+        source="From a data sheet, scaled from published aircraft of its class: see README.md in this folder.",
         mass=full_sheet.mass,
         area=full_sheet.area,
         span=full_sheet.span,
@@ -486,7 +486,7 @@ Drag = Callable[[float], float]
 
 
 def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
-    """Return a function for the drag, N, of level flight at an airspeed, m/s."""
+    """Return a function that computes the drag, N, of level flight at an airspeed, m/s."""
 
     def drag(airspeed: float) -> float:
         area_times_pressure = 0.5 * SHEET_DENSITY * airspeed**2 * sheet.area
@@ -721,7 +721,7 @@ def _thrust_error(drive: Drive, sheet: DataSheet, drag: Drag, field: str) -> flo
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
-    """Return positive numbers near 1 that make all errors vanish."""
+    """Return positive numbers near 1, as many as `count`, at which all errors are 0.  Raises _NoPropellerError."""
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):

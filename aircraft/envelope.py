@@ -164,7 +164,7 @@ class Envelope:
 
 @compiled
 def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: float) -> float:
-    """Return the path angle over the ground of a steady climb at ``air_angle`` to the air, rad.
+    """Convert a climb angle relative to the air to the path angle over the ground, rad.
 
     The result is NaN if the aircraft cannot make progress over the ground.
     """
@@ -187,6 +187,10 @@ def turn_radius(speed: float, bank: float) -> float:
 
 
 def _interpolate_bilinearly(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
+    """Return a table (xs, ys) at x and y, with y clipped to its range; NaN for x outside its range.
+
+    Rows before the first row with a value take the values of that row.
+    """
     rows = _interpolate_rows(ys, table, y)
     first_finite_row = int(np.argmax(~np.isnan(rows)))
     rows[:first_finite_row] = rows[first_finite_row]

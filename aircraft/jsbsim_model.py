@@ -1,4 +1,4 @@
-"""Properties of a JSBSim model: the properties of the four commands, and those of the readings."""
+"""Read the JSBSim properties of a model's four commands and of its readings."""
 
 import math
 import re
@@ -30,9 +30,9 @@ class CommandProperty:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Property of a reading, and its factor to SI.
+    """Property of a reading, and the factor from its unit to SI.
 
-    An empty name reads as zero, for a quantity that the model lacks.
+    An empty name means that the model lacks the quantity, which then reads as zero.
     """
 
     name: str
@@ -118,7 +118,7 @@ def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict
 def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
     """Return the name of a model that JSBSim ships, "" for none.
 
-    The name is that of a folder and must not lead outside JSBSim's folder.
+    The name is also a folder's name and must not lead outside JSBSim's folder.
     """
     value = table.get("shipped_by_jsbsim", False)
     if isinstance(value, bool):

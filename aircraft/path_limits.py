@@ -251,7 +251,7 @@ def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> floa
 
 
 @compiled_inline
-def downwind(table: PerformanceTable) -> tuple[float, float]:
+def downwind_vector(table: PerformanceTable) -> tuple[float, float]:
     """Return the east and north components of the downwind unit vector."""
     return math.sin(table.wind_to), math.cos(table.wind_to)
 
@@ -278,7 +278,7 @@ def slopes_along(
     dive_slope = ground_slope(dive, airspeed, wind * tail_fraction, wind * cross_fraction)
     if math.isnan(climb_slope) or math.isnan(dive_slope):
         return 0.0, 0.0
-    # No leg may descend from an altitude at which the true airspeed exceeds that of the fastest level flight.
+    # No leg may descend from an altitude at which the true airspeed exceeds the speed of the fastest level flight.
     if table.equivalent > 0.0 and climb < 0.0:
         dive_slope = 0.0
     return climb_slope, dive_slope
@@ -305,7 +305,7 @@ def _turn_radius(
 ) -> float:
     """Return the radius of the arc between the unit courses u and v, m.
 
-    w: unit vector of `downwind`.
+    w: unit vector of `downwind_vector`.
     turn_sign: sign of the turn, 0 for either direction.
     """
     wind, airspeed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
@@ -334,7 +334,7 @@ def turn_radius_between(table: PerformanceTable, course_in: float, course_out: f
     """
     turn = wrap(course_out - course_in)
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
-    wx, wy = downwind(table)
+    wx, wy = downwind_vector(table)
     # A U-turn may be flown in either direction.
     turn_sign = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
     return _turn_radius(table, ux, uy, vx, vy, amsl, turn_sign, wx, wy)
@@ -347,7 +347,7 @@ def corner_tangent(
     """Return the tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
 
     The tangent length R tan(theta/2) = R |sin theta| / (1 + cos theta) is 0 without a turn and inf for a U-turn.
-    w: `downwind`.
+    w: `downwind_vector`.
     """
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
     if abs(cross) < 1e-9 and dot > 0.0:
@@ -398,7 +398,7 @@ def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:
     """
     count = waypoints.shape[0]
     tangents = np.zeros(count)
-    wx, wy = downwind(table)
+    wx, wy = downwind_vector(table)
     for i in range(1, count - 1):
         ux, uy = waypoints[i, 0] - waypoints[i - 1, 0], waypoints[i, 1] - waypoints[i - 1, 1]
         vx, vy = waypoints[i + 1, 0] - waypoints[i, 0], waypoints[i + 1, 1] - waypoints[i, 1]
@@ -425,7 +425,7 @@ def roll_reversal_length(
 
     radius_in, radius_out: radii of the two arcs, m.
 
-    u: the leg's unit course. w: `downwind`.
+    u: the leg's unit course. w: `downwind_vector`.
 
     The length is 0 if the aircraft cannot make progress along the leg.
     """

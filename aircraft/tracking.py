@@ -44,7 +44,7 @@ class TrackingError:
         straight leg, (t, s) m.
     across, up: lateral and vertical deviation from a straight leg, m, including navigation error.
     lag: time by which the altitude lags behind a slope, s.
-    step: minimum altitude change of a leg that is flown as a slope, m; a smaller change is flown at once.
+    step: minimum altitude change of a leg that is flown as a slope, m; a smaller change is flown as a step.
     climb_rate, sink_rate: maximum rates of the altitude demand, m/s; inf for no limit.
     own_climb_share, own_sink_share: fractions (0..1) of the aircraft's steepest climb and descent at which it stays
         near its altitude in gusts.
@@ -107,7 +107,7 @@ def air_density_factor(amsl: float) -> float:
 
 @compiled
 def density_factor(amsl: float) -> float:
-    """Return the ratio of `air_density_factor` in compiled functions."""
+    """Return the ratio of true to equivalent airspeed at an altitude, m AMSL, in compiled functions."""
     # Two terms of (1 - 2.2558e-5 h)^-2.128, accurate to 0.5 % up to 4,000 m; a library's power rounds differently on
     # different machines.
     return 1.0 + amsl * (4.8e-5 + 1.8e-9 * amsl)
@@ -158,7 +158,7 @@ _SPEED_RATIO_STEP = float(SPEED_RATIOS[1] - SPEED_RATIOS[0])
 # SITL overshot corners of up to 25 degrees in 5 m/s of wind by at most 10 m.
 MIN_CORRIDOR = 30.0
 # Minimum half-width in acceptance radii. An autopilot that turns one radius before its waypoint cuts a right-angled
-# corner by up to 0.7 radii, and overshoots the next leg by as much if it turns late; the remainder is for wind.
+# corner by up to 0.7 radii, and overshoots the next leg by the same distance if it turns late; the rest is for wind.
 CORRIDOR_RADII = 2.0
 
 

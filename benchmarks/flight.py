@@ -102,7 +102,7 @@ def windy(seed: int, speed: float = 10.0, turbulence: str = "moderate", share: f
     for step in steps:
         climb, descent = setup.envelope.air_angles(25.0, 500.0)
         run = float(np.hypot(step[0], step[1]))
-        tail, cross = setup.scenario.wind.along(math.atan2(step[0], step[1]), 500.0)
+        tail, cross = setup.scenario.wind.components_on_course(math.atan2(step[0], step[1]), 500.0)
         most, least = (
             share * 25.0 * math.sin(air) / (math.sqrt((25.0 * math.cos(air)) ** 2 - cross**2) + tail)
             for air in (climb, -abs(descent))

@@ -16,9 +16,9 @@ from planner.evaluation.problem import ProblemArrays
 from planner.optimisers.preference import Level
 from world.arrays import Floats, Ints
 from world.frames import PolyMapRecord
-from world.geometry import CLOSEST
+from world.geometry import MIN_RANGE_M
 from world.kernels import Records
-from world.terrain import EDGE
+from world.terrain import EDGE_TOLERANCE
 
 POINTS = 6
 
@@ -41,7 +41,12 @@ def pixels_of(to_pixel: PolyMapRecord, east: Floats, north: Floats) -> tuple[Flo
 def bilinear(heights: NDArray[np.float32], col: Floats, row: Floats) -> Floats:
     """Return the heights at pixel coordinates; NaN outside the raster."""
     rows, cols = heights.shape
-    inside = (col >= -EDGE) & (col <= cols - 1 + EDGE) & (row >= -EDGE) & (row <= rows - 1 + EDGE)
+    inside = (
+        (col >= -EDGE_TOLERANCE)
+        & (col <= cols - 1 + EDGE_TOLERANCE)
+        & (row >= -EDGE_TOLERANCE)
+        & (row <= rows - 1 + EDGE_TOLERANCE)
+    )
     i = np.clip(row.astype(np.int64), 0, heights.shape[0] - 2)
     j = np.clip(col.astype(np.int64), 0, heights.shape[1] - 2)
     v, u = row - i, col - j
@@ -76,7 +81,7 @@ def numpy_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
     threats = data.threats
     offset = points[:, :, None, :] - np.stack([threats["east"], threats["north"], threats["up"]], axis=1)
     squared = (offset**2).sum(axis=-1)
-    near = np.maximum(squared, CLOSEST * CLOSEST) ** 2
+    near = np.maximum(squared, MIN_RANGE_M * MIN_RANGE_M) ** 2
     for column, kind in ((1, "kill"), (2, "detection")):
         radius, scale = threats[f"{kind}_radius"], threats[f"{kind}_scale"]
         inside = (squared <= radius**2) & (radius > 0.0)
@@ -90,7 +95,9 @@ def numpy_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
 @njit
 def _bilinear_at(heights: NDArray[np.float32], col: float, row: float) -> float:
     rows, cols = heights.shape
-    if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
+    if not (
+        -EDGE_TOLERANCE <= col <= cols - 1 + EDGE_TOLERANCE and -EDGE_TOLERANCE <= row <= rows - 1 + EDGE_TOLERANCE
+    ):
         return math.nan
     i, j = min(int(row), rows - 2), min(int(col), cols - 2)
     v, u = row - i, col - j
@@ -104,7 +111,7 @@ def _exposures_at(threats: Records, point: Floats, out: Floats) -> None:
     for k in range(threats.shape[0]):
         unit = threats[k]
         d2 = (point[0] - unit.east) ** 2 + (point[1] - unit.north) ** 2 + (point[2] - unit.up) ** 2
-        near = max(d2, CLOSEST * CLOSEST) ** 2
+        near = max(d2, MIN_RANGE_M * MIN_RANGE_M) ** 2
         if unit.kill_radius > 0.0 and d2 <= unit.kill_radius**2:
             out[1] += unit.kill_scale**4 / near
         if unit.detection_radius > 0.0 and d2 <= unit.detection_radius**2:

@@ -12,8 +12,8 @@ from flight.simulation.setup import EngineChoice, VerticalDatum
 from planfly.arguments import check_arguments, is_wind
 from planfly.workflow.file_autopilots import with_file_autopilot
 from world.errors import ArgumentError
-from world.files import did_you_mean, whole_path
-from world.scenario import Scenario, at_time, load_scenario, over_terrain, with_flight, with_wind
+from world.files import absolute_path, did_you_mean
+from world.scenario import Scenario, load_scenario, with_flight, with_flight_time, with_terrain, with_wind
 from world.scenario_tables import Guidance, Navigation
 
 # Wind speed, m/s, and the direction from which the wind blows, degrees.
@@ -248,7 +248,7 @@ def load_scenario_with_options(
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(str(scenario), terrain_path)
     elif terrain_path is not None:
-        scenario = over_terrain(scenario, terrain_path)
+        scenario = with_terrain(scenario, terrain_path)
     return apply_options(scenario, options, program)
 
 
@@ -271,7 +271,7 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
             "wind", wind, "expected the direction that the wind blows from, degrees from north, -360..360"
         )
     from_course = None if from_deg is None else math.radians(from_deg)
-    new_scenario = with_flight(at_time(scenario, options.get("at")), **flight_entries(options, program))
+    new_scenario = with_flight(with_flight_time(scenario, options.get("at")), **flight_entries(options, program))
     return with_wind(with_file_autopilot(new_scenario), speed, from_course, options.get("turbulence"))
 
 
@@ -302,7 +302,7 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
         "guidance": options.get("guidance"),
         "nav": options.get("nav"),
         # Absolute, so that it does not depend on the folder of the scenario.
-        "params": None if params is None else whole_path(Path(params)),
+        "params": None if params is None else absolute_path(Path(params)),
     }
 
 

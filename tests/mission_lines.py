@@ -17,13 +17,13 @@ from tests.setups import route_along, setup_along, spec_around
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo
 from world.scenario import from_spec, load_scenario, with_wind
-from world.terrain import Terrain, flat_terrain
+from world.terrain import Terrain, make_flat_terrain
 
 ORIGIN = GeoOrigin(36.5, -84.2)
 
 
 def ground(amsl: float = 300.0) -> Terrain:
-    return flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), amsl, 1000.0)
+    return make_flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), amsl, 1000.0)
 
 
 def mission(*lines: str, home: str = "36.5 -84.2 300") -> Mission:

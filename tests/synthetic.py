@@ -132,7 +132,7 @@ def fly_path(
     if setup.route.airspeed.min() != setup.route.airspeed.max():
         leg = np.clip(np.searchsorted(stations, s, side="right") - 1, 0, setup.route.legs - 1)
         speed = setup.route.airspeed[leg] + (0.0 if airspeed is None else airspeed(s))
-    wind = setup.scenario.wind.at_each(np.asarray(heights, dtype=np.float64))
+    wind = setup.scenario.wind.velocities_at(np.asarray(heights, dtype=np.float64))
     ground = _ground_speed(speed * np.cos(slopes), course, wind)
     moved = np.hypot(*np.diff(place, axis=0).T)
     time = np.concatenate([[0.0], np.cumsum(moved / (0.5 * (ground[1:] + ground[:-1])))])

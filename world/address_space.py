@@ -7,9 +7,9 @@ room for them, neither Ctrl-C nor SIGTERM ends the process.  LLVM and others end
 import mmap
 
 # Address space that must be free to import a module, bytes: more than OpenBLAS with its buffers, 90 MB.
-ROOM = 112 * 2**20
+MIN_FREE_BYTES = 112 * 2**20
 # Address space that must be free to import LLVM, bytes: more than its library of 160 MB.
-LLVM_ROOM = 192 * 2**20
+LLVM_MIN_FREE_BYTES = 192 * 2**20
 
 
 class AddressSpaceError(MemoryError):
@@ -29,7 +29,7 @@ def has_room(size: int) -> bool:
     return True
 
 
-class RoomFinder:
+class AddressSpaceGuard:
     """Import hook for the head of ``sys.meta_path`` that refuses imports if there is too little address space.
 
     limit: address space of this process, bytes.
@@ -40,7 +40,7 @@ class RoomFinder:
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
         """Find no module.  Raise AddressSpaceError if too little address space is left."""
-        room = LLVM_ROOM if name.startswith("llvmlite") else ROOM
+        room = LLVM_MIN_FREE_BYTES if name.startswith("llvmlite") else MIN_FREE_BYTES
         if not has_room(room):
             limit = f"{self._limit // 1024:,} kB of address space (ulimit -v)"
             library = name.partition(".")[0]

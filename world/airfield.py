@@ -128,7 +128,7 @@ class LandingStrip:
         """
         if self.course is not None:
             return self.course
-        return wind.from_course if math.hypot(*wind.at(amsl)) > 0.0 else None
+        return wind.from_course if math.hypot(*wind.velocity_at(amsl)) > 0.0 else None
 
 
 def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:

@@ -71,6 +71,7 @@ def by_reference(cls: _Class) -> _Class:
 
 
 def _get_layout(value: Any) -> _Layout:
+    """Return the layout of an instance, made at the first call and stored in the instance."""
     attributes: dict[str, Any] = vars(value)
     if "_layout" not in attributes:
         tuple_type = _value_type(typeof_impl.dispatch(tuple)(value, None))
@@ -79,11 +80,12 @@ def _get_layout(value: Any) -> _Layout:
 
 
 def _instance_address(value: Any) -> int:
+    """Return the address of an instance's fields in memory."""
     return ctypes.addressof(_get_layout(value).memory)
 
 
 def _value_type(numba_type: Any) -> Any:
-    """Return the type with references replaced by their named tuples, as they are laid out in memory."""
+    """Return a numba type with references replaced by their named tuples, as they are laid out in memory."""
     if isinstance(numba_type, Reference):
         return numba_type.tuple_type
     if isinstance(numba_type, types.Array):
@@ -148,6 +150,7 @@ class _Field(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, name: str) -> Any:
+    """Generate the code that reads a field, or returns a pointer to a field whose class is marked."""
     index, member = _find_field(reference, name)
     field_pointer = cgutils.gep_inbounds(builder, pointer, 0, index)
     if isinstance(member, Reference):
@@ -157,6 +160,7 @@ def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, 
 
 @unbox(Reference)
 def _unbox_reference(kind: Reference, value: Any, c: Any) -> Any:
+    """Generate the code that converts a Python instance to the pointer that a kernel takes."""
     pointer_type = c.context.get_value_type(kind)
     pointer = cgutils.alloca_once_value(c.builder, ir.Constant(pointer_type, None))
     address = c.pyapi.object_getattr_string(value, "_address")

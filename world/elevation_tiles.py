@@ -25,7 +25,7 @@ _MAX_BYTES = 4 * 2**20
 # Elements with which a virtual raster changes the heights of its files.
 _ALTERING_ELEMENTS = ("ScaleRatio", "ScaleOffset", "LUT", "Kernel", "PixelFunctionType")
 # Largest offset of a tile from the grid of the first tile, pixels.
-OFF_GRID = 0.01
+MAX_GRID_OFFSET_PIXELS = 0.01
 
 
 def tile_files(path: Path) -> list[Path] | None:
@@ -150,10 +150,10 @@ def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
         math.hypot(col[0] - position[1], row[0] - position[0]),
         math.hypot(col[1] - position[1] - (cols - 1), row[1] - position[0] - (rows - 1)),
     )
-    if not offset <= OFF_GRID:
+    if not offset <= MAX_GRID_OFFSET_PIXELS:
         allowed = "resample both to one grid (gdalwarp)"
         raise TerrainError(
-            f"{tile.name}: its pixel grid is offset by {offset:.3g} pixels from that of {first.name}: {allowed}",
+            f"{tile.name}: its pixel grid is offset by {offset:.3g} pixels from the grid of {first.name}: {allowed}",
             file=tile.name,
             allowed=allowed,
         )

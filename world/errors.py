@@ -80,7 +80,7 @@ class PlanflyError(Exception):
 
     @classmethod
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
-        """Convert an error to this class, with the location that led to it, and keep its attributes.
+        """Convert an error to this class, with the location of the value that caused it, and keep its attributes.
 
         file, field, value: location that led to the error, added before the message; empty to keep the message.
         They become the attributes if the error names no field; otherwise its own field and value are kept, and its

@@ -1,7 +1,7 @@
 """Extras: optional features of planfly and the modules that they need.
 
-The help, the documentation and `pyproject.toml` are tested against this list.  A feature calls `need_extra`, or is
-decorated with `needs_extra`, before it begins, so that a missing extra is reported in one line.
+The help, the documentation and `pyproject.toml` are tested against this list.  A feature calls `require_extra`, or is
+decorated with `requires_extra`, before it begins, so that a missing extra is reported in one line.
 """
 
 import functools
@@ -11,8 +11,8 @@ from typing import NamedTuple, ParamSpec, TypeVar
 
 from world.errors import MissingExtraError
 
-Given = ParamSpec("Given")
-Made = TypeVar("Made")
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 
 
 class Extra(NamedTuple):
@@ -72,12 +72,12 @@ EXTRAS = {
 }
 
 
-def need_extra(name: str, needs: str = "") -> None:
+def require_extra(name: str, needs: str = "") -> None:
     """Raise MissingExtraError, in one line, if a module of an extra is not installed.
 
     needs: beginning of the line, which names the feature; the extra's own `needs` by default.
 
-    >>> need_extra("campaigns")
+    >>> require_extra("campaigns")
     >>> print(missing_extra(EXTRAS["tables"], "pandas", ".parquet needs"))
     .parquet needs the extra 'tables': pip install 'planfly[tables]'
     """
@@ -96,7 +96,7 @@ def _is_installed(module: str) -> bool:
 
 
 def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraError:
-    """Make the error about a module that is not installed."""
+    """Make the error about a missing module, with the command that installs its extra."""
     command = f"pip install 'planfly[{extra.name}]'"
     line = f"{needs or extra.needs} the extra '{extra.name}': {command}"
     error = MissingExtraError(line, field="extra", value=extra.name, allowed=command)
@@ -104,15 +104,15 @@ def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraErr
     return error
 
 
-def needs_extra(name: str, needs: str = "") -> Callable[[Callable[Given, Made]], Callable[Given, Made]]:
-    """Decorate a function to call `need_extra` first."""
+def requires_extra(name: str, needs: str = "") -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
+    """Decorate a function to call `require_extra` first."""
 
-    def decorated(function: Callable[Given, Made]) -> Callable[Given, Made]:
+    def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
         @functools.wraps(function)
-        def checked(*args: Given.args, **keywords: Given.kwargs) -> Made:
-            need_extra(name, needs)
+        def call_checked(*args: Arguments.args, **keywords: Arguments.kwargs) -> Result:
+            require_extra(name, needs)
             return function(*args, **keywords)
 
-        return checked
+        return call_checked
 
-    return decorated
+    return decorate

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from world import file_locks
 from world.errors import PlanflyError
-from world.interruption import unfinished, uninterrupted
+from world.interruption import delay_signals, remove_at_end
 
 # ----------------------------------------------------------------------
 # Small text files that the user names: missions, parameters, scenarios.
@@ -80,10 +80,10 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
     return data
 
 
-def whole_path(path: Path) -> str:
+def absolute_path(path: Path) -> str:
     """Return the absolute path of a file or folder with links resolved; a link that leads to itself stays.
 
-    >>> whole_path(Path("/usr/../none/"))
+    >>> absolute_path(Path("/usr/../none/"))
     '/none'
     """
     try:
@@ -158,7 +158,7 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
 # Files that are written whole or not at all, temporary folders, and locks that keep a target to one process.
 
 
-def write_whole(path: Path, data: str | bytes) -> None:
+def write_atomically(path: Path, data: str | bytes) -> None:
     """Write a file completely or not at all, by renaming a temporary file next to it.
 
     Text is written in UTF-8.  A target that is a link stays a link: the file that it leads to is replaced.  Raises
@@ -166,7 +166,7 @@ def write_whole(path: Path, data: str | bytes) -> None:
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     write_whole(Path(folder) / "plan.json", "{}")
+    ...     write_atomically(Path(folder) / "plan.json", "{}")
     ...     print((Path(folder) / "plan.json").read_text())
     {}
     """
@@ -176,7 +176,7 @@ def write_whole(path: Path, data: str | bytes) -> None:
         # Cut by bytes, as a name may have 255 bytes and a letter may take up to four.
         name = target.name.encode()[:200].decode("utf-8", "ignore")
         temporary_path = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
-        with uninterrupted(), unfinished(temporary_path):
+        with delay_signals(), remove_at_end(temporary_path):
             with temporary_path.open("xb") as file:
                 file.write(content)
             temporary_path.replace(target)
@@ -201,7 +201,7 @@ def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[st
     """
     temporary_path = path.with_name(f".{path.name[:50]}.{os.getpid()}-{os.urandom(4).hex()}")
     try:
-        with uninterrupted(), unfinished(temporary_path):
+        with delay_signals(), remove_at_end(temporary_path):
             temporary_path.mkdir()
             for name, content in files.items():
                 (temporary_path / name).parent.mkdir(parents=True, exist_ok=True)
@@ -236,7 +236,7 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
     False
     """
     folder = Path(tempfile.gettempdir()) / f"{prefix}{os.getpid()}-{os.urandom(8).hex()}"
-    with unfinished(folder):
+    with remove_at_end(folder):
         folder.mkdir(mode=0o700)
         yield folder
 

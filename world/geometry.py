@@ -13,7 +13,7 @@ from world.arrays import Floats
 from world.kernels import compiled_inline, inlined
 
 # Lower limit of the distance in the exposure, which grows as 1/d^4, m.
-CLOSEST = 1.0
+MIN_RANGE_M = 1.0
 
 
 def turning_angles(waypoints: ArrayLike) -> Floats:
@@ -154,9 +154,9 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
 def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale: float) -> tuple[float, float]:
     """Return the fraction of the segment a-b inside a sphere, and the mean over the segment of (scale/d)^4 inside it.
 
-    Exact: with perpendicular distance h (at least `CLOSEST`) and path coordinate s from the closest point, the integral
-    of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The exposure follows the paper's eq. 9 and 10, as a
-    density along the path instead of a sum over six points.
+    Exact: with perpendicular distance h (at least `MIN_RANGE_M`) and path coordinate s from the closest point, the
+    integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The exposure follows the paper's eq. 9 and 10,
+    as a density along the path instead of a sum over six points.
     """
     _, begin_fraction, end_fraction = sphere_window(a, b, centre, radius)
     if end_fraction <= begin_fraction:
@@ -182,10 +182,10 @@ def window_exposure(
     length2: squared length.  dot: step times (start - centre).  start2: squared distance of the start.
     """
     if length2 < 1e-12:
-        return (end_fraction - begin_fraction) * scale**4 / max(start2, CLOSEST * CLOSEST) ** 2
+        return (end_fraction - begin_fraction) * scale**4 / max(start2, MIN_RANGE_M * MIN_RANGE_M) ** 2
     length = math.sqrt(length2)
     mid_fraction = -dot / length2
-    closest = math.sqrt(max(CLOSEST * CLOSEST, start2 - mid_fraction * mid_fraction * length2))
+    closest = math.sqrt(max(MIN_RANGE_M * MIN_RANGE_M, start2 - mid_fraction * mid_fraction * length2))
     begin_distance, end_distance = (begin_fraction - mid_fraction) * length, (end_fraction - mid_fraction) * length
     # Closed form of the difference, as on a short, distant segment the values at the ends agree in nearly all digits.
     part_length = end_distance - begin_distance

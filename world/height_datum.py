@@ -84,6 +84,7 @@ def height_datum(crs: str | None, stated_datum: StatedDatum | None) -> HeightDat
 
 
 def _constant_sea_level(height: float) -> Callable[[Floats, Floats], Floats]:
+    """Make a function that returns the same height of mean sea level, m, everywhere."""
     return lambda lon, _: np.full(np.shape(lon), height)
 
 

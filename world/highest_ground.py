@@ -19,10 +19,10 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, r
 
     west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
 
-    >>> from world.terrain import gridded_terrain
+    >>> from world.terrain import make_gridded_terrain
     >>> line = np.arange(-100.0, 101.0, 50.0)
     >>> heights = np.maximum(0.0, 50.0 - np.hypot(*np.meshgrid(line, line)))
-    >>> cone = gridded_terrain(heights, line, line, source="made", sha256="", datum="mean sea level")
+    >>> cone = make_gridded_terrain(heights, line, line, source="made", sha256="", datum="mean sea level")
     >>> highest_in_cells(cone, -30.0, -10.0, 20.0, 1, 3).round(6).tolist()
     [[40.0, 50.0, 40.0]]
     """
@@ -35,6 +35,7 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, r
 def _fill_cells(
     heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, max_heights: Floats
 ) -> None:
+    """Set `max_heights` to the highest ground on the sides of each cell and at the pixels inside it."""
     rows, columns = max_heights.shape
     start, end = np.zeros(3), np.zeros(3)
     for i in range(rows + 1):
@@ -60,7 +61,7 @@ def _fill_cells(
 
 @inner
 def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
-    """Raise cell (i, j) of `out` to a height if it is lower; ignore a cell outside the array, and keep NaN."""
+    """Set cell (i, j) of `max_heights` to a height above its value, or to NaN; ignore a cell outside the array."""
     if (
         0 <= i < max_heights.shape[0]
         and 0 <= j < max_heights.shape[1]

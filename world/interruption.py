@@ -1,6 +1,6 @@
 """Interruption by signals: blocks that must complete, temporary files to remove, and child processes to end.
 
-The application turns a signal into a call of `interrupt`; work that must complete is done within `uninterrupted`.
+The application turns a signal into a call of `interrupt`; work that must complete is done within `delay_signals`.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
 
 # Time between SIGTERM and SIGKILL for a child process, s.
-CHILD_PATIENCE = 0.5
+CHILD_TIMEOUT_S = 0.5
 # Warning option that the resource tracker of multiprocessing inherits: it frees the semaphores of a process that was
 # ended by force, and would report that on the user's terminal.
 _TRACKER_OPTION = "ignore:resource_tracker:UserWarning"
@@ -36,20 +36,21 @@ class Interrupted(KeyboardInterrupt):
 class _State:
     """State of interruptions in this process.
 
-    depth: number of open `uninterrupted` blocks.  waiting: signal that is delayed until their end, 0 for no signal.
-    unfinished: existing temporary files and folders of this process.
+    depth: number of open `delay_signals` blocks.
+    pending_signal: signal that is delayed until these blocks end, 0 for no signal.
+    temporary_paths: existing temporary files and folders of this process.
     """
 
     def __init__(self) -> None:
-        self.depth = self.waiting = 0
-        self.unfinished: set[Path] = set()
+        self.depth = self.pending_signal = 0
+        self.temporary_paths: set[Path] = set()
 
 
 _state = _State()
 
 
 def interrupt(number: int, _frame: FrameType | None = None) -> None:
-    """Handle a signal by raising `Interrupted`, immediately or at the end of an `uninterrupted` block.
+    """Handle a signal by raising `Interrupted`, immediately or at the end of an `delay_signals` block.
 
     >>> import signal
     >>> try:
@@ -59,17 +60,17 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
     15
     """
     if _state.depth:
-        _state.waiting = number
+        _state.pending_signal = number
         return
     raise Interrupted(number)
 
 
-class uninterrupted:
+class delay_signals:
     """Complete the block, then raise `Interrupted` for a signal that arrived in the meantime.
 
     >>> import signal
     >>> try:
-    ...     with uninterrupted():
+    ...     with delay_signals():
     ...         interrupt(signal.SIGTERM)
     ...         print("whole")
     ... except Interrupted:
@@ -85,38 +86,38 @@ class uninterrupted:
     def __exit__(self, *_: object) -> None:
         """Raise `Interrupted` for a signal that arrived in the meantime."""
         _state.depth -= 1
-        if _state.waiting and not _state.depth:
-            number, _state.waiting = _state.waiting, 0
+        if _state.pending_signal and not _state.depth:
+            number, _state.pending_signal = _state.pending_signal, 0
             raise Interrupted(number)
 
 
 @contextlib.contextmanager
-def unfinished(path: Path) -> Iterator[None]:
-    """Register a temporary file or folder for `remove_unfinished`, and remove it at the end of the block.
+def remove_at_end(path: Path) -> Iterator[None]:
+    """Register a temporary file or folder for `remove_temporary_paths`, and remove it at the end of the block.
 
     A folder that cannot be removed at the end, because another process still writes in it, stays registered.
 
-    >>> with unfinished(Path("never-made")):
+    >>> with remove_at_end(Path("never-made")):
     ...     pass
     """
-    _state.unfinished.add(path)
+    _state.temporary_paths.add(path)
     try:
         yield
     finally:
-        with uninterrupted():
+        with delay_signals():
             if _remove_path(path):
-                _state.unfinished.discard(path)
+                _state.temporary_paths.discard(path)
 
 
-def remove_unfinished() -> bool:
+def remove_temporary_paths() -> bool:
     """Remove all registered temporary files and folders, for a process that must end at once.
 
     Returns True if all are removed.
 
-    >>> remove_unfinished()
+    >>> remove_temporary_paths()
     True
     """
-    removals = [_remove_path(path) for path in tuple(_state.unfinished)]
+    removals = [_remove_path(path) for path in tuple(_state.temporary_paths)]
     return all(removals)
 
 
@@ -134,7 +135,7 @@ def _remove_path(path: Path) -> bool:
 def children_ignore_sigint() -> Iterator[None]:
     """Block SIGINT in child processes started inside, because Ctrl-C reaches all of them but their parent ends them.
 
-    This process receives at the end a SIGINT that arrives meanwhile.  Use it with `uninterrupted`: if another signal
+    This process receives at the end a SIGINT that arrives meanwhile.  Use it with `delay_signals`: if another signal
     interrupts the start, the child waits for its task and ends with a traceback.
 
     >>> from multiprocessing import Process
@@ -160,9 +161,9 @@ def children_ignore_sigint() -> Iterator[None]:
 
 
 def end_with_parent(in_service: threading.Event | None = None) -> None:
-    """Make this child process end at once on SIGTERM and with its parent, and remove its unfinished files.
+    """Make this child process end at once on SIGTERM and with its parent, and remove its temporary files.
 
-    in_service: once set, the process itself detects that its parent has ended.
+    in_service: event that is set once the process detects by itself that its parent has ended.
 
     >>> import multiprocessing
     >>> child = multiprocessing.get_context("spawn").Process(target=end_with_parent)
@@ -183,11 +184,11 @@ def end_with_parent(in_service: threading.Event | None = None) -> None:
 
 
 def _end_process(number: int, _frame: FrameType | None = None) -> None:
-    remove_unfinished()
+    remove_temporary_paths()
     os._exit(128 + number)
 
 
-def end_children(children: Sequence["BaseProcess"], patience: float = CHILD_PATIENCE) -> None:
+def end_children(children: Sequence["BaseProcess"], patience: float = CHILD_TIMEOUT_S) -> None:
     """End processes: SIGTERM to all, and after ``patience`` s SIGKILL to the remaining ones.
 
     >>> end_children([])

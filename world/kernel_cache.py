@@ -14,7 +14,7 @@ import re
 import tempfile
 from pathlib import Path
 
-from world.interruption import unfinished
+from world.interruption import remove_at_end
 
 # Packages that are searched for kernels.
 PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
@@ -67,20 +67,20 @@ def sources_digest(root: Path) -> str:
     return digest.hexdigest()[:16]
 
 
-# Numba's environment variable of the cache folder, which child processes inherit.
-VARIABLE = "NUMBA_CACHE_DIR"
+# Environment variable with numba's cache folder, which child processes inherit.
+CACHE_DIR_VARIABLE = "NUMBA_CACHE_DIR"
 
 
-# Prefix in the names of folders with the kernels of one version of the sources.
+# Prefix of the names of folders with the kernels of one version of the sources.
 _PREFIX = "kernels-"
 
 
-def wanted_folder(base: Path, root: Path) -> Path:
+def versioned_folder(base: Path, root: Path) -> Path:
     """Return the folder in `base` for the kernels of the sources below a root.
 
-    A base that already is such a folder, or a temporary one of this process, is returned unchanged.
+    Return `base` itself if it is already such a folder, or a temporary folder of this process.
 
-    >>> wanted_folder(Path("/tmp/kernels-mine"), Path(__file__).parents[1]).as_posix()
+    >>> versioned_folder(Path("/tmp/kernels-mine"), Path(__file__).parents[1]).as_posix()
     '/tmp/kernels-mine'
     """
     return base if _PREFIX in base.name else base / f"{_PREFIX}{sources_digest(root)}"
@@ -113,7 +113,7 @@ def usable_folder(preferred_folder: Path) -> Path | None:
     except OSError:
         return None
     exit_stack = contextlib.ExitStack()
-    exit_stack.enter_context(unfinished(folder))
+    exit_stack.enter_context(remove_at_end(folder))
     atexit.register(exit_stack.close)
-    os.environ[VARIABLE] = str(folder)
+    os.environ[CACHE_DIR_VARIABLE] = str(folder)
     return folder

@@ -17,9 +17,9 @@ from numba.core import event
 from world.file_locks import lock_now
 
 # Timeout of the lock, s: a save takes milliseconds, but a process may be suspended while it saves.
-PATIENCE = 10.0
+LOCK_TIMEOUT_S = 10.0
 # Name of the lock file in the cache folder.
-LOCK = "saving.lock"
+LOCK_NAME = "saving.lock"
 
 
 class CacheWriteLock:
@@ -30,7 +30,7 @@ class CacheWriteLock:
     """
 
     def __init__(self, folder: Path) -> None:
-        self._lock = folder / LOCK
+        self._lock = folder / LOCK_NAME
         self._thread_state = threading.local()
 
     def register(self) -> None:
@@ -40,22 +40,22 @@ class CacheWriteLock:
         listen("numba:compiler_lock", _BeginEndListener(lambda: self._track_depth(1), lambda: self._track_depth(-1)))
 
     def _track_depth(self, step: int) -> None:
-        """Track how often this thread has acquired the compiler, and release the lock when it releases the compiler."""
+        """Count how often this thread holds the compiler; release the file lock once the compiler is released."""
         state = self._thread_state
         state.depth = getattr(state, "depth", 0) + step
-        if step < 0 and state.depth < getattr(state, "taken_at", 0):
-            state.taken_at = 0
+        if step < 0 and state.depth < getattr(state, "lock_depth", 0):
+            state.lock_depth = 0
             os.close(state.handle)
 
     def _acquire(self) -> None:
-        """Acquire the lock; continue without it if the folder has no locks, or after `PATIENCE`."""
+        """Acquire the lock; continue without it if the folder has no locks, or after `LOCK_TIMEOUT_S`."""
         state = self._thread_state
-        if getattr(state, "taken_at", 0):
+        if getattr(state, "lock_depth", 0):
             return
         with contextlib.suppress(OSError):
             state.handle = os.open(self._lock, os.O_RDWR | os.O_CREAT, 0o600)
-            state.taken_at = getattr(state, "depth", 0)
-            deadline = time.monotonic() + PATIENCE
+            state.lock_depth = getattr(state, "depth", 0)
+            deadline = time.monotonic() + LOCK_TIMEOUT_S
             while not lock_now(state.handle) and time.monotonic() < deadline:
                 time.sleep(0.002)
 

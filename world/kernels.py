@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 from world.compile_events import announce_compilation
-from world.kernel_cache import usable_folder, wanted_folder
+from world.kernel_cache import usable_folder, versioned_folder
 from world.kernel_files import check_files
 from world.kernel_saves import CacheWriteLock
 
@@ -29,11 +29,11 @@ Records: TypeAlias = NDArray[Any]
 # Numba's settings, which have no types.  Numba reads the cache folder when a kernel is decorated.
 _settings: Any = numba.config
 # Cache folder of this version of the sources, within the folder that the user has set or the user's cache folder.
-WANTED = wanted_folder(Path(_settings.CACHE_DIR or user_cache_dir("planfly")), Path(__file__).parents[1])
-_usable = usable_folder(WANTED)
-_settings.CACHE_DIR = str(_usable or WANTED)
-# True if compiled kernels are kept for this process only.
-TEMPORARY = _usable not in (WANTED, None)
+PREFERRED_FOLDER = versioned_folder(Path(_settings.CACHE_DIR or user_cache_dir("planfly")), Path(__file__).parents[1])
+_usable_folder = usable_folder(PREFERRED_FOLDER)
+_settings.CACHE_DIR = str(_usable_folder or PREFERRED_FOLDER)
+# True if compiled kernels are kept only for this process, because `PREFERRED_FOLDER` cannot be written.
+IS_TEMPORARY = _usable_folder not in (PREFERRED_FOLDER, None)
 
 
 class _CompileListener(event.Listener):
@@ -48,12 +48,12 @@ class _CompileListener(event.Listener):
 
 
 cast("Any", event).register("numba:compile", _CompileListener())
-if _usable is not None:
-    CacheWriteLock(_usable).register()
+if _usable_folder is not None:
+    CacheWriteLock(_usable_folder).register()
 
 
 def cache_folder() -> Path:
-    """Return the folder of compiled kernels: `WANTED`, or a temporary folder if `WANTED` cannot be written.
+    """Return the folder of compiled kernels: `PREFERRED_FOLDER`, or a temporary folder if it cannot be written.
 
     >>> cache_folder().is_absolute() or bool(_settings.CACHE_DIR)
     True
@@ -111,8 +111,8 @@ def inlined(kernel: _Kernel) -> _Kernel:
 def _make_dispatcher(kernel: Any, **options: bool) -> Any:
     njit: Any = numba.njit
     # The wrapper for C is only needed to pass a kernel to another one as a value, which no kernel here does.
-    dispatcher = njit(cache=_usable is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
-    if _usable is not None:
+    dispatcher = njit(cache=_usable_folder is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
+    if _usable_folder is not None:
         check_files(dispatcher)
     return dispatcher
 
@@ -135,11 +135,11 @@ class _InnerKernel:
         return _make_dispatcher(lambda *arguments: kernel(*arguments))
 
     def __reduce__(self) -> str:
-        """Return its name, which distinguishes the wrapper functions in the cache."""
+        """Return the function's name, which distinguishes the wrapper functions in the cache."""
         return str(vars(self)["__qualname__"])
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call it from Python through the wrapper; without a wrapper the process would crash."""
+        """Call the function from Python through the wrapper; without a wrapper the process would crash."""
         return self._wrapper(*arguments)
 
 
@@ -149,7 +149,7 @@ class _InnerType(numba.types.Dispatcher):  # type: ignore[misc]  # numba states 
     def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
         """Return numba's call type without literals.
 
-        Otherwise numba compiles a function again for each literal number.
+        With literals, numba would compile the function again for each literal number.
         """
         plain_types = tuple(numba.types.unliteral(argument_type) for argument_type in args)
         return super().get_call_type(context, plain_types, {name: numba.types.unliteral(kws[name]) for name in kws})

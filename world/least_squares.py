@@ -28,6 +28,7 @@ def least_squares(basis: Floats, values: Floats) -> Floats:
 
 @compiled
 def _least_squares(basis: Floats, values: Floats) -> Floats:
+    """Return the coefficients of `least_squares` for contiguous arrays."""
     row_count, column_count = basis.shape
     # Orthogonalise the columns and the values together.
     q, r = np.empty((row_count, column_count + 1)), np.zeros((column_count, column_count + 1))

@@ -26,7 +26,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from world.errors import TerrainError
-from world.files import write_whole
+from world.files import write_atomically
 
 # Timeout for an answer, s.
 _ANSWER_TIMEOUT_S = 30.0
@@ -102,12 +102,16 @@ class RemoteFile:
                     time.sleep(_PAUSE * 2.0**attempt)
 
     def _fetch_part(self, begin: int, end: int, on_bytes: OnBytes) -> None:
+        """Fetch [begin, end) into the copy, or the whole file from a server without range requests.
+
+        Raises _IncompleteAnswer, with the received bytes kept, and errors of the connection.
+        """
         headers = {"Range": f"bytes={begin}-{end - 1}"} | ({"If-Range": self.version} if self.version else {})
         with _open_url(self.url, headers) as answer:
             if answer.status == 200:
                 # A server without range requests sends the whole file; so does a server whose file has changed.
                 if _content_length(answer) != self.size or _file_version(answer) != self.version:
-                    raise _IncompleteAnswer("it has changed since the fetch began: try again")
+                    raise _IncompleteAnswer("the file has changed since the fetch began: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
                 raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")
@@ -127,14 +131,16 @@ class RemoteFile:
                 os.fsync(file.fileno())
             if position > begin:
                 self.parts[begin, position] = digest.hexdigest()
-                write_whole(_notes_path(self.copy), json.dumps([[*chunk, text] for chunk, text in self.parts.items()]))
+                write_atomically(
+                    _notes_path(self.copy), json.dumps([[*chunk, text] for chunk, text in self.parts.items()])
+                )
             if is_slow and position < end:
                 raise _IncompleteAnswer(f"the server sends fewer than {_MIN_BYTES_PER_S:,.0f} bytes a second")
             if position < end:
-                raise _IncompleteAnswer(f"{position - begin:,} of {end - begin:,} bytes came")
+                raise _IncompleteAnswer(f"{position - begin:,} of {end - begin:,} bytes were received")
 
-    def forget(self) -> None:
-        """Replace the copy by an empty one.  Raises OSError."""
+    def clear_copy(self) -> None:
+        """Replace the copy by an empty file of the same size, without parts.  Raises OSError."""
         _notes_path(self.copy).unlink(missing_ok=True)
         self.parts = {}
         # A new file, so that another process that reads the old one can go on.
@@ -171,7 +177,7 @@ def find_remote(url: str, folder: Path) -> RemoteFile | None:
     copy.parent.mkdir(parents=True, exist_ok=True)
     remote = RemoteFile(url, size, version, copy)
     if not (copy.is_file() and copy.stat().st_size == size):
-        remote.forget()
+        remote.clear_copy()
     remote.parts = _read_notes(copy, size)
     return remote
 
@@ -293,7 +299,7 @@ def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
         return {}
     with copy.open("rb") as file:
 
-        def is_whole(part_begin: int, part_end: int, digest: str) -> bool:
+        def is_intact(part_begin: int, part_end: int, digest: str) -> bool:
             if not 0 <= part_begin < part_end <= size:
                 return False
             file.seek(part_begin)
@@ -302,5 +308,5 @@ def _read_notes(copy: Path, size: int) -> dict[tuple[int, int], str]:
         return {
             (part_begin, part_end): digest
             for (part_begin, part_end), digest in parts.items()
-            if is_whole(part_begin, part_end, digest)
+            if is_intact(part_begin, part_end, digest)
         }

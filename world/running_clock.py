@@ -3,14 +3,14 @@
 import time
 from collections.abc import Callable
 
-# Longest step between two readings, s; in a longer step the process did not run, and it is cut to this.
-LONGEST_STEP = 1.0
+# Longest step between two readings, s.  A longer step is cut to this, because the process did not run all the time.
+MAX_STEP_S = 1.0
 
 
 class RunningClock:
     """Seconds of real time that this process has run since the clock was made.
 
-    The clock must be read at least every `LONGEST_STEP` s.  Timeouts and playback continue from where they stopped.
+    The clock must be read at least every `MAX_STEP_S` s.  Timeouts and playback continue from where they stopped.
 
     >>> real = iter((100.0, 100.5, 4000.5, 4000.75))
     >>> clock = RunningClock(lambda: next(real))
@@ -25,8 +25,8 @@ class RunningClock:
         self._seconds = 0.0
 
     def __call__(self) -> float:
-        """Return the seconds."""
+        """Return the running time of this process since the clock was made, s."""
         now = self._real()
-        self._seconds += min(max(now - self._last, 0.0), LONGEST_STEP)
+        self._seconds += min(max(now - self._last, 0.0), MAX_STEP_S)
         self._last = now
         return self._seconds

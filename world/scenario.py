@@ -26,7 +26,7 @@ from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zone
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import ScenarioError, TerrainError
-from world.files import did_you_mean, whole_path
+from world.files import absolute_path, did_you_mean
 from world.frames import GeoOrigin, to_geo
 from world.map_positions import check_inside, make_threats, map_position
 from world.radio import RadioLink, make_link
@@ -49,7 +49,7 @@ from world.scenario_tables import (
     ZoneTable,
     names_folder,
 )
-from world.terrain import Peak, Terrain, flat_terrain, peaks_terrain
+from world.terrain import Peak, Terrain, make_flat_terrain, make_peaks_terrain
 from world.threats import Threats
 from world.wind import Wind
 
@@ -232,7 +232,7 @@ def from_spec(
     else:
         file_zones = FileZones()
     if terrain is not None:
-        spec, base = _with_terrain(spec, terrain, source, base), None
+        spec, base = _replace_terrain(spec, terrain, source, base), None
     raster = None
     if spec.terrain.kind == "dem" and ground is None:
         raster, terrain_table = _open_terrain(spec.terrain, source if terrain is None else "terrain", base)
@@ -272,13 +272,13 @@ def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
     """Return the table with absolute paths of the aircraft's folder and the parameter file."""
     changes = {}
     if names_folder(flight.aircraft):
-        changes["aircraft"] = whole_path(Path(base or "", flight.aircraft))
+        changes["aircraft"] = absolute_path(Path(base or "", flight.aircraft))
     if flight.params is not None:
-        changes["params"] = whole_path(Path(base or "", flight.params))
+        changes["params"] = absolute_path(Path(base or "", flight.params))
     return flight.model_copy(update=changes)
 
 
-def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
+def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
     """Replace the terrain by a file and keep the map's origin, which may be the centre of the old tile."""
     changes: dict[str, Any] = {
         "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "terrain"),
@@ -294,7 +294,7 @@ def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | No
 def _with_file_zones(
     spec: ScenarioFile, file_zones: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
-    """Add the zones of other files to a scenario's own zones, if they are near its area."""
+    """Add those zones of other files to a scenario that are near its area, and notes on the others."""
     if not file_zones.zones and not file_zones.notes:
         return spec
     zones_nearby = select_near_zones(file_zones.zones, source, origin, bounds)
@@ -326,7 +326,7 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
         raise TerrainError.from_error(error, source, "terrain.path", path_text) from error
     if table.sha256 not in (None, raster.sha256):
         raise ScenarioError.at(source, "terrain.path", path_text, "the file has changed since (its SHA-256 differs)")
-    whole_paths = [path if path in EMBEDDED else whole_path(Path(base or "", path)) for path in paths]
+    whole_paths = [path if path in EMBEDDED else absolute_path(Path(base or "", path)) for path in paths]
     stored_path = whole_paths if isinstance(table.path, list) else whole_paths[0]
     return raster, table.model_copy(update={"path": stored_path, "sha256": raster.sha256})
 
@@ -341,6 +341,7 @@ def _assemble_scenario(
     external: bool,
     replaced: bool,
 ) -> Scenario:
+    """Make a scenario from its file, map and terrain.  replaced: True if its terrain was replaced."""
     area = spec.area
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
     max_ground = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
@@ -393,18 +394,18 @@ def _assemble_scenario(
 
 def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
     if table.kind == "flat":
-        return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
+        return make_flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
     if table.kind == "peaks":
         peaks = [Peak(peak.east_m, peak.north_m, peak.height_m, peak.sigma_m) for peak in table.peak or []]
-        return peaks_terrain(bounds, peaks, GROUND_BUFFER)
+        return make_peaks_terrain(bounds, peaks, GROUND_BUFFER)
     return None
 
 
-def geographic(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
-    """Return latitude and longitude in degrees of map positions (..., 3).
+def lat_lon_of_points(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
+    """Convert map positions (..., 3), m, to latitudes and longitudes, degrees.
 
     >>> scenario = load_scenario("tight")
-    >>> lat, lon = geographic(scenario, scenario.destination)
+    >>> lat, lon = lat_lon_of_points(scenario, scenario.destination)
     >>> float(lat.round(5)), float(lon.round(5))
     (46.0, 8.03356)
     """
@@ -415,13 +416,13 @@ def geographic(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
 # Variants of a scenario: another terrain, wind, flight or planner, or more threats.
 
 
-def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
+def with_terrain(scenario: Scenario, terrain: str) -> Scenario:
     """Return a scenario over another elevation file.
 
     Start and destination keep their altitudes AMSL; threats on the ground are placed on the new ground.
     Raises TerrainError for a file that cannot be read or does not cover the area.
 
-    >>> over_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
+    >>> with_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
     'jacksboro'
     """
     spec = with_absolute_ends(scenario.to_json(), scenario.start, scenario.destination)
@@ -451,7 +452,7 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
     speed: m/s, with from_course: direction that the wind blows from, rad.  turbulence: "none", "light" or "moderate".
     Raises ScenarioError for a wind that is not allowed in a scenario file.
 
-    >>> with_wind(load_scenario("tight"), 5.0, math.radians(270.0), "light").wind.at(75.0)
+    >>> with_wind(load_scenario("tight"), 5.0, math.radians(270.0), "light").wind.velocity_at(75.0)
     (5.0, ...)
     """
     table = scenario.spec.wind
@@ -549,12 +550,12 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
     return replace(scenario, spec=spec, zones=(*scenario.zones, *zones))
 
 
-def at_time(scenario: Scenario, at: str | None) -> Scenario:
-    """Return a scenario that is flown at a time; None keeps its present time.
+def with_flight_time(scenario: Scenario, at: str | None) -> Scenario:
+    """Return a scenario with another time of flight; None keeps the present time.
 
     at: time span as `world.airspace.zone_times.parse_span` reads it.  Raises ScenarioError for an invalid time.
 
-    >>> at_time(load_scenario("tight"), "2026-05-01T10:00Z").spec.at
+    >>> with_flight_time(load_scenario("tight"), "2026-05-01T10:00Z").spec.at
     '2026-05-01T10:00Z'
     """
     if at is None:
@@ -572,14 +573,14 @@ def with_threats(
     scenario: Scenario,
     added_threats: Sequence[tuple[float, float, float, float]],
     source: str,
-    existing: Sequence[ThreatTable] = (),
+    preceding: Sequence[ThreatTable] = (),
 ) -> Scenario:
     """Return a scenario with additional threats on the ground.
 
     added_threats: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.
     The ratio of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for
     detection.
-    source: name of the threats in messages.  existing: tables to insert before the added threats.
+    source: name of the threats in messages.  preceding: tables to insert before the added threats.
     Raises ScenarioError for a threat that is not allowed in a scenario file.
 
     >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
@@ -594,9 +595,9 @@ def with_threats(
     threats = scenario.threats
     kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, KILL_SCALE_RATIO)
     detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, DETECTION_SCALE_RATIO)
-    tables = [*scenario.spec.threats, *existing]
+    tables = [*scenario.spec.threats, *preceding]
     for index, (east, north, kill, detection) in enumerate(added_threats):
-        data: dict[str, Any] = {"name": f"pop-up {len(existing) + index + 1}", "east_m": east, "north_m": north}
+        data: dict[str, Any] = {"name": f"pop-up {len(preceding) + index + 1}", "east_m": east, "north_m": north}
         if kill != 0.0:
             data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_ratio}
         if detection != 0.0:

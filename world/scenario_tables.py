@@ -160,7 +160,7 @@ class ZoneTable(ScenarioTable):
         degrees = (self.lat_deg is not None, self.lon_deg is not None)
         if self.radius_m is None:
             if any(metres) or any(degrees):
-                raise ValueError("radius_m: missing; a centre is a cylinder's")
+                raise ValueError("radius_m: missing; a zone with a centre is a cylinder and needs a radius")
         elif not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
             raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
         return self
@@ -531,7 +531,7 @@ class HomeTable(PositionTable):
 
 LaunchMethod = Literal["catapult", "hand", "runway"]
 # Largest incline of a runway, degrees above level, as for a landing strip (`world.airfield.STEEPEST_STRIP_SLOPE`).
-STEEPEST_RUNWAY = 5.0
+MAX_RUNWAY_INCLINE_DEG = 5.0
 
 
 class LaunchTable(ScenarioTable):
@@ -562,8 +562,8 @@ class LaunchTable(ScenarioTable):
             raise ValueError(
                 f"speed_mps: {self.speed_mps:g}: not allowed for a runway, where the motor accelerates the aircraft"
             )
-        if self.method == "runway" and (self.incline_deg or 0.0) > STEEPEST_RUNWAY:
-            raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{STEEPEST_RUNWAY:g} of a runway")
+        if self.method == "runway" and (self.incline_deg or 0.0) > MAX_RUNWAY_INCLINE_DEG:
+            raise ValueError(f"incline_deg: {self.incline_deg:g}: allowed 0..{MAX_RUNWAY_INCLINE_DEG:g} of a runway")
         return self
 
 
@@ -646,7 +646,7 @@ class ReturnsTable(ScenarioTable):
         if not self.require and all(value is None for value in (self.rtl_altitude_m, self.rtl_autoland, self.rally)):
             raise ValueError("require: missing; give require, rtl_altitude_m, rtl_autoland or rally")
         if self.require is not None and len(set(self.require)) < len(self.require):
-            raise ValueError(f"require: {', '.join(self.require)}: name each one once")
+            raise ValueError(f"require: {', '.join(self.require)}: name each requirement only once")
         return self
 
 

@@ -18,11 +18,11 @@ from world.kernels import compiled, inlined
 
 # Longest piece of a segment that is treated as straight in the raster's grid, m: at 60 degrees latitude a 500 m piece
 # bends by 9 mm.
-STRAIGHT_PIECE = 500.0
-# Error tolerance of the map from positions to pixels, pixels; a position on the raster's edge counts as inside.
-EDGE = 2e-3
+STRAIGHT_PIECE_M = 500.0
+# Error tolerance of the map from positions to pixels, pixels: positions so close to the raster's edge are inside.
+EDGE_TOLERANCE = 2e-3
 # Side of the tiles with a stored steepest slope, pixels.
-TILE = 16
+TILE_PIXELS = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +74,7 @@ class Terrain:
 
 
 def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
+    """Make a terrain from pickled heights, locked again, and its other fields."""
     heights.setflags(write=False)
     return Terrain(heights, *others)
 
@@ -82,10 +83,12 @@ def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
 def pixel_height(heights: Heights, col: float, row: float) -> float:
     """Return the bilinear height at fractional pixel coordinates, NaN outside the raster.
 
-    The raster extends `EDGE` beyond the outer pixel centres.
+    The raster extends `EDGE_TOLERANCE` beyond the outer pixel centres.
     """
     rows, cols = heights.shape
-    if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
+    if not (
+        -EDGE_TOLERANCE <= col <= cols - 1 + EDGE_TOLERANCE and -EDGE_TOLERANCE <= row <= rows - 1 + EDGE_TOLERANCE
+    ):
         return math.nan
     i = min(int(row), rows - 2)
     j = min(int(col), cols - 2)
@@ -100,20 +103,21 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 
 @compiled
 def steepest_slopes(heights: Heights, pitch: float) -> Heights:
-    """Return the steepest possible slope of the bilinear ground in each tile of `TILE` x `TILE` cells, m per m.
+    """Return the steepest possible slope of the bilinear ground in each tile, m per m.
 
-    pitch: distance between pixels, m.  Pixels without data (NaN) are ignored.
+    A tile has `TILE_PIXELS` x `TILE_PIXELS` cells.  Pixels without data (NaN) are ignored.
+    pitch: distance between pixels, m.
     """
     rows, cols = heights.shape
-    tiles = np.zeros(((rows - 2) // TILE + 1, (cols - 2) // TILE + 1), dtype=np.float32)
+    tiles = np.zeros(((rows - 2) // TILE_PIXELS + 1, (cols - 2) // TILE_PIXELS + 1), dtype=np.float32)
     for i in range(rows - 1):
         for j in range(cols - 1):
             step_across = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
             step_down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
             slope2 = step_across * step_across + step_down * step_down
             # False for NaN.
-            if slope2 > tiles[i // TILE, j // TILE]:
-                tiles[i // TILE, j // TILE] = slope2
+            if slope2 > tiles[i // TILE_PIXELS, j // TILE_PIXELS]:
+                tiles[i // TILE_PIXELS, j // TILE_PIXELS] = slope2
     for i in range(tiles.shape[0]):
         for j in range(tiles.shape[1]):
             # Slightly more, to cover the rounding of single precision.
@@ -144,7 +148,7 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
 
     The height is NaN if the segment leaves the raster.
     """
-    piece_count = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
+    piece_count = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE_M))
     min_clearance = math.inf
     min_fraction = 0.0
     col1, row1 = polymap(to_pixel, a[0], a[1])
@@ -231,24 +235,24 @@ def _piece_clearance(
     return min_clearance, min_fraction
 
 
-def gridded_terrain(
-    function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str
+def make_gridded_terrain(
+    heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str
 ) -> Terrain:
-    """Make terrain on a regular map grid: heights (n, e) at north (n,) and east (e,), both increasing and even."""
+    """Make terrain from heights (n, e), m, at the evenly increasing coordinates north (n,) and east (e,), m."""
     step_e, step_n = east[1] - east[0], north[1] - north[0]
     to_pixel = fit_polymap(
         lambda e, n: ((e - east[0]) / step_e, (n - north[0]) / step_n),
         [[east[0], east[-1]], [north[0], north[-1]]],
         1e-9,
     )
-    return Terrain(function_heights.astype(np.float32), to_pixel, float(min(step_e, step_n)), source, sha256, datum)
+    return Terrain(heights.astype(np.float32), to_pixel, float(min(step_e, step_n)), source, sha256, datum)
 
 
-def flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
+def make_flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
     """Make level ground over bounds [[e0, e1], [n0, n1]] and a buffer around them, m."""
     east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
     north = np.linspace(bounds[1, 0] - buffer, bounds[1, 1] + buffer, 3)
-    return gridded_terrain(
+    return make_gridded_terrain(
         np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level"
     )
 
@@ -262,9 +266,10 @@ class Peak(NamedTuple):
     sigma: float
 
 
-def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terrain:
-    """Sum Gaussian hills on level ground at sea level, over bounds [[e0, e1], [n0, n1]] and a buffer around them, m.
+def make_peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terrain:
+    """Make terrain of Gaussian hills on level ground at sea level.
 
+    bounds: [[e0, e1], [n0, n1]] m.  buffer: width of terrain around the bounds, m.
     The grid pitch is a sixteenth of the smallest sigma (at most 1,500 pixels a side), which keeps each summit within
     0.05 % of its height.
     """
@@ -282,4 +287,4 @@ def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terra
             np.exp(-((east - peak.east) ** 2) / (2 * peak.sigma**2)),
         )
     source = f"{len(peaks)} Gaussian peak{'s' * (len(peaks) != 1)}"
-    return gridded_terrain(heights, east, north, source=source, sha256="", datum="mean sea level")
+    return make_gridded_terrain(heights, east, north, source=source, sha256="", datum="mean sea level")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from world.arrays import Heights
 from world.errors import TerrainError
-from world.files import write_whole
+from world.files import write_atomically
 from world.gdal_raster import block_spans, geotiff_bytes, open_geotiff
 from world.raster import MAX_PIXELS, open_raster
 from world.raster_file import RasterFile, is_ground, shift_grid
@@ -118,7 +118,7 @@ def _write_geotiff(out: Path, heights: Heights, grid: Sequence[float], crs: str)
     if _count_empty(heights) == heights.size:
         raise TerrainError(f"{out}: the tiles have no data in the area", file=out)
     filled_heights = np.where(is_ground(heights), heights, np.float32(_NODATA))
-    write_whole(out, geotiff_bytes(filled_heights, tuple(grid), crs, _NODATA))
+    write_atomically(out, geotiff_bytes(filled_heights, tuple(grid), crs, _NODATA))
 
 
 # ----------------------------------------------------------------------
@@ -168,7 +168,10 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
         remote_files[degree] = find_remote(f"{server.rstrip('/')}/{name}/{name}.tif", cache)
     remotes = {degree: remote for degree, remote in remote_files.items() if remote is not None}
     if not remotes:
-        raise TerrainError(f"{server}: no tile of the area is there: open sea, or not such a server", file=server)
+        raise TerrainError(
+            f"{server}: the server has no tile for this area: open sea, or not a server of Copernicus GLO-30 tiles",
+            file=server,
+        )
     fetched_bytes = 0
     tiles = []
     for index, (degree, remote) in enumerate(remotes.items()):
@@ -204,7 +207,7 @@ def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]
                 tile.read(*window)
             return replace(tile, name=remote.url)
         except _UnreadableError as error:
-            remote.forget()
+            remote.clear_copy()
             if is_last:
                 message = f"{remote.url}: the server's answer is not a readable GeoTIFF"
                 raise TerrainError(message, file=remote.url) from error
@@ -281,8 +284,9 @@ def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedT
         or abs(dx * tile.shape[1] - 1.0) > _MAX_TILE_OFFSET_DEG
         or abs(-dy * tile.shape[0] - 1.0) > _MAX_TILE_OFFSET_DEG
     ):
-        allowed = f"expected the degree from {degree[0]} N {degree[1]} E on"
-        raise TerrainError(f"{tile.name}: another place: {allowed}", file=tile.name, allowed=allowed)
+        lat, lon = degree
+        allowed = f"expected latitude {lat}..{lat + 1}, longitude {lon}..{lon + 1}"
+        raise TerrainError(f"{tile.name}: covers another area: {allowed}", file=tile.name, allowed=allowed)
     turn_count = round(((box.west + box.east) / 2.0 - (west + dx * tile.shape[1] / 2.0)) / 360.0)
     return _PlacedTile(tile, west + 360.0 * turn_count, north, dx, -dy)
 

@@ -51,32 +51,32 @@ class Wind:
         """Direction that the wind blows towards, rad clockwise from north."""
         return self.from_course + math.pi
 
-    def at(self, amsl: float) -> tuple[float, float]:
+    def velocity_at(self, amsl: float) -> tuple[float, float]:
         """Return the east and north components of the mean wind at an altitude (m AMSL), m/s.
 
-        >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).at(700.0)
+        >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).velocity_at(700.0)
         (-0.0, -10.0)
         """
         speed = mean_wind_speed(self.speed, self.gradient, self.reference_amsl, amsl)
         return -speed * math.sin(self.from_course), -speed * math.cos(self.from_course)
 
-    def at_each(self, amsl: Floats) -> Floats:
+    def velocities_at(self, amsl: Floats) -> Floats:
         """Return the east and north components of the mean wind at altitudes (n,) m AMSL: (n, 2) m/s.
 
-        >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).at_each(np.array([300.0, 700.0]))
+        >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).velocities_at(np.array([300.0, 700.0]))
         array([[ -0.,  -6.],
                [ -0., -10.]])
         """
         speeds = _mean_wind_speeds(self.speed, self.gradient, self.reference_amsl, amsl)
         return np.column_stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)])
 
-    def strongest(self, amsl: Floats) -> float:
+    def max_speed_at(self, amsl: Floats) -> float:
         """Return the highest mean wind speed at these altitudes (m AMSL), m/s."""
-        return max(math.hypot(*self.at(float(altitude))) for altitude in amsl)
+        return max(math.hypot(*self.velocity_at(float(altitude))) for altitude in amsl)
 
-    def along(self, course: float, amsl: float) -> tuple[float, float]:
-        """Return tailwind and crosswind on a course (rad), m/s; crosswind from the left is positive."""
-        east, north = self.at(amsl)
+    def components_on_course(self, course: float, amsl: float) -> tuple[float, float]:
+        """Return the tailwind and crosswind on a course (rad) at an altitude (m AMSL), m/s; positive from the left."""
+        east, north = self.velocity_at(amsl)
         return (
             east * math.sin(course) + north * math.cos(course),
             east * math.cos(course) - north * math.sin(course),

@@ -25,7 +25,7 @@ from flight.dynamics.trim import (
 )
 from world.arrays import Floats
 from world.errors import FlightError
-from world.files import write_whole
+from world.files import write_atomically
 
 # Version of the file format; increase it with any change of the contents or of their computation.
 _SCHEMA_VERSION = 7
@@ -227,4 +227,4 @@ def write_tables(file: Path, key: dict[str, Any], tables: Mapping[str, Floats]) 
     text = json.dumps(key | {"tables": values}, allow_nan=False)
     with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(file, text)
+        write_atomically(file, text)

@@ -278,7 +278,7 @@ class Fdm:
         self._gear = gear
         # Roll, pitch and yaw of all evaluations, one after the other.
         self._attitudes = array("d")
-        self._exec = _new_instance(aircraft, self.dt, flat_earth, tried or aircraft.embedded, gear)
+        self._exec = _new_instance(aircraft, self.dt, flat_earth, tried or aircraft.is_embedded, gear)
         access = PropertyAccess(self._exec.get_property_manager(), aircraft.model_file)
         self.properties = access
         if flat_earth:

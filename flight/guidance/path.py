@@ -417,7 +417,7 @@ def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route:
     slopes = np.diff(altitudes) / np.diff(distances)
     next_slopes = np.concatenate([slopes, slopes[-1:]])
     slope_changes = np.concatenate([[0.0], np.diff(slopes), [0.0]])
-    speed = float(route.airspeed.max()) + limits.wind.strongest(route.waypoints[:, 2])
+    speed = float(route.airspeed.max()) + limits.wind.max_speed_at(route.waypoints[:, 2])
     half_lengths = np.abs(slope_changes) * speed**2 / (2.0 * BLEND_ACCELERATION)
     gaps = np.diff(distances)
     max_half_lengths = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))

@@ -8,7 +8,7 @@ import numpy as np
 
 from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem, on_grid
 from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneKind, is_hole, make_cylinder, make_polygon
-from world.airspace.zones_on_map import add_corners, ring_on_map
+from world.airspace.zones_on_map import add_corner_count, ring_on_map
 from world.arrays import Floats
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
@@ -321,7 +321,7 @@ def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str 
             else:
                 east, north = to_map(origin, first.lat_deg, first.lon_deg)
                 shape = make_cylinder(float(east), float(north), first.params[0])
-            corner_count = add_corners(corner_count, shape)
+            corner_count = add_corner_count(corner_count, shape)
         except ValueError as error:
             item = f"fence item {first.seq}"
             raise MissionError(f"{source}: {item}: {error}", file=source, field=item) from error

@@ -148,7 +148,7 @@ def acceptance_radii(
     """
     if tracking is not None:
         return _turn_distances(scenario, points, airspeed, tracking)
-    wind = max(math.hypot(*scenario.wind.at(float(amsl))) for amsl in points[:, 2])
+    wind = max(math.hypot(*scenario.wind.velocity_at(float(amsl))) for amsl in points[:, 2])
     turns, lateral_acceleration = turning_angles(points), GRAVITY * math.tan(max_bank)
     radii = np.full(len(points), ACCEPTANCE_TOLERANCE)
     radii[1:-1] += _fly_by_offsets(
@@ -185,7 +185,7 @@ def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[f
     courses, speeds = leg_courses(points), []
     for i in range(1, len(points) - 1):
         altitude = float(points[i, 2])
-        east, north = scenario.wind.at(altitude)
+        east, north = scenario.wind.velocity_at(altitude)
         speed = airspeed * air_density_factor(altitude)
         turn_courses = courses[i - 1] + wrap(courses[i] - courses[i - 1]) * np.linspace(0.0, 1.0, 5)
         ground_speeds = [

@@ -69,7 +69,7 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
     if landing is not None and not math.isnan(route.landing_ground):
         ends.append(("landing", float(courses[-1]), route.landing_ground))
     for name, course, altitude in ends:
-        tail_wind = scenario.wind.along(course, altitude)[0]
+        tail_wind = scenario.wind.components_on_course(course, altitude)[0]
         if tail_wind > CALM:
             yield f"{name}: {tail_wind:.1f} m/s of tailwind on {round(math.degrees(course)) % 360}°"
 
@@ -176,7 +176,7 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
     course = float(leg_courses(route.waypoints)[-1])
     wind = ""
     if not math.isnan(route.landing_ground):
-        tail_wind = scenario.wind.along(course, route.landing_ground)[0]
+        tail_wind = scenario.wind.components_on_course(course, route.landing_ground)[0]
         wind = f", with {tail_wind:.1f} m/s of tailwind" if tail_wind > CALM else wind
         wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -CALM else wind
     ground = "the terrain there is unknown"

@@ -8,7 +8,7 @@ from functools import partial
 from typing import NamedTuple
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import contacts_of
+from aircraft.contacts import find_contacts
 from flight.autopilots.parts import ControlLaw
 from flight.dynamics.compiled_model import PROOF_STEPS, CompiledModel
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm, Variation
@@ -266,7 +266,7 @@ class Flight(Airborne):
         ground_law = setup.autopilot.ground.control_law
         if self._ground_phases and ground_law is not None:
             gear = default_gear(self._ground_phases)
-            self._law = ground_law(self._ground_phases, aircraft, contacts_of(aircraft, gear))
+            self._law = ground_law(self._ground_phases, aircraft, find_contacts(aircraft, gear))
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ground_phases:
             self.max_ticks += int(GROUND_PATIENCE / self.dt)

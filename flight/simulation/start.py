@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import Gear, contacts_of
+from aircraft.contacts import Gear, find_contacts
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import Trim
 from flight.mission.ground_ways import GroundPhases, TakeOff
@@ -62,7 +62,7 @@ def find_start(
     convergence = local_map.convergence(lat, lon)
     # If the aircraft cannot hold the airspeed or the first slope, the flight starts level at the nearest airspeed that
     # the aircraft can hold; the verdict reports it.
-    east_wind, north_wind = setup.scenario.wind.at(up)
+    east_wind, north_wind = setup.scenario.wind.velocity_at(up)
     cos, sin = math.cos(convergence), math.sin(convergence)
     return Start(
         lat_deg=lat,
@@ -133,11 +133,11 @@ def find_release(
     launch = take_off.launch
     position, velocity = take_off.release()
     if launch.method == "runway":
-        stand_heights = [contact.down for contact in contacts_of(aircraft, "wheels") if contact.stands]
+        stand_heights = [contact.down for contact in find_contacts(aircraft, "wheels") if contact.stands]
         position[2] += max(stand_heights, default=0.0)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
     convergence = local_map.convergence(lat, lon)
-    east, north = setup.scenario.wind.at(float(position[2]))
+    east, north = setup.scenario.wind.velocity_at(float(position[2]))
     ground_altitude = ground.height(float(position[0]), float(position[1]))
     return Release(
         position=(lat, lon, float(position[2])),

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from aircraft.catalog import load_aircraft
 from world.arrays import Floats, Singles
 from world.errors import FlightError
-from world.extras import need_extra
-from world.files import write_whole
+from world.extras import require_extra
+from world.files import write_atomically
 from world.html_table import html_table
 from world.kernels import compiled, field_names, record_dtype
 
@@ -313,7 +313,7 @@ def track_columns(track: Track) -> dict[str, NDArray[Any]]:
 
 def track_frame(track: Track) -> Any:
     """Return the track as a `pandas.DataFrame`. Raises MissingExtraError without the extra ``tables``."""
-    need_extra("tables", "to_pandas() needs")
+    require_extra("tables", "to_pandas() needs")
     import pandas as pd
 
     return pd.DataFrame(track_columns(track))
@@ -336,18 +336,18 @@ def write_track_csv(track: Track, path: Path) -> None:
                 strict=True,
             )
         )
-    write_whole(path, text.getvalue())
+    write_atomically(path, text.getvalue())
 
 
 def write_track_parquet(track: Track, path: Path) -> None:
     """Write a track as Parquet. Raises MissingExtraError without the extra ``tables``, and OSError."""
-    need_extra("tables", "to_parquet() needs")
+    require_extra("tables", "to_parquet() needs")
     import pyarrow as pa
     from pyarrow import parquet
 
     sink = pa.BufferOutputStream()
     parquet.write_table(pa.table({name: pa.array(values) for name, values in track_columns(track).items()}), sink)
-    write_whole(path, sink.getvalue().to_pybytes())
+    write_atomically(path, sink.getvalue().to_pybytes())
 
 
 def track_html(track: Track) -> str:

@@ -1,6 +1,6 @@
 """Messages of an ArduPilot dataflash log: the start of each, and its fields as columns.
 
-A message is 0xA3, 0x95, its type, and a body whose length and fields the log itself states in messages named FMT
+A message is 0xA3, 0x95, its type, and a body whose length and fields the log itself states in messages named FMT_TYPE
 (ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message is valid if the next one, or the
 end of the file, follows immediately.  pymavlink's `DFReader` reports no damage, stopped at message 471 of 4,737 in a
 log with 400 wrong bytes, and takes 6 to 14 times as long.
@@ -24,7 +24,7 @@ from world.kernels import compiled, copy_into, read_only
 # Bytes of a log without its size in memory: mapped, and released piece by piece.
 
 # Bytes that are read before they are released.
-PIECE = 16 * 2**20
+PIECE_BYTES = 16 * 2**20
 
 
 class MappedFile:
@@ -45,34 +45,36 @@ class MappedFile:
             self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
         self.data: Bytes = np.frombuffer(self._map, np.uint8)
 
-    def let_go(self) -> None:
+    def release_memory(self) -> None:
         """Release the memory of the mapped file; it is read again when needed."""
         # Windows has no such call, and accounts for mapped pages differently.
         if hasattr(self._map, "madvise"):
             self._map.madvise(mmap.MADV_DONTNEED)
 
 
-def pieces(size: int, let_go: Callable[[], None]) -> Iterator[int]:
-    """Yield the ends of pieces of the file, the last being its size; the file is released after each.
+def piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
+    """Yield the end of each piece of a file of ``size`` bytes, and release the memory after each piece.
 
-    >>> list(pieces(3, lambda: None)), list(pieces(PIECE + 1, lambda: None)) == [PIECE, PIECE + 1]
-    ([3], True)
+    >>> list(piece_ends(3, lambda: None))
+    [3]
+    >>> list(piece_ends(PIECE_BYTES + 1, lambda: None)) == [PIECE_BYTES, PIECE_BYTES + 1]
+    True
     """
     end = 0
     while end < size:
-        end = min(size, end + PIECE)
+        end = min(size, end + PIECE_BYTES)
         yield end
-        let_go()
+        release_memory()
 
 
 # ----------------------------------------------------------------------
 # Messages: their formats, their starts, and their fields as columns.
 
-HEADER = 3
-FMT = 128
-_FMT_LENGTH = 89
-# Block-wise storage leaves old bytes in its last page: this number of bytes at the end is no damage.
-TRAILING = 528
+HEADER_BYTES = 3
+FMT_TYPE = 128
+_FMT_BYTES = 89
+# Largest number of bytes at the end of a log that are not damage: block-wise storage leaves old bytes in its last page.
+MAX_TRAILING_BYTES = 528
 # Format letters: numpy type, and the factor that stored numbers are multiplied by (ArduPilot,
 # libraries/AP_Logger/LogStructure.h, "Format characters in the format string").
 FIELDS: dict[str, tuple[str, int]] = {
@@ -101,9 +103,10 @@ FIELDS: dict[str, tuple[str, int]] = {
 
 
 class MessageFormat(NamedTuple):
-    """Content of a FMT message, the format of other messages.
+    """Content of a FMT_TYPE message, the format of other messages.
 
-    number: of the type.  length: of a message, bytes.  columns: names of the fields.  letters: their types.
+    number: number of the message type.  length: length of a message, bytes.  columns: names of the fields.
+    letters: format letters of the fields, keys of `FIELDS`.
     """
 
     number: int
@@ -114,7 +117,7 @@ class MessageFormat(NamedTuple):
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """Type of the body of a message."""
+        """Numpy type of the body of a message."""
         return np.dtype([(name, FIELDS[letter][0]) for name, letter in zip(self.columns, self.letters, strict=True)])
 
     @property
@@ -124,7 +127,7 @@ class MessageFormat(NamedTuple):
         return {name: FIELDS[letter][1] for name, letter in letters_by_name if FIELDS[letter][1] != 1}
 
 
-def _text(value: bytes) -> str:
+def _decode_text(value: bytes) -> str:
     """Decode text up to its first zero; bytes that are not UTF-8 become escapes."""
     return value.partition(b"\0")[0].decode(errors="backslashreplace")
 
@@ -133,22 +136,22 @@ def _text(value: bytes) -> str:
 class Messages:
     """All messages of one name, in the order of the file.
 
-    at: (n,) the start of each.
+    starts: (n,) byte at which each begins.
     rows: (n,) of the format's fields, as stored.
     scales: factors of the scaled fields.
     """
 
-    at: Ints
+    starts: Ints
     rows: NDArray[np.void]
     scales: dict[str, int]
 
     def __len__(self) -> int:
         """Return the number of messages."""
-        return len(self.at)
+        return len(self.starts)
 
     def has(self, *names: str) -> bool:
         """Return True if there are messages with all these fields."""
-        return len(self.at) > 0 and set(names) <= set(self.rows.dtype.names or ())
+        return len(self.starts) > 0 and set(names) <= set(self.rows.dtype.names or ())
 
     def column(self, name: str) -> Floats:
         """Return a field of numbers, in the unit of the format."""
@@ -158,21 +161,22 @@ class Messages:
 
     def texts(self, name: str) -> list[str]:
         """Return a field of text."""
-        return [_text(value) for value in self.rows[name].tolist()]
+        return [_decode_text(value) for value in self.rows[name].tolist()]
 
-    def only(self, keep: NDArray[np.bool_]) -> "Messages":
+    def select(self, is_selected: NDArray[np.bool_]) -> "Messages":
         """Return the selected messages."""
-        return Messages(self.at[keep], self.rows[keep], self.scales)
+        return Messages(self.starts[is_selected], self.rows[is_selected], self.scales)
 
 
 @dataclass(frozen=True, slots=True)
 class Dataflash:
     """Indexed log.
 
-    data: its bytes.
-    starts: for each type of message, the starts of its messages.
-    formats: by type.
-    names: of the messages that the log holds.
+    data: bytes of the log.
+    starts: start of each message, by number of the message type.
+    formats: formats by number of the message type.
+    names: names of the messages that the log contains.
+    release_memory: called regularly, to release the memory of the mapped log.
     damage: parts that could not be read.
     """
 
@@ -181,54 +185,56 @@ class Dataflash:
     formats: dict[int, MessageFormat]
     names: tuple[str, ...]
     damage: Damage
-    let_go: Callable[[], None] = lambda: None
+    release_memory: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
         """Return all messages of a name; an empty object if there are none."""
         for number, message_format in self.formats.items():
             if message_format.name == name and number in self.starts:
-                return _columns(self.data, self.starts[number], message_format, self.let_go)
+                return _read_messages(self.data, self.starts[number], message_format, self.release_memory)
         return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
 
 
-def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], None] = lambda: None) -> Dataflash:
-    """Find the messages of some names in a log (n,) of bytes.
+def index_dataflash(
+    data: Bytes, names: Collection[str], release_memory: Callable[[], None] = lambda: None
+) -> Dataflash:
+    """Index the messages with these names in the bytes (n,) of a log.
 
-    let_go: called regularly, to release memory.
+    release_memory: called regularly, to release memory.
 
     The log is read twice: for the formats, and for the messages of those names, so that the index of a large log is
     small.
     """
     only_formats = np.zeros(256, np.bool_)
-    only_formats[FMT] = True
-    first = _find_messages(data, only_formats, let_go)
+    only_formats[FMT_TYPE] = True
+    first = _find_messages(data, only_formats, release_memory)
     formats: dict[int, MessageFormat] = {}
     unreadable = 0
-    for start in first.at.tolist():
-        message_format = _format(bytes(data[start + HEADER : start + _FMT_LENGTH]))
+    for start in first.starts.tolist():
+        message_format = _parse_format(bytes(data[start + HEADER_BYTES : start + _FMT_BYTES]))
         if message_format is None:
             unreadable += 1
         else:
             formats.setdefault(message_format.number, message_format)
     is_requested = np.zeros(256, np.bool_)
     is_requested[[number for number, entry in formats.items() if entry.name in names]] = True
-    messages_found = _find_messages(data, is_requested, let_go)
+    messages_found = _find_messages(data, is_requested, release_memory)
     order = np.argsort(messages_found.kinds, kind="stable")
     numbers, firsts = np.unique(messages_found.kinds[order], return_index=True)
     # Without messages numpy returns one empty part.
     starts = {
-        int(number): message_format
-        for number, message_format in zip(numbers, np.split(messages_found.at[order], firsts[1:]), strict=False)
+        int(number): message_starts
+        for number, message_starts in zip(numbers, np.split(messages_found.starts[order], firsts[1:]), strict=False)
     }
     held_names = tuple(entry.name for number, entry in formats.items() if messages_found.counts[number])
     damage = Damage(int(messages_found.places), int(messages_found.size), bool(messages_found.cut), unreadable)
-    return Dataflash(data, starts, formats, held_names, damage, let_go)
+    return Dataflash(data, starts, formats, held_names, damage, release_memory)
 
 
 class _FoundMessages(NamedTuple):
     """Starts and types of the requested messages, the number of messages of each type, and the damage."""
 
-    at: Ints
+    starts: Ints
     kinds: Bytes
     counts: Ints
     places: int
@@ -236,37 +242,41 @@ class _FoundMessages(NamedTuple):
     cut: bool
 
 
-def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], let_go: Callable[[], None]) -> _FoundMessages:
+def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory: Callable[[], None]) -> _FoundMessages:
     state, lengths, counts = np.zeros(6, np.int64), np.zeros(256, np.int64), np.zeros(256, np.int64)
-    state[_READING], lengths[FMT] = 1, _FMT_LENGTH
+    state[_IS_READING], lengths[FMT_TYPE] = 1, _FMT_BYTES
     starts, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
-    for end in pieces(data.size, let_go):
-        piece = _walk_messages(read_only(data), end, state, lengths, counts, HEADER, FMT, TRAILING, is_requested)
+    for end in piece_ends(data.size, release_memory):
+        piece = _walk_messages(
+            read_only(data), end, state, lengths, counts, HEADER_BYTES, FMT_TYPE, MAX_TRAILING_BYTES, is_requested
+        )
         starts.append(piece[0])
         kinds.append(piece[1])
-    places, size, behind = int(state[_PLACES]), int(state[_LOST]), int(state[_BEHIND])
-    if not state[_READING] and behind and data.size - behind < TRAILING:
+    places, size, behind = int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), int(state[_LAST_END])
+    if not state[_IS_READING] and behind and data.size - behind < MAX_TRAILING_BYTES:
         # The rest of the last page is no damage.
         places -= 1
-        size -= min(size, data.size - HEADER + 1 - behind)
-    return _FoundMessages(np.concatenate(starts), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
+        size -= min(size, data.size - HEADER_BYTES + 1 - behind)
+    return _FoundMessages(np.concatenate(starts), np.concatenate(kinds), counts, places, size, bool(state[_IS_CUT]))
 
 
-def _format(body: bytes) -> MessageFormat | None:
-    """Return the format stated by a FMT message; None for an invalid one."""
-    if len(body) < _FMT_LENGTH - HEADER:
+def _parse_format(body: bytes) -> MessageFormat | None:
+    """Return the format stated by a FMT_TYPE message; None for an invalid one."""
+    if len(body) < _FMT_BYTES - HEADER_BYTES:
         return None
     number, length, *texts = struct.unpack("<BB4s16s64s", body)
-    name, letters, columns = (_text(text) for text in texts)
+    name, letters, columns = (_decode_text(text) for text in texts)
     names = tuple(columns.split(",")) if columns else ()
     is_valid = set(letters) <= FIELDS.keys() and len(names) == len(letters)
     if not is_valid or len(set(names)) < len(names) or "" in names:
         return None
     message_format = MessageFormat(number, name, length, names, letters)
-    return message_format if message_format.dtype.itemsize + HEADER == length else None
+    return message_format if message_format.dtype.itemsize + HEADER_BYTES == length else None
 
 
-def _columns(data: Bytes, starts: Ints, message_format: MessageFormat, let_go: Callable[[], None]) -> Messages:
+def _read_messages(
+    data: Bytes, starts: Ints, message_format: MessageFormat, release_memory: Callable[[], None]
+) -> Messages:
     starts = starts[starts + message_format.length <= len(data)]
     dtype = message_format.dtype
     rows = np.zeros(0, dtype)
@@ -274,25 +284,25 @@ def _columns(data: Bytes, starts: Ints, message_format: MessageFormat, let_go: C
         windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
         rows = np.empty(len(starts), dtype)
         first = 0
-        for end in pieces(data.size, let_go):
+        for end in piece_ends(data.size, release_memory):
             last = int(np.searchsorted(starts, end))
-            rows[first:last] = windows[starts[first:last] + HEADER].view(dtype)[:, 0]
+            rows[first:last] = windows[starts[first:last] + HEADER_BYTES].view(dtype)[:, 0]
             first = last
     return Messages(starts, rows, message_format.scales)
 
 
 # Indices into the state of a walk: the next byte,
-_AT = 0
+_NEXT_BYTE = 0
 # the number of places where no message begins,
-_PLACES = 1
+_DAMAGED_PLACES = 1
 # the number of bytes there,
-_LOST = 2
+_LOST_BYTES = 2
 # the end of the last message,
-_BEHIND = 3
+_LAST_END = 3
 # 1 while messages follow each other,
-_READING = 4
+_IS_READING = 4
 # and 1 if the last message is cut.
-_CUT = 5
+_IS_CUT = 5
 
 
 @compiled
@@ -310,8 +320,8 @@ def _walk_messages(
     """Return starts and types of requested messages before byte `stop`, continuing from and updating `state`."""
     starts, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     count, end = 0, data.size
-    places, size, k, behind = state[_PLACES], state[_LOST], state[_AT], state[_BEHIND]
-    reading, cut = state[_READING] == 1, state[_CUT] == 1
+    places, size, k, behind = state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_NEXT_BYTE], state[_LAST_END]
+    reading, cut = state[_IS_READING] == 1, state[_IS_CUT] == 1
     while k + header <= end and k < stop:
         length = 0
         if data[k] == 0xA3 and data[k + 1] == 0x95:
@@ -340,6 +350,6 @@ def _walk_messages(
         k = behind = after
         cut = after > end
         reading = True
-    state[_PLACES], state[_LOST], state[_AT], state[_BEHIND] = places, size, k, behind
-    state[_READING], state[_CUT] = reading, cut
+    state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_NEXT_BYTE], state[_LAST_END] = places, size, k, behind
+    state[_IS_READING], state[_IS_CUT] = reading, cut
     return starts[:count], kinds[:count]

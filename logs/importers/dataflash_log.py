@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Home, MissionItem, on_grid
-from logs.importers.clean_places import steady_clock
+from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
-from logs.importers.logged_missions import Item, gather_items, logged_mission, plane_mode
+from logs.importers.logged_missions import LoggedItem, combine_items, logged_mission, plane_mode
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.arrays import Floats
 from world.errors import LogError
@@ -55,9 +55,9 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
         # A float32 has seven digits; a mission file has six after the decimal point.
         place = (on_grid(lat), on_grid(lon), round(up, 6))
         item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *place)
-        rows.append(Item(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
+        rows.append(LoggedItem(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
     notes = () if framed else ("the log states no frames: heights are taken as above home",)
-    for logged in gather_items(rows):
+    for logged in combine_items(rows):
         readable = logged_mission(logged, source, "CMD")
         if readable is not None:
             mission = readable.mission
@@ -69,7 +69,7 @@ def logged_home(origins: Messages) -> Home | None:
     """Return the last home of the vehicle, from ORGN; None if not logged."""
     if not origins.has("Type", "Lat", "Lng", "Alt"):
         return None
-    homes = origins.only(origins.column("Type") == _HOME)
+    homes = origins.select(origins.column("Type") == _HOME)
     if not len(homes):
         return None
     lat, lon, up = (float(homes.column(name)[-1]) for name in ("Lat", "Lng", "Alt"))
@@ -113,7 +113,7 @@ _WEEK_S = 604_800.0
 def read_dataflash(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one without positions."""
     file = MappedFile(path)
-    index = index_dataflash(file.data, _READ, file.let_go)
+    index = index_dataflash(file.data, _READ, file.release_memory)
     return _Reader(index, str(path)).read()
 
 
@@ -175,7 +175,7 @@ class _Reader:
                 # Earlier releases have a mode number or a counter under these names, which are no instances.
                 if name in _WITH_INSTANCES and messages.has(column) and messages.rows.dtype[column].kind in "ui":
                     number = messages.rows[column]
-                    messages = messages.only(number == number.min())
+                    messages = messages.select(number == number.min())
             self._cache[name] = messages
         return self._cache[name]
 
@@ -186,13 +186,13 @@ class _Reader:
             messages = self._messages(name)
             if messages.has("TimeUS") or messages.has("TimeMS"):
                 times.append(_raw_time(messages))
-                starts.append(messages.at)
+                starts.append(messages.starts)
         if not times:
             return np.zeros(0, np.int64), np.zeros(0), ()
         order = np.argsort(np.concatenate(starts), kind="stable")
         places, raw = np.concatenate(starts)[order], np.concatenate(times)[order]
         is_finite = np.isfinite(raw)
-        steady = steady_clock(raw[is_finite])
+        steady = remove_clock_jumps(raw[is_finite])
         return places[is_finite], steady.time - raw[is_finite], steady.jumps
 
     def _time(self, messages: Messages) -> Floats:
@@ -200,7 +200,7 @@ class _Reader:
         raw = _raw_time(messages)
         if not jumps:
             return raw
-        return np.asarray(raw + moved[np.clip(np.searchsorted(places, messages.at), 0, len(moved) - 1)])
+        return np.asarray(raw + moved[np.clip(np.searchsorted(places, messages.starts), 0, len(moved) - 1)])
 
     def _table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
         columns = tuple(columns)

@@ -13,7 +13,7 @@ import numpy as np
 from flight.mission.items import Mission
 from flight.simulation.setup import Gap, HeightOffset, Heights, MissionStretch, Quantity, RowFaults
 from flight.simulation.track import THROTTLE, Track
-from logs.importers.clean_places import DEGREE, Places, clean_places, find_gaps, metres_between
+from logs.importers.clean_positions import DEGREE_LENGTH_M, CleanPositions, clean_positions, find_gaps, metres_between
 from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from world.arrays import Floats
 from world.errors import LogError
@@ -23,15 +23,15 @@ from world.frames import GeoOrigin, to_map
 # Flights of a log, and the parts of them that were flown along a mission.
 
 # Median ground speed above which the aircraft flies, m/s.
-FLYING = 6.0
+MIN_FLYING_SPEED_MPS = 6.0
 # Longest time for which an aircraft in flight may be slower, in a headwind, s.
 MAX_SLOW_TIME_S = 60.0
 # Window of the median ground speed, s.
 _MEDIAN_WINDOW_S = 5.0
-# The log cuts off a flight that begins or ends within this time of its first or last row, s.
-IN_THE_AIR = _MEDIAN_WINDOW_S
+# A flight that begins or ends within this time of the log's first or last row is cut off by the log, s.
+CUT_FLIGHT_TIME_S = _MEDIAN_WINDOW_S
 # Least duration of a flight, s.
-SHORTEST = 20.0
+MIN_FLIGHT_TIME_S = 20.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +54,12 @@ class FlightPart:
         return sum(stretch.end - stretch.start for stretch in self.stretches)
 
 
-def flown_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
-    """Return starts and ends of flights, s: stretches with a ground speed above `FLYING`.
+def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
+    """Return starts and ends of flights, s: stretches with a ground speed above `MIN_FLYING_SPEED_MPS`.
 
     >>> time = np.arange(0.0, 200.0)
     >>> north = np.cumsum(np.where((time > 50.0) & (time < 150.0), 20.0, 0.1))
-    >>> [(start, end)] = flown_spans(time, 46.0 + north / 111195.0, np.full(200, 8.0))
+    >>> [(start, end)] = find_flight_spans(time, 46.0 + north / 111195.0, np.full(200, 8.0))
     >>> 45.0 < start < 55.0, 145.0 < end < 155.0
     (True, True)
     """
@@ -67,14 +67,14 @@ def flown_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, flo
         return []
     speed = metres_between(lat, lon) / np.maximum(np.diff(time), 1e-3)
     width = max(1, int(_MEDIAN_WINDOW_S / max(1e-3, float(np.median(np.diff(time))))))
-    fast = _running_median(speed, width) > FLYING
+    fast = _running_median(speed, width) > MIN_FLYING_SPEED_MPS
     spans: list[list[float]] = []
     for k in np.flatnonzero(fast).tolist():
         if spans and time[k] - spans[-1][1] <= MAX_SLOW_TIME_S:
             spans[-1][1] = float(time[k + 1])
         else:
             spans.append([float(time[k]), float(time[k + 1])])
-    return [(start, end) for start, end in spans if end - start >= SHORTEST]
+    return [(start, end) for start, end in spans if end - start >= MIN_FLIGHT_TIME_S]
 
 
 def _running_median(values: Floats, width: int) -> Floats:
@@ -85,7 +85,7 @@ def _running_median(values: Floats, width: int) -> Floats:
     return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
 
 
-def flight_parts(
+def find_flight_parts(
     spans: Sequence[tuple[float, float]],
     modes: Sequence[ModeChange],
     missions: Sequence[LoggedMission],
@@ -93,12 +93,12 @@ def flight_parts(
 ) -> list[FlightPart]:
     """Return one part for each flight and each mission that the flight followed.
 
-    spans: from `flown_spans`.  last: time of the last row of the log, s.  Without modes, the whole flight is taken as
-    flown along the mission.
+    spans: start and end of each flight, from `find_flight_spans`.  last: time of the last row of the log, s.
+    Without modes, the whole flight is taken as flown along the mission.
     """
     parts = []
     for start, end in spans:
-        stretches = _stretches(start, end, modes, last)
+        stretches = _find_stretches(start, end, modes, last)
         by_mission: dict[int, list[MissionStretch]] = {}
         for stretch in stretches:
             by_mission.setdefault(_mission_at(stretch, missions), []).append(stretch)
@@ -108,9 +108,10 @@ def flight_parts(
     return parts
 
 
-def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
+def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
+    """Return the stretches of a flight in a mode that follows the mission, or the whole flight without modes."""
     # The log cuts off a flight that continues to its last rows.
-    open_end = last - end < IN_THE_AIR
+    open_end = last - end < CUT_FLIGHT_TIME_S
     if not modes:
         return [MissionStretch(start, end, "", "log" if open_end else "landed")]
     stretches = []
@@ -137,19 +138,19 @@ def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> i
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the flight that followed its mission for longest, or of the longest flight."""
+    """Return the index of the part that followed its mission for longest; of equal ones, the longest part."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
 # Time shown before and after a flight, s.
-BESIDE = 10.0
+SHOWN_MARGIN_S = 10.0
 # Longest interval between rows over which values are interpolated, s.
 _MAX_INTERPOLATED_STEP_S = 1.0
 # The same limit as a multiple of the usual interval of the series.
 _MAX_INTERPOLATED_STEPS = 2.5
 # Duration at the start of a flight over which altitudes are compared, s.
 _COMPARED_TIME_S = 5.0
-# Vehicles that are refused, with their words for the message.
+# Vehicles whose logs are refused, with their possessive in the message.
 _REFUSED: dict[VehicleKind, str] = {
     "copter": "a copter's",
     "rover": "a rover's",
@@ -171,13 +172,14 @@ class LoggedFlight:
     raw: the log.
     time: (n,) s of the log's clock.  lat, lon: (n,) degrees.  up: (n,) m.
     columns: (n, k) by the names of `logs.importers.raw_log.COLUMNS`, NaN where the log has no row nearby.
-    holds: names of the columns that the log holds.
+    holds: names of the quantities that the log contains.
     stretches: parts flown along the mission.
     mission: the mission of the flight; None if the log holds none.
     heights, gaps, faults: see `flight.simulation.setup.ImportedLog`.
     number, count: number of this flight in the log, from 1, and number of flights.
-    others: start of each other flight, and how long it followed a mission, s.
-    begins, ends: True if the first row of the log, or the last, is in the air: the log lacks the rest of the flight.
+    others: for each other flight, its start and the time for which it followed a mission, s.
+    begins_in_flight, ends_in_flight: True if the first or the last row of the log is in the air: the log lacks the rest
+        of the flight.
     """
 
     raw: RawLog
@@ -195,9 +197,9 @@ class LoggedFlight:
     number: int
     count: int
     others: tuple[tuple[float, float], ...] = ()
-    begins: bool = False
-    ends: bool = False
-    clock: Places | None = field(default=None, repr=False)
+    begins_in_flight: bool = False
+    ends_in_flight: bool = False
+    clock: CleanPositions | None = field(default=None, repr=False)
 
 
 def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
@@ -218,41 +220,49 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
         )
     series = raw.series["position"]
     if len(series.time) > _MAX_ROWS:
-        raise LogError(f"{raw.source}: {len(series.time):,} places: at most {_MAX_ROWS:,} are read", file=raw.source)
-    places = clean_places(series, raw.clock_jumps)
-    spans = flown_spans(places.time, places.lat, places.lon)
+        raise LogError(f"{raw.source}: {len(series.time):,} positions: at most {_MAX_ROWS:,} are read", file=raw.source)
+    positions = clean_positions(series, raw.clock_jumps)
+    spans = find_flight_spans(positions.time, positions.lat, positions.lon)
     if not spans:
-        raise LogError(f"{raw.source}: contains no flight: {_reason_without_flight(places)}", file=raw.source)
-    last = float(places.time[-1])
+        raise LogError(f"{raw.source}: contains no flight: {_reason_without_flight(positions)}", file=raw.source)
+    last = float(positions.time[-1])
     modes = [
-        type(mode)(float(places.on_clock(np.array([mode.time]))[0]), mode.name, mode.automatic) for mode in raw.modes
+        type(mode)(float(positions.to_steady_clock(np.array([mode.time]))[0]), mode.name, mode.automatic)
+        for mode in raw.modes
     ]
-    parts = flight_parts(spans, modes, raw.missions, last)
+    parts = find_flight_parts(spans, modes, raw.missions, last)
     chosen = choose_part(parts)
     if number is not None:
         if not 1 <= number <= len(parts):
             raise LogError.of_argument("flight", number, f"it holds flights 1..{len(parts)}", file=raw.source)
         chosen = number - 1
     others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != chosen)
-    return _cut_out(raw, places, parts[chosen], chosen + 1, len(parts), others)
+    return _extract_flight(raw, positions, parts[chosen], chosen + 1, len(parts), others)
 
 
-def _reason_without_flight(places: Places) -> str:
-    if places.time.size < 2:
-        unusable_count = places.faults.unusable
-        return f"{places.time.size} usable places" + (
-            f", {unusable_count:,} without a place or a time" if unusable_count else ""
+def _reason_without_flight(positions: CleanPositions) -> str:
+    if positions.time.size < 2:
+        unusable_count = positions.faults.unusable
+        return f"{positions.time.size} usable positions" + (
+            f", {unusable_count:,} without a position or a time" if unusable_count else ""
         )
-    return f"in {places.time[-1] - places.time[0]:.0f} s it never went faster than a person for long"
+    return f"in {positions.time[-1] - positions.time[0]:.0f} s it never went faster than a person for long"
 
 
-def _cut_out(
-    raw: RawLog, places: Places, part: FlightPart, number: int, count: int, others: tuple[tuple[float, float], ...]
+def _extract_flight(
+    raw: RawLog,
+    positions: CleanPositions,
+    part: FlightPart,
+    number: int,
+    count: int,
+    others: tuple[tuple[float, float], ...],
 ) -> LoggedFlight:
-    keep = (places.time >= part.start - BESIDE) & (places.time <= part.end + BESIDE)
-    time = places.time[keep]
-    columns = {name: _interpolate_at(raw.series.get(name), name, time, places) for name in COLUMNS if name != "height"}
-    up = places.up[keep]
+    keep = (positions.time >= part.start - SHOWN_MARGIN_S) & (positions.time <= part.end + SHOWN_MARGIN_S)
+    time = positions.time[keep]
+    columns = {
+        name: _interpolate_at(raw.series.get(name), name, time, positions) for name in COLUMNS if name != "height"
+    }
+    up = positions.up[keep]
     holds: list[Quantity] = [name for name in _OPTIONAL_QUANTITIES if np.isfinite(columns[name]).any()]
     if np.isfinite(up).all():
         holds.append("heights")
@@ -260,26 +270,26 @@ def _cut_out(
     return LoggedFlight(
         raw=raw,
         time=time,
-        lat=places.lat[keep],
-        lon=places.lon[keep],
+        lat=positions.lat[keep],
+        lon=positions.lon[keep],
         up=up,
         columns=columns,
         holds=tuple(holds),
         stretches=part.stretches,
         mission=raw.missions[part.mission] if part.mission >= 0 else None,
-        heights=_heights(raw, places, start),
+        heights=_heights(raw, positions, start),
         gaps=find_gaps(time),
-        faults=places.faults,
+        faults=positions.faults,
         number=number,
         count=count,
         others=others,
-        begins=part.start - float(places.time[0]) < IN_THE_AIR,
-        ends=float(places.time[-1]) - part.end < IN_THE_AIR,
-        clock=places,
+        begins_in_flight=part.start - float(positions.time[0]) < CUT_FLIGHT_TIME_S,
+        ends_in_flight=float(positions.time[-1]) - part.end < CUT_FLIGHT_TIME_S,
+        clock=positions,
     )
 
 
-def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: Places) -> Floats:
+def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions: CleanPositions) -> Floats:
     """Interpolate a series at the times of the positions (n,); NaN without rows nearby."""
     width = len(COLUMNS[name])
     out = np.full((time.size, width), math.nan)
@@ -288,7 +298,7 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: P
     is_valid = (
         np.isfinite(series.time) & np.isfinite(series.values).all(axis=1) & (np.abs(series.values) < 1e7).all(axis=1)
     )
-    series_time = places.on_clock(series.time[is_valid])
+    series_time = positions.to_steady_clock(series.time[is_valid])
     order = np.argsort(series_time, kind="stable")
     series_time, values = series_time[order], series.values[is_valid][order]
     fresh = np.concatenate([[True], np.diff(series_time) > 0.0]) if series_time.size else np.zeros(0, bool)
@@ -314,14 +324,14 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, places: P
     return out
 
 
-def _heights(raw: RawLog, places: Places, start: float) -> Heights:
+def _heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
     """Return the chosen altitude source, and offsets of the others in the first seconds of the flight."""
     offsets = []
     for other in raw.heights:
-        time = places.on_clock(other.series.time)
+        time = positions.to_steady_clock(other.series.time)
         first = (time >= start) & (time <= start + _COMPARED_TIME_S) & np.isfinite(other.series.values[:, 0])
-        if first.any() and np.isfinite(places.up).any():
-            own = np.interp(time[first], places.time, places.up)
+        if first.any() and np.isfinite(positions.up).any():
+            own = np.interp(time[first], positions.time, positions.up)
             offsets.append(HeightOffset(other.name, float(np.median(other.series.values[first, 0] - own))))
     source = raw.series["position"].source
     return Heights(source, raw.datum, tuple(offsets))
@@ -347,7 +357,7 @@ def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -
     for item in mission.items:
         if item.has_position and heights.size:
             east = ((lon - item.lon_deg + 180.0) % 360.0 - 180.0) * np.cos(np.radians(item.lat_deg))
-            distances = np.hypot((lat - item.lat_deg) * DEGREE, east * DEGREE)
+            distances = np.hypot((lat - item.lat_deg) * DEGREE_LENGTH_M, east * DEGREE_LENGTH_M)
             items.append(replace(item, alt=round(float(heights[int(np.argmin(distances))]), 2)))
         else:
             items.append(item)
@@ -398,7 +408,7 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 # Rows of an imported flight as a track; quantities that are not logged are NaN.
 
 
-def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:
+def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
     """Return a track on the map about ``origin``.
 
     Velocities missing in the log are computed from positions.  A log without altitudes gets altitude 0, which no rule
@@ -406,7 +416,7 @@ def track_of_flight(flight: LoggedFlight, origin: GeoOrigin) -> Track:
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight
-    >>> track = track_of_flight(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
+    >>> track = make_track(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
     >>> track.position[-1].round(1).tolist(), float(track.airspeed[0]), float(track.current[0])
     ([1045.0, 1000.0, 500.0], 25.0, nan)
     """

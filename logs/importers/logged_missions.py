@@ -12,17 +12,17 @@ from logs.importers.raw_log import LoggedMission
 # Missions from logged items: logged one by one, as whole missions repeatedly, and as items that are flown.
 
 
-class Item(NamedTuple):
+class LoggedItem(NamedTuple):
     """Item as logged.
 
     time: s.  total: number of items of its mission; 0 if not logged.
-    begins: true if the log shows that a new mission begins with it.
+    begins_mission: True if the log shows that a new mission begins with this item.
     """
 
     time: float
     total: int
     item: MissionItem
-    begins: bool = False
+    begins_mission: bool = False
 
 
 class LoggedItems(NamedTuple):
@@ -36,15 +36,16 @@ class LoggedItems(NamedTuple):
     items: tuple[MissionItem, ...]
 
 
-def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
+def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItems]:
     """Combine items, in the order of the log, into missions.
 
-    Items from number 0 on begin a new mission, even if later ones are lost.  A single item is a flown item if it is
-    unchanged, and otherwise an edited one.  A mission that is logged twice, each time in part, is one mission.
+    An item 0 begins a new mission, even if later items are lost.  A single item that repeats an item of the mission is
+    the item being flown; one that differs is an edit, which begins a changed mission.  A mission that is logged twice,
+    each time in part, is one mission.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
-    >>> logged = [Item(1.0, 3, way[0]), Item(1.0, 3, way[1]), Item(1.0, 3, way[2]), Item(9.0, 3, way[1])]
-    >>> [(start, total, len(items)) for start, total, items in gather_items(logged)]
+    >>> logged = [*(LoggedItem(1.0, 3, item) for item in way), LoggedItem(9.0, 3, way[1])]
+    >>> [(start, total, len(items)) for start, total, items in combine_items(logged)]
     [(1.0, 3, 3)]
     """
     missions: list[tuple[float, dict[int, MissionItem]]] = []
@@ -77,7 +78,7 @@ def gather_items(rows: Iterable[Item]) -> list[LoggedItems]:
 
 
 def _begins_mission(following: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
-    """Return True if the item after an item 0 shows a new mission: item 1, or an unknown or changed one."""
+    """Return True if the item after an item 0 shows a new mission: it is item 1, or unknown, or changed."""
     if following is None or following.seq == 0:
         return False
     return following.seq == 1 or following.seq not in items or not _is_same_item(items[following.seq], following)
@@ -142,7 +143,7 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
 def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
     """Renumber the items of PX4, which counts from 0, from 1.
 
-    After a vertical take-off PX4 flies to its place (docs.px4.io, "Mission Mode (VTOL)"), as after any other.
+    A vertical take-off becomes a take-off: PX4 flies to the position of either (docs.px4.io, "Mission Mode (VTOL)").
 
     >>> [(item.seq, item.command) for item in px4_items([MissionItem(0, 84, 0, (0.0,) * 4, 46.0, 8.0, 75.0)])]
     [(1, 22)]
@@ -155,8 +156,8 @@ def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
 def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:
     """Return a mission numbered from 1 if it is whole, or with its longest run of items without a gap.
 
-    total: announced number of items, 0 if not known.  end: number of its last item, as far as known.
-    None for a whole mission of fewer than two items; an incomplete mission may be left without any item.
+    total: announced number of items, 0 if not known.  end: largest known number of an item.
+    Return None for a complete mission of fewer than two items; an incomplete mission may be left without any item.
     """
     numbers = {item.seq for item in logged.mission.items}
     missing = tuple(sorted(set(range(1, end + 1)) - numbers))

@@ -36,7 +36,7 @@ class Samples:
 class MotionLog:
     """Motion in a log, in SI units and radians; data that are not logged have no rows.
 
-    source: the file.  sha256: of its bytes.  program: name of the program.  vehicle: kind of vehicle.
+    source: the file.  sha256: SHA-256 of its bytes.  program: name of the program.  vehicle: kind of vehicle.
     inertial: (n, 6) specific force forward, right, down, and p, q, r, of the first inertial sensor.
     outputs: (n, 14) servo outputs, microseconds, the first in column 0.
     attitude: (n, 3) roll, pitch, yaw.  velocity: (n, 3) north, east, down.  wind: (n, 2) north, east, as the air moves.
@@ -76,18 +76,18 @@ class MotionLog:
     hovering: tuple[tuple[float, float], ...] = ()
 
     @property
-    def moved(self) -> Samples:
-        """Commands to the surfaces, which are the controls if logged, otherwise the pulses."""
+    def surface_commands(self) -> Samples:
+        """Commands to the surfaces: the controls if they are logged, or else the servo outputs."""
         return self.controls if len(self.controls.time) else self.outputs
 
 
-def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
+def first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
     """Return the first position at which a vehicle stood still; None for a log that begins in flight.
 
     position: (n, 3) latitude, longitude (degrees) and height (m).  velocity: (n, 3) m/s.
 
     >>> place = Samples(np.array([1.0, 2.0]), np.array([[48.0, 11.0, 520.0], [48.0, 11.001, 540.0]]))
-    >>> first_on_ground(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
+    >>> first_ground_position(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
     (48.0, 11.0, 520.0)
     """
     if not len(position.time) or not len(velocity.time):
@@ -102,8 +102,8 @@ def first_on_ground(position: Samples, velocity: Samples) -> tuple[float, float,
     return lat, lon, height
 
 
-def rising(time: Floats, values: Floats) -> Samples:
-    """Sort rows by time, without repeated times and rows that are no numbers."""
+def sort_samples(time: Floats, values: Floats) -> Samples:
+    """Sort rows by time; leave out repeated times and rows with values that are not finite."""
     is_finite = np.isfinite(time) & np.isfinite(values).all(axis=1)
     time, values = time[is_finite], values[is_finite]
     order = np.argsort(time, kind="stable")

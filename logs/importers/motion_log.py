@@ -10,9 +10,9 @@ import numpy as np
 from logs.importers.columns.file_names import DATA_SUFFIXES, is_table
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
 from logs.importers.dataflash_log import logged_home, program_and_vehicle
-from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_on_ground, rising
+from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_ground_position, sort_samples
 from world.errors import LogError
-from world.extras import need_extra
+from world.extras import require_extra
 
 _DEGREE = math.pi / 180.0
 _NAMES = (
@@ -43,7 +43,7 @@ def read_motion(path: Path) -> MotionLog:
         if not path.is_file():
             raise LogError(f"{path}: no such file; expected a log (.BIN, .tlog, .ulg or a table of columns)", file=path)
         if is_table(path) or path.suffix.lower() in DATA_SUFFIXES:
-            need_extra("data-logs", f"{path}: reading {path.suffix.lower()} needs")
+            require_extra("data-logs", f"{path}: reading {path.suffix.lower()} needs")
             from logs.importers.columns.column_motion import read_column_motion
 
             return read_column_motion(path)
@@ -54,12 +54,12 @@ def read_motion(path: Path) -> MotionLog:
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if head == b"ULog\x01\x12\x35":
-        need_extra("px4-logs", f"{path}: reading .ulg needs")
+        require_extra("px4-logs", f"{path}: reading .ulg needs")
         from logs.importers.px4_motion import read_px4_motion
 
         return read_px4_motion(path, digest)
     if path.suffix.lower() == ".tlog":
-        need_extra("live", f"{path}: reading .tlog needs")
+        require_extra("live", f"{path}: reading .tlog needs")
         from logs.importers.telemetry_motion import read_telemetry_motion
 
         return read_telemetry_motion(path, digest)
@@ -70,7 +70,7 @@ def read_motion(path: Path) -> MotionLog:
         )
     mapped = MappedFile(path)
     with np.errstate(all="ignore"):
-        return _Dataflash(index_dataflash(mapped.data, _NAMES, mapped.let_go), str(path), digest).read()
+        return _Dataflash(index_dataflash(mapped.data, _NAMES, mapped.release_memory), str(path), digest).read()
 
 
 class _Dataflash:
@@ -110,7 +110,7 @@ class _Dataflash:
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):
                 number = messages.rows[column]
-                messages = messages.only(number == number.min()) if number.dtype.kind in "ui" else messages
+                messages = messages.select(number == number.min()) if number.dtype.kind in "ui" else messages
         return messages
 
     def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
@@ -124,7 +124,7 @@ class _Dataflash:
             for k, column in enumerate(columns):
                 if column in held_columns:
                     values[:, k] = messages.column(column)
-            return rising(messages.column("TimeUS") * 1e-6, values * scale)
+            return sort_samples(messages.column("TimeUS") * 1e-6, values * scale)
         return Samples(np.zeros(0), np.zeros((0, 1)))
 
     def _airspeed(self) -> Samples:
@@ -132,7 +132,7 @@ class _Dataflash:
         if not messages.has("TimeUS", "Airspeed"):
             return Samples(np.zeros(0), np.zeros((0, 1)))
         used = messages.column("U") > 0 if messages.has("U") else np.ones(len(messages), np.bool_)
-        return rising(messages.column("TimeUS")[used] * 1e-6, messages.column("Airspeed")[used, np.newaxis])
+        return sort_samples(messages.column("TimeUS")[used] * 1e-6, messages.column("Airspeed")[used, np.newaxis])
 
     def _modes(self) -> list[tuple[float, int]]:
         messages = self._messages("MODE")
@@ -154,4 +154,4 @@ class _Dataflash:
         home = logged_home(self._index.messages("ORGN"))
         if home is not None:
             return home.lat_deg, home.lon_deg, home.alt
-        return first_on_ground(self._first((("POS", ("Lat", "Lng", "Alt")),)), velocity)
+        return first_ground_position(self._first((("POS", ("Lat", "Lng", "Alt")),)), velocity)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from logs.importers.columns.file_names import DATA_SUFFIXES, TABLE_SUFFIX, is_table
 from world.address_space import AddressSpaceError
 from world.errors import LogError
-from world.extras import need_extra
+from world.extras import require_extra
 
 if TYPE_CHECKING:
     from logs.importers.raw_log import RawLog
@@ -72,7 +72,7 @@ def is_imported_log(path: Path) -> bool:
 
 
 def _suffix(path: Path) -> str:
-    """Return the suffix of a file in lower case; that of a table of columns has two parts."""
+    """Return the suffix of a file in lower case, or `TABLE_SUFFIX` for a table of columns."""
     return TABLE_SUFFIX if is_table(path) else path.suffix.lower()
 
 
@@ -97,7 +97,7 @@ def open_log(path: Path) -> "RawLog":
             raise LogError(f"{path}: empty; expected a log", file=path)
         log_type = log_format(path, head)
         if log_type.extra:
-            need_extra(log_type.extra, f"{path}: reading {_suffix(path)} needs")
+            require_extra(log_type.extra, f"{path}: reading {_suffix(path)} needs")
         module, function = log_type.reader.rsplit(".", 1)
         read: Reader = getattr(import_module(f"logs.importers.{module}"), function)
         # Invalid numbers of a damaged log are left out later, and reported.
@@ -112,7 +112,7 @@ def open_log(path: Path) -> "RawLog":
 
 
 def log_format(path: Path, head: bytes) -> LogFormat:
-    """Return the format that fits a file's first bytes and suffix, else its first bytes only, else its suffix only.
+    """Return the format that fits a file's first bytes and suffix, or else the first bytes, or else the suffix.
 
     Raises LogError if neither is known, and for a dataflash log that was converted to text.
 

@@ -1,4 +1,4 @@
-"""Number of fields in the message formats of a PX4 log, counted before pyulog makes them.
+"""Count the fields in the message formats of a PX4 log, before pyulog makes them.
 
 A format may contain others, and arrays of them (PX4, "ULog File Format", Message Format): forty that contain the next
 one twice are a kilobyte and 2^40 fields.  pyulog makes every field of a topic when the log declares the topic.
@@ -32,30 +32,31 @@ class MessageFormats:
         self._counts: dict[str, int] = {}
         self._total = 0
 
-    def state(self, text: str) -> None:
+    def add_format(self, text: str) -> None:
         """Add a format: its name, a colon, and its fields.
 
         >>> formats = MessageFormats("a.ulg")
-        >>> formats.state("wind:uint64_t timestamp;float[3] wind;")
-        >>> formats.fields("wind")
+        >>> formats.add_format("wind:uint64_t timestamp;float[3] wind;")
+        >>> formats.count_fields("wind")
         4
         """
         name, _, fields = text.partition(":")
         self._formats[name] = list(_types(fields))
         self._counts.clear()
 
-    def hold(self, name: str) -> None:
+    def add_topic(self, name: str) -> None:
         """Add a topic of this format.  Raises LogError for more fields than a log may have."""
-        self._total += self.fields(name)
+        self._total += self.count_fields(name)
         if self._total > MAX_FIELDS:
             reason = f"the formats of its messages have more than {MAX_FIELDS:,} fields"
             raise LogError(f"{self._source}: not a readable PX4 log: {reason}", file=self._source)
 
-    def fields(self, name: str) -> int:
+    def count_fields(self, name: str) -> int:
         """Return the number of fields of a format, including nested ones; more than `MAX_FIELDS` if recursive."""
         return self._count(name, frozenset())
 
     def _count(self, name: str, within: frozenset[str]) -> int:
+        """Return the number of fields of a format that is nested in the formats ``within``."""
         if name in _PLAIN or name not in self._formats:
             return 1
         if name in within:

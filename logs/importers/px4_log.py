@@ -17,7 +17,7 @@ from pyulog import ULog
 
 from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid
 from flight.simulation.setup import Damage
-from logs.importers.dataflash_frames import MappedFile, pieces
+from logs.importers.dataflash_frames import MappedFile, piece_ends
 from logs.importers.logged_missions import px4_items, px4_state, without_gaps
 from logs.importers.px4_formats import MessageFormats
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
@@ -72,7 +72,7 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     try:
         # pyulog reports errors on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
-            log = ULog(_Steps(file, str(path)), names, disable_str_exceptions=True)
+            log = ULog(_CountingFile(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
         raise
     except MemoryError:
@@ -82,8 +82,8 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
     return Topics(log, str(path), _damage_of(path))
 
 
-class _Steps:
-    """File in which a step back after a short read at the end equals the data read, and which counts formats.
+class _CountingFile:
+    """File for pyulog that counts formats, and steps back after a short read only by the bytes that were read.
 
     pyulog steps back by the claimed length of a record, and would read the end of a damaged file again and again; it
     reads a record's three bytes of length and letter, and then its content.
@@ -97,10 +97,10 @@ class _Steps:
         data = self._file.read(size)
         self._missing = size - len(data)
         if self._letter == b"F":
-            self._formats.state(data.decode("utf-8", "replace"))
+            self._formats.add_format(data.decode("utf-8", "replace"))
         elif self._letter == b"A":
             # After the topic's instance and number.
-            self._formats.hold(data[3:].decode("utf-8", "replace"))
+            self._formats.add_topic(data[3:].decode("utf-8", "replace"))
         self._letter = data[2:] if size == 3 and not self._letter else b""
         return data
 
@@ -116,49 +116,55 @@ class _Steps:
         self._file.close()
 
 
-def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damage:
+def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) -> Damage:
     """Find the damage of a log (n,) of bytes, whose records follow each other, with length and known letter.
 
     >>> find_damage(np.zeros(20, np.uint8)).places
     1
     """
     state = np.zeros(5, np.int64)
-    state[_AT], state[_READING] = _HEADER, 1
-    for end in pieces(data.size, let_go):
+    state[_NEXT_BYTE], state[_IS_READING] = _HEADER, 1
+    for end in piece_ends(data.size, release_memory):
         _walk_records(read_only(data), end, state, np.frombuffer(_LETTERS, np.uint8))
-    cut = bool(state[_CUT]) or int(state[_AT]) < data.size
-    return Damage(int(state[_PLACES]), int(state[_LOST]), cut)
+    cut = bool(state[_IS_CUT]) or int(state[_NEXT_BYTE]) < data.size
+    return Damage(int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), cut)
 
 
 def _damage_of(path: Path) -> Damage:
     file = MappedFile(path)
-    return find_damage(file.data, file.let_go)
+    return find_damage(file.data, file.release_memory)
 
 
 # Indices into the state of a walk: the next byte,
-_AT = 0
+_NEXT_BYTE = 0
 # the number of places where no record begins,
-_PLACES = 1
+_DAMAGED_PLACES = 1
 # the number of bytes there,
-_LOST = 2
+_LOST_BYTES = 2
 # 1 while records follow each other,
-_READING = 3
+_IS_READING = 3
 # and 1 if the last record is cut.
-_CUT = 4
+_IS_CUT = 4
 
 
 @compiled
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
-    """Continue a walk from its state up to a byte."""
+    """Walk over records up to byte ``stop``, continuing from and updating ``state``."""
     is_known_letter = np.zeros(256, np.bool_)
     for letter in letters:
         is_known_letter[letter] = True
-    k, places, size, reading, cut = state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT]
+    k, places, size, reading, cut = (
+        state[_NEXT_BYTE],
+        state[_DAMAGED_PLACES],
+        state[_LOST_BYTES],
+        state[_IS_READING],
+        state[_IS_CUT],
+    )
     while k + 3 <= data.size and k < stop and not cut:
         length = data[k] + 256 * data[k + 1]
         after = k + 3 + length
         if is_known_letter[data[k + 2]] and after > data.size:
-            # Only what a cut record would be: nothing else can follow it.
+            # A cut record: nothing can follow it.
             cut = 1
             break
         follows = after + 3 > data.size or is_known_letter[data[after + 2]]
@@ -170,7 +176,13 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
             reading = 0
             size += 1
             k += 1
-    state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT] = k, places, size, reading, cut
+    state[_NEXT_BYTE], state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_IS_READING], state[_IS_CUT] = (
+        k,
+        places,
+        size,
+        reading,
+        cut,
+    )
 
 
 def _one_line(error: Exception) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.importers.motion import MotionLog, Samples, first_on_ground, rising
+from logs.importers.motion import MotionLog, Samples, first_ground_position, sort_samples
 from logs.importers.px4_log import WIND_TOPICS, Topics, open_topics
 from world.arrays import Flags, Floats
 from world.errors import LogError
@@ -33,7 +33,7 @@ _TOPICS = [
     "flaps_setpoint",
     "spoilers_setpoint",
 ]
-NONE = Samples(np.zeros(0), np.zeros((0, 1)))
+NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
 # CA_AIRFRAME of a fixed wing.
 _WING = 1
 # CA_AIRFRAME of a fixed wing with additional lifting motors, which are its first rotors.
@@ -92,25 +92,25 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
         controls, elevons = _controls(topics, parameters)
         airspeed, ratio = _airspeed(topics)
         home, battery = topics.home(), topics.battery()
-        height = NONE if not len(place.time) else Samples(place.time, place.values[:, 2:])
+        height = NO_SAMPLES if not len(place.time) else Samples(place.time, place.values[:, 2:])
         return MotionLog(
             source=str(path),
             sha256=digest,
             program=topics.program(),
             vehicle=topics.vehicle(),
             inertial=_inertial(topics),
-            outputs=NONE,
-            attitude=NONE if attitude is None else rising(attitude.time, attitude.values),
+            outputs=NO_SAMPLES,
+            attitude=NO_SAMPLES if attitude is None else sort_samples(attitude.time, attitude.values),
             velocity=velocity,
             wind=_wind(topics),
             airspeed=airspeed,
             ratio=ratio,
             height=height,
-            battery=NONE if battery is None else rising(battery.time, battery.values),
+            battery=NO_SAMPLES if battery is None else sort_samples(battery.time, battery.values),
             parameters={
                 name: parameters[own] * factor for own, (name, factor) in _PARAMETERS.items() if own in parameters
             },
-            home=first_on_ground(place, velocity) if home is None else (home.lat_deg, home.lon_deg, home.alt),
+            home=first_ground_position(place, velocity) if home is None else (home.lat_deg, home.lon_deg, home.alt),
             program_kind="px4",
             controls=controls,
             elevons=elevons,
@@ -119,11 +119,13 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
+    """Return the first choice of fields that a topic has, sorted by time; no rows if it has none."""
     table = topics.table(topic, *choices)
-    return NONE if table is None else rising(table.time, table.values)
+    return NO_SAMPLES if table is None else sort_samples(table.time, table.values)
 
 
 def _inertial(topics: Topics) -> Samples:
+    """Return specific force and angular rates, (n, 6), from the sensors or from two filtered topics."""
     force, rates = tuple(f"accelerometer_m_s2[{k}]" for k in range(3)), tuple(f"gyro_rad[{k}]" for k in range(3))
     samples = _samples(topics, "sensor_combined", force + rates)
     if len(samples.time):
@@ -131,11 +133,11 @@ def _inertial(topics: Topics) -> Samples:
     three = tuple(f"xyz[{k}]" for k in range(3))
     forces, turning = (_samples(topics, name, three) for name in ("vehicle_acceleration", "vehicle_angular_velocity"))
     if len(forces.time) < 2 or len(turning.time) < 2:
-        return NONE
+        return NO_SAMPLES
     inside = (forces.time >= turning.time[0]) & (forces.time <= turning.time[-1])
     time = forces.time[inside]
-    also = [np.interp(time, turning.time, column) for column in turning.values.T]
-    return Samples(time, np.column_stack([forces.values[inside], *also]))
+    rate_columns = [np.interp(time, turning.time, column) for column in turning.values.T]
+    return Samples(time, np.column_stack([forces.values[inside], *rate_columns]))
 
 
 def _wind(topics: Topics) -> Samples:
@@ -144,7 +146,7 @@ def _wind(topics: Topics) -> Samples:
         wind = _samples(topics, topic, ("windspeed_north", "windspeed_east"))
         if len(wind.time):
             return wind
-    return NONE
+    return NO_SAMPLES
 
 
 def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
@@ -154,7 +156,7 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
     choices = [(speed, true) for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
     validated = topics.table("airspeed_validated", *choices)
     if validated is None:
-        return NONE, NONE
+        return NO_SAMPLES, NO_SAMPLES
     # From 1 on sensors; 0 and below, and 4 (synthetic), are no measurements.
     for name in ("airspeed_source", "selected_airspeed_index"):
         chosen = topics.table("airspeed_validated", *((*columns, name) for columns in choices))
@@ -167,7 +169,7 @@ def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
     time, values = validated.time[measured], validated.values[measured]
     moving = values[:, 0] > 1.0
     ratio = values[moving, 1:] / values[moving, :1]
-    return rising(time, values[:, :1]), rising(time[moving], ratio)
+    return sort_samples(time, values[:, :1]), sort_samples(time[moving], ratio)
 
 
 def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
@@ -187,8 +189,8 @@ def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
 def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
     """Return pitch, roll and yaw as fractions of travel, and throttle, (n, 4), and True if there are elevons.
 
-    A surface's positive is up, or right; its torque scales (CA_SV_CSn_TRQ_*) give the axes that it moves, and an axis
-    is the mean of its surfaces weighted by them.  Raises LogError for surfaces that cannot be modelled.
+    A surface is positive up or to the right.  Its torque scales (CA_SV_CSn_TRQ_*) give the axes that it moves; an axis
+    is the mean of its surfaces, weighted by these scales.  Raises LogError for surfaces that cannot be modelled.
     """
     servos, motors = _actuators(topics, "actuator_servos", _SERVOS), _actuators(topics, "actuator_motors", _MOTORS)
     # An unused servo has NaN.
@@ -197,7 +199,7 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
     if len(servos.time) < 2 or len(motors.time) < 2:
         # Roll, pitch, yaw and throttle before the mixer.
         old = _samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
-        return (Samples(old.time, old.values[:, [1, 0, 2, 3]]) if len(old.time) else NONE), False
+        return (Samples(old.time, old.values[:, [1, 0, 2, 3]]) if len(old.time) else NO_SAMPLES), False
     airframe = int(parameters.get("CA_AIRFRAME", _WING))
     if airframe not in (_WING, _STANDARD_VTOL):
         raise _refusal(topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}: expected a plane")
@@ -262,7 +264,7 @@ def _actuators(topics: Topics, topic: str, size: int) -> Samples:
     table = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
     if table is None:
         return Samples(np.zeros(0), np.zeros((0, size)))
-    steps = rising(table.time, np.arange(len(table.time), dtype=np.float64)[:, np.newaxis])
+    steps = sort_samples(table.time, np.arange(len(table.time), dtype=np.float64)[:, np.newaxis])
     return Samples(steps.time, table.values[steps.values[:, 0].astype(np.intp)])
 
 

@@ -32,7 +32,7 @@ COLUMNS = {
 class LogSeries:
     """Rows of one kind in the order of the file.
 
-    source: the message they are of, for people: "POS", "vehicle_global_position".
+    source: name of the logged message, for people: "POS", "vehicle_global_position".
     time: (n,) s on the log's clock, as written.
     values: (n, k), a column for each name of `COLUMNS`: degrees for latitude and longitude, rad for attitude, m, m/s,
     A and Wh for the rest.
@@ -47,7 +47,7 @@ class LogSeries:
 class HeightSource:
     """One of several altitudes in a log.
 
-    datum: of the altitudes.  series: one column, m.
+    datum: vertical datum of the altitudes.  series: one column, m.
     """
 
     name: str
@@ -57,7 +57,7 @@ class HeightSource:
 
 @dataclass(frozen=True, slots=True)
 class ModeChange:
-    """Start of a flight mode, s; automatic: true if the vehicle followed its mission."""
+    """Start of a flight mode.  time: s.  automatic: True if the vehicle follows its mission in this mode."""
 
     time: float
     name: str
@@ -69,7 +69,7 @@ class LoggedMission:
     """Mission as the vehicle had it from a time (s) on.
 
     origin: messages that hold it, for people: "CMD", "MISSION_ITEM_INT", "declared task".
-    with_heights: true if its items state altitudes.
+    with_heights: True if its items state altitudes.
     missing: items that the log does not hold; None for a complete mission.  The mission is then the longest run of
     items without a gap, and may have fewer than two.
     """
@@ -85,12 +85,12 @@ class LoggedMission:
 class RawLog:
     """Log as given by its reader; nothing is sorted or cleaned yet.
 
-    format: for people: "ArduPilot dataflash log".
+    format: name of the format, for people: "ArduPilot dataflash log".
     program: name of the program in the log, "" if not logged.
     vehicle: kind of vehicle.
     series: by the names of `COLUMNS` except "height"; a missing name is not in the log.
     heights: altitudes other than the altitude of the position, for comparison.
-    datum: of the altitude of the position.
+    datum: vertical datum of the position's altitude.
     modes: in order of the file; empty if not logged.
     missions: in order of the file.
     parameters: by name, the last value of each.
@@ -124,31 +124,31 @@ class RawLog:
 # Synthetic log of a short flight, for examples and tests: along two legs at a right angle, in AUTO.
 
 # Airspeed of the example, m/s.
-SPEED = 25.0
+EXAMPLE_SPEED_MPS = 25.0
 # Length of a leg, m.
-LEG = 1000.0
+EXAMPLE_LEG_M = 1000.0
 # Altitude, m AMSL.
-UP = 500.0
+EXAMPLE_ALTITUDE_M = 500.0
 # Time between rows, s.
-STEP = 0.2
+EXAMPLE_STEP_S = 0.2
 # Time until the first waypoint is passed, s.
-BEFORE = 10.0
+EXAMPLE_LEAD_S = 10.0
 # Time after the last waypoint, s.
-AFTER = 2.0
+EXAMPLE_TAIL_S = 2.0
 
 
-def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = UP) -> RawLog:
+def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALTITUDE_M) -> RawLog:
     """Make a log of a flight 1 km north and 1 km east of a place (degrees, m AMSL), with a sharp corner.
 
     >>> log = example_raw_log()
     >>> log.program, log.modes[0].name, len(log.missions[0].mission.items)
     ('ArduPlane V4.5.0', 'AUTO', 3)
     """
-    time = np.arange(0.0, BEFORE + 2.0 * LEG / SPEED + AFTER, STEP)
-    run = SPEED * (time - BEFORE)
-    north, east = np.minimum(run, LEG), np.maximum(run - LEG, 0.0)
+    time = np.arange(0.0, EXAMPLE_LEAD_S + 2.0 * EXAMPLE_LEG_M / EXAMPLE_SPEED_MPS + EXAMPLE_TAIL_S, EXAMPLE_STEP_S)
+    run = EXAMPLE_SPEED_MPS * (time - EXAMPLE_LEAD_S)
+    north, east = np.minimum(run, EXAMPLE_LEG_M), np.maximum(run - EXAMPLE_LEG_M, 0.0)
     lats, lons = to_geo(GeoOrigin(lat, lon), east, north)
-    on_first = run < LEG
+    on_first = run < EXAMPLE_LEG_M
     course = np.where(on_first, 0.0, 0.5 * math.pi)
     level = np.zeros(time.size)
     boot = time + 20.0
@@ -156,7 +156,10 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = UP) -> RawL
     def series(name: str, *columns: np.ndarray) -> LogSeries:
         return LogSeries(name, boot, np.column_stack(columns))
 
-    ends = [to_geo(GeoOrigin(lat, lon), *place) for place in ((0.0, 0.0), (0.0, LEG), (LEG, LEG))]
+    ends = [
+        to_geo(GeoOrigin(lat, lon), *place)
+        for place in ((0.0, 0.0), (0.0, EXAMPLE_LEG_M), (EXAMPLE_LEG_M, EXAMPLE_LEG_M))
+    ]
     items = tuple(
         MissionItem(
             number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(float(y)), on_grid(float(x)), up
@@ -172,9 +175,9 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = UP) -> RawL
         vehicle="plane",
         series={
             "position": series("POS", lats, lons, height),
-            "velocity": series("XKF1", SPEED * np.sin(course), SPEED * np.cos(course), level),
+            "velocity": series("XKF1", EXAMPLE_SPEED_MPS * np.sin(course), EXAMPLE_SPEED_MPS * np.cos(course), level),
             "attitude": series("ATT", level, level + 0.05, course),
-            "airspeed": series("ARSP", level + SPEED),
+            "airspeed": series("ARSP", level + EXAMPLE_SPEED_MPS),
             "wind": series("XKF2", level, level - 3.0),
             "throttle": series("CTUN", level + 0.6),
         },

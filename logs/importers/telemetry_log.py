@@ -18,12 +18,12 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Home, Mission, MissionItem, on_grid
 from flight.simulation.setup import Damage
-from logs.importers.clean_places import steady_clock
-from logs.importers.dataflash_frames import PIECE, MappedFile
+from logs.importers.clean_positions import remove_clock_jumps
+from logs.importers.dataflash_frames import PIECE_BYTES, MappedFile
 from logs.importers.logged_missions import (
-    Item,
+    LoggedItem,
     LoggedItems,
-    gather_items,
+    combine_items,
     logged_mission,
     plane_mode,
     px4_items,
@@ -64,12 +64,12 @@ class TelemetryReader:
     """Decoder of the wanted messages of a log, with a count of the unreadable ones.
 
     wanted: message numbers.
-    let_go: called regularly, to release the memory of what was read.
+    release_memory: called regularly, to release the memory of the bytes that were read.
     """
 
     data: memoryview
     wanted: frozenset[int]
-    let_go: Callable[[], None] = lambda: None
+    release_memory: Callable[[], None] = lambda: None
     places: int = 0
     size: int = 0
     cut: bool = False
@@ -78,11 +78,11 @@ class TelemetryReader:
 
     def messages(self) -> Iterator[tuple[float, Any]]:
         """Yield time of reception (s since 1970) and message, in the order of the file."""
-        position, end, reading, piece = 0, len(self.data), True, PIECE
+        position, end, reading, piece = 0, len(self.data), True, PIECE_BYTES
         while position + _STAMP.size + _V1_FRAME <= end:
             if position >= piece:
-                self.let_go()
-                piece = position + PIECE
+                self.release_memory()
+                piece = position + PIECE_BYTES
             length = self._length(position)
             if length == 0:
                 self.places += reading
@@ -214,7 +214,7 @@ class SystemMessages:
             offset = float(stamps[0]) if stamps.size else math.nan
             return BootClock(offset, (), stamps - offset)
         offset = float(stamps[known_rows[0]] - time[known_rows[0]])
-        steady = steady_clock(time[known_rows])
+        steady = remove_clock_jumps(time[known_rows])
         time[known_rows] = steady.time
         before = known_rows[np.clip(np.searchsorted(known_rows, np.arange(time.size), side="right") - 1, 0, None)]
         unknown = ~np.isfinite(time)
@@ -274,7 +274,7 @@ def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
     Raises LogError for a log without a vehicle.
     """
     file = MappedFile(path)
-    reader = TelemetryReader(memoryview(file.data), _NUMBERS, file.let_go)  # type: ignore[arg-type]  # a buffer
+    reader = TelemetryReader(memoryview(file.data), _NUMBERS, file.release_memory)  # type: ignore[arg-type]  # a buffer
     systems: dict[int, SystemMessages] = {}
     items: list[tuple[float, Any]] = []
     for stamp, message in reader.messages():
@@ -419,7 +419,7 @@ class VehicleMessages:
 
     def _missions(self) -> Iterable[LoggedMission]:
         """Yield missions from items as uploaded, or as downloaded by a station."""
-        rows: list[Item] = []
+        rows: list[LoggedItem] = []
         total, begins_mission = 0, False
         for time, message in self._items:
             kind = message.get_type()
@@ -428,9 +428,9 @@ class VehicleMessages:
             if kind == "MISSION_COUNT":
                 total, begins_mission = message.count, True
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
-                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission))
+                rows.append(LoggedItem(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission))
                 begins_mission = False
-        for logged in gather_items(rows):
+        for logged in combine_items(rows):
             readable = (_px4_mission if self.is_px4 else logged_mission)(logged, self._source, "mission items")
             if readable is not None:
                 yield replace(readable, mission=self._with_home(readable.mission))

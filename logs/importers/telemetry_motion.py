@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_on_ground, rising
+from logs.importers.motion import OUTPUTS, MotionLog, Samples, first_ground_position, sort_samples
 from logs.importers.raw_log import LogSeries
 from logs.importers.telemetry_log import VehicleMessages, vehicle_messages
-from logs.importers.wind_triangle import wind_of_triangle
+from logs.importers.wind_triangle import estimate_wind
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -17,7 +17,7 @@ _STANDARD_GRAVITY_MPS2 = 9.80665
 _WRAP_S = 2.0**32 * 1e-6
 # Largest difference between a message's own time and the time that its neighbours give it, s.
 _MAX_CLOCK_DIFFERENCE_S = 2.0
-NONE = Samples(np.zeros(0), np.zeros((0, 1)))
+NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
 
 
 def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
@@ -36,7 +36,7 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
     true_airspeed = raw.series.get("airspeed")
     wind = _reordered(raw.series.get("wind"), [1, 0])
     if not len(wind.time):
-        wind = wind_of_triangle(velocity, attitude, _reordered(true_airspeed, [0]))
+        wind = estimate_wind(velocity, attitude, _reordered(true_airspeed, [0]))
     battery = messages.table("SYS_STATUS", ("voltage_battery", "current_battery"))
     return MotionLog(
         source=str(path),
@@ -48,21 +48,21 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
         attitude=attitude,
         velocity=velocity,
         wind=wind,
-        airspeed=NONE if true_airspeed is None else _reordered(messages.table("VFR_HUD", ("airspeed",)), [0]),
-        ratio=NONE,
+        airspeed=NO_SAMPLES if true_airspeed is None else _reordered(messages.table("VFR_HUD", ("airspeed",)), [0]),
+        ratio=NO_SAMPLES,
         height=_reordered(position, [2]),
-        battery=_reordered(battery, [0, 1], [1e-3, 0.01]) if "battery" in raw.series else NONE,
+        battery=_reordered(battery, [0, 1], [1e-3, 0.01]) if "battery" in raw.series else NO_SAMPLES,
         modes=tuple(messages.mode_numbers()),
         parameters=raw.parameters,
-        home=first_on_ground(_reordered(position, [0, 1, 2]), velocity),
+        home=first_ground_position(_reordered(position, [0, 1, 2]), velocity),
         program_kind="telemetry",
     )
 
 
 def _reordered(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
     if series is None:
-        return NONE
-    return rising(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
+        return NO_SAMPLES
+    return sort_samples(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
 
 
 def _own_times(time: Floats, microseconds: Floats) -> Floats:
@@ -82,9 +82,9 @@ def _own_times(time: Floats, microseconds: Floats) -> Floats:
 def _inertial(messages: VehicleMessages) -> Samples:
     table = messages.table("RAW_IMU", ("time_usec", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"))
     if table is None:
-        return NONE
+        return NO_SAMPLES
     units = np.repeat([_STANDARD_GRAVITY_MPS2 * 1e-3, 1e-3], 3)
-    return rising(_own_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
+    return sort_samples(_own_times(table.time, table.values[:, 0]), table.values[:, 1:] * units)
 
 
 def _outputs(messages: VehicleMessages) -> Samples:
@@ -93,4 +93,4 @@ def _outputs(messages: VehicleMessages) -> Samples:
     if table is None:
         return Samples(np.zeros(0), np.zeros((0, OUTPUTS)))
     first = table.values[:, 1] == 0.0
-    return rising(_own_times(table.time[first], table.values[first, 0]), table.values[first, 2:])
+    return sort_samples(_own_times(table.time[first], table.values[first, 0]), table.values[first, 2:])

@@ -45,7 +45,7 @@ def track_text(path: Path, *, xml: bool) -> str:
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read of a track", file=path)
-    text = _bytes_of(path).decode("utf-8-sig", errors="replace")
+    text = _read_bytes(path).decode("utf-8-sig", errors="replace")
     if xml and _DOCUMENT_TYPE.search(text):
         raise LogError(
             f"{path}: a document type is declared, which a track must not have; entities are not expanded", file=path
@@ -53,7 +53,7 @@ def track_text(path: Path, *, xml: bool) -> str:
     return text
 
 
-def _bytes_of(path: Path) -> bytes:
+def _read_bytes(path: Path) -> bytes:
     if not zipfile.is_zipfile(path):
         return path.read_bytes()
     try:
@@ -70,7 +70,7 @@ def _bytes_of(path: Path) -> bytes:
         why = " ".join(str(error).split())[:120]
         raise LogError(f"{path}: an unreadable zipped file: {why}", file=path) from error
     if len(data) > MAX_BYTES:
-        message = f"{path}: more than {MAX_BYTES:,} bytes unpacked: at most as many are read of a track"
+        message = f"{path}: more than {MAX_BYTES:,} bytes unpacked: at most this many are read of a track"
         raise LogError(message, file=path)
     return data
 
@@ -144,7 +144,6 @@ def _routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
     return missions
 
 
-# ----------------------------------------------------------------------
 # ----------------------------------------------------------------------
 # IGC flight recorder files: B records are fixes, C records the declared task.
 # The record layouts are specified in the FAI's "Technical Specification for GNSS Flight Recorders", appendix A: `B`
@@ -293,8 +292,8 @@ def read_kml(path: Path) -> RawLog:
                 rows.append(row)
     if len(rows) < 2:
         lines = sum(_name(element) == "LineString" for element in root.iter())
-        why = f"; its {lines} lines have no times" if lines else ""
-        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track); expected at least 2{why}", file=path)
+        reason = f"; its {lines} lines have no times" if lines else ""
+        raise LogError(f"{path}: {len(rows)} positions with a time (gx:Track); expected at least 2{reason}", file=path)
     table = np.array(rows)
     start = _earliest(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
@@ -318,9 +317,10 @@ def _name(element: ElementTree.Element) -> str:
 
 
 def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Return times and places that belong together, and the number of unpaired ones.
+    """Return pairs of time and position, and the number of unpaired elements.
 
-    All times stand before all places, or each before its own.  Raises LogError if they cannot be paired.
+    Either all times come before all positions, or each time comes before its position.  Raises LogError if
+    they cannot be paired.
     """
     marks = [(_name(child), child.text or "") for child in track if _name(child) in ("when", "coord")]
     whens = [text for name, text in marks if name == "when"]
@@ -329,8 +329,8 @@ def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]
     if all(name == "when" for name, _ in marks[: last_when + 1]):
         if len(whens) != len(coords):
             raise LogError(
-                f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): expected"
-                " as many of both",
+                f"{path}: a track of {len(whens)} times (when) and {len(coords)} positions (gx:coord): expected"
+                " equal numbers",
                 file=path,
             )
         return list(zip(whens, coords, strict=True)), 0

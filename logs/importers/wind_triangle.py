@@ -15,7 +15,7 @@ _MIN_AIRSPEED_MPS = 5.0
 _MIN_FRACTION = 0.5
 
 
-def wind_of_triangle(velocity: Samples, attitude: Samples, airspeed: Samples) -> Samples:
+def estimate_wind(velocity: Samples, attitude: Samples, airspeed: Samples) -> Samples:
     """Return the wind, north and east, in the direction of the air's motion: ground velocity less air velocity.
 
     The nose is assumed to point into the air flow, so a sideslip or an error of the heading of 3 degrees at 17 m/s is
@@ -26,7 +26,7 @@ def wind_of_triangle(velocity: Samples, attitude: Samples, airspeed: Samples) ->
     >>> time, yaw = np.arange(0.0, 120.0, 0.1), 0.1 * np.arange(0.0, 120.0, 0.1)
     >>> ground = np.column_stack([17.0 * np.cos(yaw) + 3.0, 17.0 * np.sin(yaw) - 2.0, 0.0 * yaw])
     >>> angles, speed = np.column_stack([0.0 * yaw, 0.0 * yaw, yaw]), np.full((1200, 1), 17.0)
-    >>> wind = wind_of_triangle(*(Samples(time, values) for values in (ground, angles, speed)))
+    >>> wind = estimate_wind(*(Samples(time, values) for values in (ground, angles, speed)))
     >>> wind.values[0].round(3).tolist()
     [3.0, -2.0]
     """
@@ -35,7 +35,7 @@ def wind_of_triangle(velocity: Samples, attitude: Samples, airspeed: Samples) ->
     time = velocity.time
     yaw = np.interp(time, attitude.time, np.unwrap(attitude.values[:, 2]))
     speed = np.interp(time, airspeed.time, airspeed.values[:, 0], left=0.0, right=0.0)
-    # The horizontal part of the airspeed: the vertical part is that of the ground velocity, as the air is level.
+    # The horizontal part of the airspeed: the vertical part equals the ground velocity's, as air moves horizontally.
     level = np.sqrt(np.maximum(0.0, np.square(speed) - np.square(velocity.values[:, 2])))
     flying = speed > _MIN_AIRSPEED_MPS
     rows = velocity.values[:, :2] - level[:, np.newaxis] * np.column_stack([np.cos(yaw), np.sin(yaw)])

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.catalog import find_again
+from aircraft.catalog import find_logged_aircraft
 from aircraft.tracking import CORRIDOR_RADII
 from flight.autopilots.autopilot import Autopilot
 from flight.simulation.setup import FlightSetup
@@ -71,7 +71,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
     mass = None
     # The aircraft of a log may not be on this machine.
     with suppress(FlightError):
-        mass = find_again(aircraft, flight_table.aircraft).mass
+        mass = find_logged_aircraft(aircraft, flight_table.aircraft).mass
     return Conditions(
         aircraft=aircraft,
         mass_kg=mass,

@@ -19,7 +19,7 @@ from logs.verdict.junit import junit_text
 from logs.verdict.notebook import verdict_html
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.presentation import Presentation, findings_by_rule
-from world.extras import need_extra
+from world.extras import require_extra
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -142,7 +142,7 @@ class Verdict:
         tolerance, margin, unit, limit_source, method, ok (None where it was not judged) and reason.
         Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
-        need_extra("tables", "to_pandas() needs")
+        require_extra("tables", "to_pandas() needs")
         # Imported here: pandas is an extra.
         import pandas as pd
 

@@ -27,7 +27,7 @@ from PIL import Image
 from logs import theme
 from logs.views.charts import Chart, Label, Layer, LegendEntry, Panel, legend_entries, nice_step
 from logs.views.labels import DPI, LabelPlacer
-from world.files import write_whole
+from world.files import write_atomically
 
 # Width of every picture, inches; 1500 pixels.
 WIDTH = 10.0
@@ -202,7 +202,7 @@ def write_png(figure: Figure, path: FilePath) -> None:
     ...     (FilePath(folder) / "empty.png").read_bytes()[1:4]
     b'PNG'
     """
-    write_whole(path, png_bytes(figure))
+    write_atomically(path, png_bytes(figure))
 
 
 def draw_chart(chart: Chart) -> Figure:

@@ -19,7 +19,7 @@ from planfly.runtime.stages import stage
 from planfly.workflow.airframe import check_level_flight
 from planfly.workflow.output_paths import check_output_folder, expand_path_pattern, prepare_folder
 from world.errors import PlanflyError
-from world.files import whole_path, write_whole
+from world.files import absolute_path, write_atomically
 from world.scenario_tables import names_folder
 
 
@@ -186,7 +186,7 @@ def describe_aircraft(
         pictures = _draw_pictures(aircraft_entry, envelope, trims, modes, steps)
         prepare_folder(folder, tuple(pictures))
         for file, data in pictures.items():
-            write_whole(folder / file, data)
+            write_atomically(folder / file, data)
         files = tuple(folder / file for file in pictures)
     return AircraftNumbers(aircraft_entry, model_sha256, envelope, trims, modes, cruise, steps, missing_files, files)
 
@@ -199,7 +199,7 @@ def _load_aircraft(name: str | Path) -> Aircraft:
     if not Path(text).exists():
         message = f"{text}: no such folder; planfly aircraft --new {shlex.quote(text)} makes it"
         raise PlanflyError(message, file=text)
-    return find_aircraft(whole_path(Path(text)))
+    return find_aircraft(absolute_path(Path(text)))
 
 
 def _draw_pictures(

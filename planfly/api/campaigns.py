@@ -37,7 +37,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planner.plan import Plan
 from world.errors import PlanflyError
-from world.extras import need_extra, needs_extra
+from world.extras import require_extra, requires_extra
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +95,7 @@ def _make_workers(count: int | None, scheduler: str | None, seed: int | None) ->
     check_arguments(workers=count, seed=seed)
     if scheduler is not None:
         check_scheduler_address(scheduler)
-        need_extra("cluster", "--scheduler needs")
+        require_extra("cluster", "--scheduler needs")
     return Workers(count, scheduler)
 
 
@@ -120,7 +120,7 @@ def continued_goal(
     )
 
 
-@needs_extra("campaigns")
+@requires_extra("campaigns")
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign(
@@ -185,7 +185,7 @@ def _fly_and_summarise(
     return CampaignResult(summary, read_table(table_path), table_path)
 
 
-@needs_extra("campaigns")
+@requires_extra("campaigns")
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def campaign_flight(
@@ -224,7 +224,7 @@ def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> Fli
 # Find the strongest wind from each direction in which a mission is flyable.
 
 
-@needs_extra("campaigns")
+@requires_extra("campaigns")
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def winds(

@@ -12,7 +12,7 @@ from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_file
 from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, PlanflyError
-from world.files import whole_path, write_whole
+from world.files import absolute_path, write_atomically
 from world.raster import open_raster
 from world.scenario import from_spec
 from world.scenario_draft import GeoPosition, draft_text, make_draft
@@ -53,7 +53,7 @@ def new_scenario(
     check_arguments(height=height, autopilot=autopilot)
     endpoints = _parse_position("start", start), _parse_position("destination", destination)
     target = Path(folder)
-    name = Path(whole_path(target)).name if ".." in target.parts else target.absolute().name
+    name = Path(absolute_path(target)).name if ".." in target.parts else target.absolute().name
     file = _scenario_file(target, name, overwrite=overwrite)
     autopilot_name, _, version = (autopilot or DEFAULT_AUTOPILOT).partition("-")
     raster_path = None if terrain is None else _absolute_path(terrain, is_name=terrain in EMBEDDED)
@@ -79,7 +79,7 @@ def new_scenario(
         draft, terrain=raster_path and _relative_path(target, raster_path), aircraft=_relative_path(target, model_path)
     )
     target.mkdir(exist_ok=True)
-    write_whole(file, draft_text(relative_draft))
+    write_atomically(file, draft_text(relative_draft))
     return file
 
 
@@ -111,13 +111,13 @@ def _parse_position(keyword: str, coordinates: Sequence[float]) -> GeoPosition:
 
 def _absolute_path(path: str | Path, *, is_name: bool) -> str:
     """Return the absolute path of a file, or an embedded name unchanged."""
-    return str(path) if is_name else whole_path(Path(path))
+    return str(path) if is_name else absolute_path(Path(path))
 
 
 def _relative_path(folder: Path, path: str) -> str:
     """Return an absolute path relative to a folder, as a file in that folder names it, or a name unchanged."""
     if not Path(path).is_absolute():
         return path
-    relative = os.path.relpath(path, whole_path(folder))
+    relative = os.path.relpath(path, absolute_path(folder))
     # The slash marks the text as the folder of an aircraft, not a name.
     return relative if "/" in relative else f"./{relative}"

@@ -36,8 +36,8 @@ from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import check_output_file
 from planner.plan import Plan, plan_json
 from world.errors import MissionError, PlanflyError
-from world.extras import need_extra
-from world.files import temporary_folder, write_whole
+from world.extras import require_extra
+from world.files import temporary_folder, write_atomically
 from world.scenario import Scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT
 
@@ -131,7 +131,7 @@ def export(
         source_content = _read_source(path, targets, {"fence": fence, "at": at})
         contents = [_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
-        write_whole(target, data)
+        write_atomically(target, data)
     loss = "" if source_content.log is None else loss_text(source_content.log)
     notes = (*source_content.mission.warnings, *source_content.notes, *([loss] if loss else []))
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
@@ -141,7 +141,7 @@ def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary
     """Return the path of a source; a plan is written to a file that exists while `temporary_folders` is open."""
     if isinstance(source, Plan):
         file = temporary_folders.enter_context(temporary_folder("planfly-export-")) / "plan.json"
-        write_whole(file, plan_json(source))
+        write_atomically(file, plan_json(source))
         return file
     if isinstance(source, FlightLog):
         return Path(source.source)
@@ -279,7 +279,7 @@ def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
     """Return the rows of a flight in the format of another program, and a description of the content."""
     description = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
-        need_extra("live", ".tlog needs")
+        require_extra("live", ".tlog needs")
         from logs.views.exports.telemetry_file import telemetry_bytes
 
         return telemetry_bytes(log), description

@@ -41,8 +41,8 @@ from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log, 
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
-from world.extras import need_extra
-from world.scenario import Scenario, over_terrain
+from world.extras import require_extra
+from world.scenario import Scenario, with_terrain
 
 # ----------------------------------------------------------------------
 # Results of the functions.  They are frozen data with a short printed form and a table in a notebook.
@@ -392,7 +392,7 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
     setup = flight.setup
     if terrain is not None:
-        setup = setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
+        setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
     if fences.items or fences.zones:
         setup = replace(
             setup.in_scenario(fences.add_to_scenario(setup.scenario)), mission=fences.add_to_mission(setup.mission)
@@ -411,7 +411,7 @@ def named_program(sitl: str | Path | None) -> Path | None:
     """
     if sitl is None:
         return None
-    need_extra("live", "--sitl needs")
+    require_extra("live", "--sitl needs")
     program = Path(sitl)
     check_binary(program, program_autopilot(program).title)
     return program

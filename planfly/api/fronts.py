@@ -19,7 +19,7 @@ from planfly.workflow.airframe import choose_seed, load_airframe
 from planfly.workflow.output_paths import RUN_FOLDER, clean_folder, expand_path_pattern
 from planner.plan import plan_json
 from planner.search.plan_front import Front, FrontPlan
-from world.files import write_whole
+from world.files import write_atomically
 from world.scenario import Scenario
 
 # Default folder of a front.
@@ -86,13 +86,13 @@ def plan_front(
 def _write_front(front: Front, world: Scenario, folder: Path) -> None:
     """Write plans, tables and pictures; a front without plans gets only the empty tables."""
     for number, front_plan in enumerate(front.plans, 1):
-        write_whole(folder / f"plan-{number}.json", plan_json(front_plan.plan))
+        write_atomically(folder / f"plan-{number}.json", plan_json(front_plan.plan))
     rows = table_rows(front)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     writer.writerows([["" if value is None else value for value in row.values()] for row in rows])
-    write_whole(folder / "front.csv", text.getvalue())
+    write_atomically(folder / "front.csv", text.getvalue())
     data = {
         "schema": TABLE_SCHEMA,
         "scenario": world.name,
@@ -106,15 +106,15 @@ def _write_front(front: Front, world: Scenario, folder: Path) -> None:
         "default": {key: value for key, value in _table_row(0, front.default).items() if key != "plan"},
         "plans": [row | {"file": f"plan-{row['plan']}.json"} for row in rows],
     }
-    write_whole(folder / "front.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_atomically(folder / "front.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
     if front.plans:
         # Imported here: matplotlib takes most of a second.
         from logs.views.draw_map import draw_map
         from logs.views.drawing import draw_chart, png_bytes
         from logs.views.fronts import front_chart, front_map
 
-        write_whole(folder / PICTURES[0], png_bytes(draw_map(front_map(front))))
-        write_whole(folder / PICTURES[1], png_bytes(draw_chart(front_chart(front))))
+        write_atomically(folder / PICTURES[0], png_bytes(draw_map(front_map(front))))
+        write_atomically(folder / PICTURES[1], png_bytes(draw_chart(front_chart(front))))
 
 
 def table_rows(front: Front) -> list[dict[str, Any]]:

@@ -37,8 +37,8 @@ from planfly.runtime.stages import stage
 from planfly.workflow.data_sheets import parse_sheet
 from world.arrays import Floats
 from world.errors import FlightError, LogError, PlanflyError
-from world.extras import needs_extra
-from world.files import whole_path
+from world.extras import requires_extra
+from world.files import absolute_path
 from world.scenario_tables import names_folder
 
 # Maximum ratio between the stated and the base's mass or span, in either direction, for which the base is a usable
@@ -91,7 +91,7 @@ class IdentifiedAircraft:
     conflict: DriveConflict | None = None
 
 
-@needs_extra("identification")
+@requires_extra("identification")
 @with_warm_up()
 def identify_aircraft(
     logs: str | Path | Sequence[str | Path],
@@ -183,7 +183,7 @@ def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
 
 def _load_base(base: str | Path) -> Aircraft:
     text = str(base.absolute()) if isinstance(base, Path) else base
-    aircraft = find_aircraft(whole_path(Path(text)) if names_folder(text) else text)
+    aircraft = find_aircraft(absolute_path(Path(text)) if names_folder(text) else text)
     if (aircraft.folder / "posterior.toml").is_file():
         allowed = "identified from flight logs itself: name its base, which its posterior.toml states"
         raise FlightError.of_argument("base", str(base), allowed)

@@ -27,8 +27,8 @@ from planfly.workflow.output_paths import (
     clean_folder,
 )
 from world.errors import LogError, ScenarioError
-from world.extras import needs_extra
-from world.files import write_whole
+from world.extras import requires_extra
+from world.files import write_atomically
 
 # Number of rows recorded per call; it is limited because a recorder needs many times the memory of a row.
 _ROWS_PER_WRITE = 4096
@@ -101,7 +101,7 @@ class ColumnGuesses:
     missing: tuple[str, ...]
 
 
-@needs_extra("data-logs")
+@requires_extra("data-logs")
 def guess_columns(
     files: str | Path | Sequence[str | Path], table: str | Path, *, overwrite: bool = False
 ) -> ColumnGuesses:
@@ -119,7 +119,7 @@ def guess_columns(
         raise LogError(f"{target}: {allowed}", file=target, allowed=allowed)
     check_output_file(target, overwrite)
     text = guess_table([Path(file) for file in ([files] if isinstance(files, str | Path) else files)], target)
-    write_whole(target, text.encode())
+    write_atomically(target, text.encode())
     lines = text.splitlines()
     missing = tuple(line.removeprefix("# ") for line in lines if line.startswith("# Not found"))
     return ColumnGuesses(target, sum("# guess" in line for line in lines), missing)
@@ -196,7 +196,7 @@ def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
     files = []
     for name, chart in refly_charts(reflight).items():
         path = (folder / name).with_stem(f"{Path(name).stem}{ending}")
-        write_whole(path, png_bytes(draw_chart(chart)))
+        write_atomically(path, png_bytes(draw_chart(chart)))
         files.append(path)
     return files
 
@@ -234,7 +234,7 @@ def recover(log: str | Path, out: str | Path | None = None, *, overwrite: bool =
     recovered_log = recover_log(Path(log))
     if recovered_log is None:
         return None
-    write_whole(target, recovered_log.data)
+    write_atomically(target, recovered_log.data)
     return recovered_log.log
 
 

@@ -22,7 +22,7 @@ from planfly.workflow.output_paths import LINK_FILES, check_output_folder, clean
 from planner.plan import Plan
 from world.arrays import Floats
 from world.errors import ArgumentError
-from world.files import write_whole
+from world.files import write_atomically
 from world.scenario import with_link
 
 # Entries of [link] that a scenario without this table needs.
@@ -139,7 +139,7 @@ def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Link
         pictures = draw_pictures(views)
     clean_folder(folder, LINK_FILES, overwrite=overwrite)
     for name in LINK_FILES:
-        write_whole(folder / name, pictures[name])
+        write_atomically(folder / name, pictures[name])
     return replace(result, files=tuple(folder / name for name in LINK_FILES))
 
 

@@ -21,7 +21,7 @@ from planner.search.explain_failure import explain_failure
 from planner.search.replan import check_same_mission
 from planner.search.search_state import StopCondition
 from world.errors import ScenarioError
-from world.files import write_whole
+from world.files import write_atomically
 from world.scenario import Scenario, embedded_scenarios, with_planner, with_threats
 
 # ----------------------------------------------------------------------
@@ -151,7 +151,7 @@ def _search_and_write(
         )
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(target, plan_json(plan))
+        write_atomically(target, plan_json(plan))
     return plan
 
 

@@ -32,8 +32,8 @@ from planfly.runtime.stages import stage
 from planfly.workflow.imported_flights import DrawnFlight, fly_draws
 from planfly.workflow.output_paths import PREDICT_FILES, check_output_folder, clean_folder
 from world.errors import LogError, PlanflyError
-from world.extras import needs_extra
-from world.files import read_toml, write_whole
+from world.extras import requires_extra
+from world.files import read_toml, write_atomically
 from world.scenario_tables import names_folder
 
 # Inputs with which the model flies: the logged controls, or the autopilot's model with the logged mission.
@@ -85,7 +85,7 @@ class Predicted:
     leg_ends: tuple[float, ...] = ()
 
 
-@needs_extra("identification")
+@requires_extra("identification")
 @with_warm_up(*FLYING)
 @takes_options
 def predict(
@@ -145,7 +145,7 @@ def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
         if required:
             raise
         return None
-    has_controls = len(motion.inertial.time) > 1 and len(motion.moved.time) > 1
+    has_controls = len(motion.inertial.time) > 1 and len(motion.surface_commands.time) > 1
     if not has_controls and required:
         raise LogError(f"{path}: no inertial sensors or no controls: predict it by the mission", file=path)
     return motion if has_controls else None
@@ -256,7 +256,7 @@ def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> 
     else:
         flight = read_imported(path, **options)
         setup, track = flight.setup, flight.track
-    name = str(aircraft.folder) if not aircraft.embedded else aircraft.name
+    name = str(aircraft.folder) if not aircraft.is_embedded else aircraft.name
     with stage("flying by draws") as advance:
         flights = fly_draws(setup, track, name, drawn_flights(aircraft), advance)
     bands = _profile_bands(flights)
@@ -311,6 +311,6 @@ def _write_page(folder: Path, predicted: Predicted) -> tuple[Path, ...]:
     title = f"{Path(predicted.source).name}, predicted by {predicted.aircraft}"
     chart = band_chart(predicted.bands, title, by_time=predicted.by == "controls")
     page, picture = (folder / name for name in PREDICT_FILES)
-    write_whole(picture, png_bytes(draw_chart(chart)))
-    write_whole(page, prediction_page(predicted.heading, predicted.bands, chart).encode())
+    write_atomically(picture, png_bytes(draw_chart(chart)))
+    write_atomically(page, prediction_page(predicted.heading, predicted.bands, chart).encode())
     return page, picture

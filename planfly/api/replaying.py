@@ -14,7 +14,7 @@ from planfly.api.serving import link_access
 from planfly.arguments import check_arguments
 from planfly.runtime.first_start import with_warm_up
 from world.errors import LogError
-from world.extras import needs_extra
+from world.extras import requires_extra
 from world.running_clock import RunningClock
 
 # Numbers that may be meant as the port of a ground station.
@@ -156,7 +156,7 @@ def _ignore_message(_text: str) -> None:
     pass
 
 
-@needs_extra("foxglove", "--foxglove needs")
+@requires_extra("foxglove", "--foxglove needs")
 @with_warm_up()
 def play_to_foxglove(
     log: FlightLog | str | Path,
@@ -211,7 +211,7 @@ def _check_origin(text: str) -> str:
     return text
 
 
-@needs_extra("live", "playing to ground stations needs")
+@requires_extra("live", "playing to ground stations needs")
 @with_warm_up()
 def play_to_stations(
     log: FlightLog | str | Path,

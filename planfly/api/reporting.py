@@ -19,7 +19,7 @@ from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder
 from planfly.workflow.suggestion_trials import judge_mission
 from planner.plan import Plan
-from world.files import write_whole
+from world.files import write_atomically
 from world.html_table import html_table
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def foxglove_layout(file: str | Path, *, overwrite: bool = False) -> Path:
     'layout.json'
     """
     check_output_file(Path(file), overwrite)
-    write_whole(Path(file), layout_text())
+    write_atomically(Path(file), layout_text())
     return Path(file)
 
 

@@ -44,8 +44,8 @@ from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
 from planner.plan import Plan
-from world.files import write_whole
-from world.scenario import over_terrain
+from world.files import write_atomically
+from world.scenario import with_terrain
 
 if TYPE_CHECKING:
     from planfly.workflow.imported_flights import ImportedFlight
@@ -229,7 +229,7 @@ def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
 
 def _with_terrain(setup: FlightSetup, terrain: str | Path | None) -> FlightSetup:
     """Replace the terrain of a setup, or return the setup unchanged if no terrain is named."""
-    return setup if terrain is None else setup.in_scenario(over_terrain(setup.scenario, str(terrain)))
+    return setup if terrain is None else setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
 
 
 class _ReturnsRequest(NamedTuple):
@@ -292,7 +292,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
             files = _draw_files(setup, track, drawn_returns_data)
         folder = clean_folder(request.folder, RETURN_FILES, overwrite=request.overwrite)
         for name, data in files.items():
-            write_whole(folder / name, data)
+            write_atomically(folder / name, data)
         names = list(files)
         for log in sorted(Path(log_folder).iterdir()):
             shutil.move(log, folder / log.name)

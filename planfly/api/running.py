@@ -36,7 +36,7 @@ from planfly.workflow.pipeline import autopilot_log, fly_and_judge
 from planfly.workflow.reference_flights import FlyReference
 from planfly.workflow.tighten_plan import refine as refine_rounds
 from planner.plan import Plan, plan_json
-from world.files import lock_path, write_whole
+from world.files import lock_path, write_atomically
 from world.scenario import Scenario
 
 
@@ -228,7 +228,7 @@ def _fly_rounds(
 
     _, round_entries = refine_rounds(scenario, refine, fly_round, lambda number: _move_round_results(folder, number))
     if refine:
-        write_whole(folder / "rounds.json", json.dumps(round_entries, indent=1) + "\n")
+        write_atomically(folder / "rounds.json", json.dumps(round_entries, indent=1) + "\n")
     *earlier_rounds, last_round = (
         replace(flown_round, changes=tuple(round_entry["changes"]))
         for flown_round, round_entry in zip(flown_rounds, round_entries, strict=True)
@@ -246,17 +246,17 @@ def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
     from logs.views.report.page import write_report
 
     folder, airframe = task.folder, task.airframe
-    write_whole(folder / "plan.json", plan_json(plan))
+    write_atomically(folder / "plan.json", plan_json(plan))
     mission = mission_of_plan(plan, airframe, "mission.waypoints")
     mission = replace(mission, autopilot=airframe.autopilot.name)
     rally = [folder / "mission.rally"] if mission.rally else []
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
-        write_whole(target, mission_text(mission, mission_kind(target)))
+        write_atomically(target, mission_text(mission, mission_kind(target)))
     if plan.ways is not None and airframe.autopilot.parameters is not None:
-        write_whole(folder / "mission.parm", judging_parameters_text("mission.waypoints", airframe.autopilot)[0])
+        write_atomically(folder / "mission.parm", judging_parameters_text("mission.waypoints", airframe.autopilot)[0])
     if not plan.feasible:
         verdict = judge_plan_only(plan, planning_conditions(task.scenario, airframe))
-        write_whole(folder / "verdict.json", verdict_json(verdict))
+        write_atomically(folder / "verdict.json", verdict_json(verdict))
         return Round(number, (), verdict, flown=False, folder=folder)
     setup = with_engine(make_setup(task.scenario, airframe, mission, task.seed, plan=plan), task.engine)
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
@@ -271,7 +271,7 @@ def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
             returns=True,
             limits=task.limits,
         )
-    write_whole(folder / "verdict.json", verdict_json(flight.verdict))
+    write_atomically(folder / "verdict.json", verdict_json(flight.verdict))
     summary = flight.returns or return_summary(flight.setup, flight.track)
     with stage("drawing", "drawing a report"):
         write_report(

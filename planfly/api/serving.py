@@ -10,7 +10,7 @@ from planfly.flight_options import MissionOptions, takes_options
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.runtime.first_start import with_warm_up
 from world.errors import FlightError, PlanflyError
-from world.extras import needs_extra
+from world.extras import requires_extra
 
 if TYPE_CHECKING:
     from flight.live.link import Access
@@ -24,7 +24,7 @@ def _ignore_message(_text: str) -> None:
     pass
 
 
-@needs_extra("live", "serve needs")
+@requires_extra("live", "serve needs")
 @with_warm_up(*FLYING)
 @takes_options
 def serve(

@@ -42,7 +42,7 @@ from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
 from world.errors import ArgumentError, LogError, MissionError
-from world.files import write_whole
+from world.files import write_atomically
 from world.scenario import Scenario
 
 
@@ -225,19 +225,19 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
         # Imported here: matplotlib takes most of a second.
         from logs.views.drawing import draw_chart, png_bytes
 
-        write_whole(folder / "survey.png", png_bytes(draw_chart(chart)))
+        write_atomically(folder / "survey.png", png_bytes(draw_chart(chart)))
         files.append(folder / "survey.png")
     for remedy in result.remedies:
         if remedy.mission is not result.setup.mission:
             path = folder / f"{remedy.kind}.waypoints"
-            write_whole(path, mission_text(remedy.mission, "waypoints"))
+            write_atomically(path, mission_text(remedy.mission, "waypoints"))
             files.append(path)
         if remedy.kind == "parameter":
             # Include the parameters of the user's own file, because they were flown, too.
             parameters = result.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
             file_values = {} if parameters is None else parameters.by_origin("file")
             path = folder / "parameter.param"
-            write_whole(path, "".join(f"{name},{value!r}\n" for name, value in file_values.items()))
+            write_atomically(path, "".join(f"{name},{value!r}\n" for name, value in file_values.items()))
             files.append(path)
     return replace(result, files=tuple(files))
 

@@ -37,7 +37,7 @@ from planfly.workflow.pipeline import OffNominal
 from planner.plan import Plan, plan_json, read_plan
 from world.airfield import LandingStrip
 from world.errors import FlightError, MissionError
-from world.files import write_whole
+from world.files import write_atomically
 from world.scenario import Scenario
 from world.scenario_tables import WindTable
 from world.terrain import Terrain
@@ -136,7 +136,7 @@ def open_campaign(
         if has_plan_file and plan.scenario.to_json() != scenario.to_json():
             raise MissionError(f"{plan_file}: is the plan of another scenario than {target}", file=str(plan_file))
         if plan_file is not None and not has_plan_file:
-            write_whole(plan_file, plan_json(plan))
+            write_atomically(plan_file, plan_json(plan))
         base = _make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed))
     check_level_flight_at_medians(base)
     # Refuse a mission without a valid route now, not in a worker.

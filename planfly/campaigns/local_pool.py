@@ -21,7 +21,7 @@ from planfly.campaigns.flight_requests import (
 )
 from planfly.campaigns.flight_row import FlightRow, fly_one, make_lost_row
 from world.errors import PlanflyError
-from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
+from world.interruption import children_ignore_sigint, delay_signals, end_children, end_with_parent
 
 if TYPE_CHECKING:
     from multiprocessing.process import BaseProcess
@@ -56,7 +56,7 @@ class _Worker:
     def send(self, request: FlightRequest) -> Future[FlightRow]:
         """Send a flight to the process."""
         # Ctrl-C reaches every process of a terminal, so workers ignore it, and this process ends them.
-        with children_ignore_sigint(), uninterrupted():
+        with children_ignore_sigint(), delay_signals():
             try:
                 return self._submit(request)
             except BrokenProcessPool:

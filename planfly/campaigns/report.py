@@ -59,7 +59,7 @@ from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
 from world.errors import ArgumentError, PlanflyError
-from world.files import write_whole
+from world.files import write_atomically
 
 # Maximum number of flights drawn in the pictures of tracks; more flights do not change the pictures visibly.
 _MAX_DRAWN_FLIGHTS = 3000
@@ -261,7 +261,7 @@ class OutputDirectory:
         if not self.resume:
             clear_campaign(self.folder)
         if base.plan is not None and not plan_file.exists():
-            write_whole(plan_file, plan_json(base.plan))
+            write_atomically(plan_file, plan_json(base.plan))
         return base
 
 
@@ -317,8 +317,8 @@ def write_files(
             fly_row_again(base, row, log)
         if advance is not None:
             advance(count + 1.0, float(len(logged_flights)), f"flight {row.draw.index}")
-    write_whole(folder / "summary.json", summary_json(summary))
-    write_whole(folder / "report.html", campaign_page(base, summary, store, command))
+    write_atomically(folder / "summary.json", summary_json(summary))
+    write_atomically(folder / "report.html", campaign_page(base, summary, store, command))
 
 
 def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
@@ -400,9 +400,9 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
     }
     picture = png_bytes(figure)
     page = winds_page(base.name, figure, winds, rows, command)
-    write_whole(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
-    write_whole(folder / "winds.png", picture)
-    write_whole(folder / "winds.html", page)
+    write_atomically(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_atomically(folder / "winds.png", picture)
+    write_atomically(folder / "winds.html", page)
 
 
 def _calm_document(calm: CalmFailures) -> dict[str, Any]:

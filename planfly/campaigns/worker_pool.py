@@ -14,7 +14,7 @@ from planfly.campaigns.flight_requests import FinishedFlight, FlightRequest, Fly
 from planfly.campaigns.flight_row import fly_one
 from planfly.campaigns.local_pool import LocalPool
 from world.errors import PlanflyError
-from world.extras import need_extra
+from world.extras import require_extra
 
 # Minimum time between two progress reports, s.
 REPORT_INTERVAL_S = 0.5
@@ -54,7 +54,7 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
             yield pool
         return
     address = check_scheduler_address(workers.scheduler)
-    need_extra("cluster", "--scheduler needs")
+    require_extra("cluster", "--scheduler needs")
     # Imported here because dask is an optional dependency.
     from planfly.campaigns.dask_pool import DaskPool, connect_client
 

@@ -222,7 +222,7 @@ def _check_usable(log: MotionLog) -> None:
     if log.vehicle not in ("plane", "unknown"):
         raise LogError(f"{log.source}: flown by a {log.vehicle} ({log.program}): expected a plane", file=log.source)
     series_names = _SERIES[log.program_kind]
-    for samples, name in ((log.inertial, "inertial"), (log.moved, "outputs")):
+    for samples, name in ((log.inertial, "inertial"), (log.surface_commands, "outputs")):
         if len(samples.time) < 2:
             raise LogError(f"{log.source}: no {series_names[name]}: {_recording_hint(log)}", file=log.source)
     for samples, name in ((log.attitude, "attitude"), (log.velocity, "velocity"), (log.height, "height")):
@@ -244,7 +244,7 @@ def _check_usable(log: MotionLog) -> None:
 
 def slowest_rows(log: MotionLog) -> float:
     """Return the lower of the rates of inertial sensors and surface commands, rows per second."""
-    return min(log.inertial.rate, log.moved.rate)
+    return min(log.inertial.rate, log.surface_commands.rate)
 
 
 def recording_setting(log: MotionLog) -> str:
@@ -345,7 +345,7 @@ def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, flo
 
 def _time_grid(log: MotionLog) -> Floats:
     """Return the time grid over the span that all series cover."""
-    series = (log.inertial, log.moved, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
+    series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     start_time, end_time = max(samples.time[0] for samples in series), min(samples.time[-1] for samples in series)
     return np.arange(start_time, end_time, 1.0 / GRID_HZ)
 
@@ -387,7 +387,9 @@ def _usable_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, puls
     """Flag the rows in free flight on the wing, without gaps in sensors, airspeed or wind."""
     min_airspeed = log.parameters.get("AIRSPEED_MIN", log.parameters.get("ARSPD_FBW_MIN", 9.0))
     is_flying = (equivalent_airspeed > _MIN_AIRSPEED_FRACTION * min_airspeed) & ~_vtol_rows(log, grid, pulses)
-    sensors = [(samples, _MAX_SENSOR_GAP_S) for samples in (log.inertial, log.moved, log.attitude, log.velocity)]
+    sensors = [
+        (samples, _MAX_SENSOR_GAP_S) for samples in (log.inertial, log.surface_commands, log.attitude, log.velocity)
+    ]
     wind_gap = _MAX_AIR_GAP_S if log.program_kind == "ardupilot" else _MAX_SLOW_WIND_GAP_S
     for samples, max_gap in (*sensors, (log.airspeed, _MAX_AIR_GAP_S), (log.wind, wind_gap)):
         steps = np.diff(samples.time)

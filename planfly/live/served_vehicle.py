@@ -16,7 +16,7 @@ from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 from planfly.live.served_flights import ServedScenario, ServeOptions, autopilot_parameters, fly_process
 from world.frames import to_geo
-from world.interruption import children_ignore_sigint, end_children, uninterrupted
+from world.interruption import children_ignore_sigint, delay_signals, end_children
 from world.scenario import Scenario
 
 # Maximum time for a process to end by itself before it is killed, s.
@@ -93,7 +93,7 @@ class _FlightPool:
         self._children = [child for child in self._children if child.is_alive()]
         link_end, process_end = self._context.Pipe()
         child = self._context.Process(target=fly_process, args=(process_end, self._options), daemon=True)
-        with children_ignore_sigint(), uninterrupted():
+        with children_ignore_sigint(), delay_signals():
             child.start()
         process_end.close()
         self._children.append(child)

@@ -23,8 +23,8 @@ from planfly.workflow.output_paths import check_output_folder, prepare_folder
 from planner.plan import Objectives, Violations
 from planner.search.algorithms import find_algorithm
 from world.arrays import Floats
-from world.files import lock_path, write_whole
-from world.interruption import children_ignore_sigint, end_children, end_with_parent, uninterrupted
+from world.files import lock_path, write_atomically
+from world.interruption import children_ignore_sigint, delay_signals, end_children, end_with_parent
 from world.scenario import Scenario, load_scenario, with_planner
 
 # Numbers of threats in the problems of the paper.
@@ -199,7 +199,7 @@ def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterato
     pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=end_with_parent)
     try:
         # All processes are started here.
-        with children_ignore_sigint(), uninterrupted():
+        with children_ignore_sigint(), delay_signals():
             results = pool.map(_plan_task, tasks[1:])
         yield from results
     except BaseException:
@@ -294,15 +294,17 @@ def _number_text(value: float | None, digits: int) -> str:
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
     """Write table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv."""
     columns = [field.name for field in fields(TableRow) if field.name != "seconds_median"]
-    write_whole(folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows)))
-    write_whole(
+    write_atomically(
+        folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows))
+    )
+    write_atomically(
         folder / "runs.csv", _csv_text(_PLAN_COLUMNS, (list(_plan_row(seeded_plan).values()) for seeded_plan in plans))
     )
     times = (
         [seeded_plan.threats, seeded_plan.algorithm, seeded_plan.seed, f"{seeded_plan.seconds:.3f}"]
         for seeded_plan in plans
     )
-    write_whole(folder / "times.csv", _csv_text(["threats", "algorithm", "seed", "cpu_s"], times))
+    write_atomically(folder / "times.csv", _csv_text(["threats", "algorithm", "seed", "cpu_s"], times))
     table_rows = [{key: value for key, value in asdict(row).items() if key != "seconds_median"} for row in rows]
     runs = [
         _plan_row(seeded_plan)
@@ -313,7 +315,7 @@ def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededP
         for seeded_plan in plans
     ]
     text = json.dumps({"schema": PAPER_SCHEMA, "table": table_rows, "runs": runs}, allow_nan=False, indent=1)
-    write_whole(folder / "runs.json", text + "\n")
+    write_atomically(folder / "runs.json", text + "\n")
 
 
 def _plan_row(seeded_plan: SeededPlan) -> dict[str, Any]:

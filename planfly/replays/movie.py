@@ -19,8 +19,8 @@ from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_file, check_output_folder
 from world.errors import PlanflyError
-from world.extras import need_extra
-from world.files import temporary_folder, write_whole
+from world.extras import require_extra
+from world.files import temporary_folder, write_atomically
 
 # Duration of a film without a given speed, s.
 _DEFAULT_DURATION_S = 20.0
@@ -56,7 +56,7 @@ def write_movie(
         raise PlanflyError.of_argument("movie", len(film), allowed, shown="", file=target)
     if not kind:
         return _write_folder(target, film)
-    write_whole(target, _encode_gif(film) if kind == ".gif" else _encode_mp4(film, program))
+    write_atomically(target, _encode_gif(film) if kind == ".gif" else _encode_mp4(film, program))
     return [target]
 
 
@@ -77,7 +77,7 @@ def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
         data = io.BytesIO()
         image.save(data, "PNG")
         files.append(folder / f"frame-{number:04d}.png")
-        write_whole(files[-1], data.getvalue())
+        write_atomically(files[-1], data.getvalue())
     return files
 
 
@@ -140,7 +140,7 @@ def _find_ffmpeg(target: Path) -> str:
     program = shutil.which("ffmpeg")
     if program is not None:
         return program
-    need_extra("films", f"{target}: an .mp4 needs ffmpeg (a .gif or a folder does not), or")
+    require_extra("films", f"{target}: an .mp4 needs ffmpeg (a .gif or a folder does not), or")
     from imageio_ffmpeg import get_ffmpeg_exe
 
     return str(get_ffmpeg_exe())

@@ -16,7 +16,7 @@ from typing import ParamSpec, TypeVar
 from planfly.kernel_units.unit_kernels import list_unit_kernels
 from planfly.runtime.stages import has_receiver, report_line, stage
 from world.compile_events import notify_before_compiling
-from world.kernel_cache import VARIABLE, can_write
+from world.kernel_cache import CACHE_DIR_VARIABLE, can_write
 
 # ----------------------------------------------------------------------
 # Units of kernels are compiled by separate processes, which store them in the cache.
@@ -109,7 +109,7 @@ STAGE_TITLE = "compiling numeric kernels"
 # End of the message on compiled kernels.
 _CACHE_NOTE = ", which later runs load"
 # Hint at the variable that names another cache folder.
-_CACHE_DIR_HINT = f"{VARIABLE}=FOLDER names one that can"
+_CACHE_DIR_HINT = f"{CACHE_DIR_VARIABLE}=FOLDER names one that can"
 # Units that this process has compiled or tried to compile.
 _compiled_units: set[str] = set()
 
@@ -150,7 +150,7 @@ def with_warm_up(*units: str) -> Callable[[Callable[_Parameters, _Result]], Call
 
 def _report_and_compile(units: list[str]) -> None:
     # Imported here: code that compiles kernels has already imported it.
-    from world.kernels import TEMPORARY, WANTED, cache_folder
+    from world.kernels import IS_TEMPORARY, PREFERRED_FOLDER, cache_folder
 
     folder = cache_folder()
     if not can_write(folder):
@@ -158,11 +158,12 @@ def _report_and_compile(units: list[str]) -> None:
             f"compiling the numeric kernels: {folder} cannot be written, so they are not stored; {_CACHE_DIR_HINT}"
         )
         return
-    if TEMPORARY:
+    if IS_TEMPORARY:
         report_line(
-            f"compiling the numeric kernels for this command only: {WANTED} cannot be written; {_CACHE_DIR_HINT}"
+            f"compiling the numeric kernels for this command only: {PREFERRED_FOLDER} cannot be written;"
+            f" {_CACHE_DIR_HINT}"
         )
-    title = STAGE_TITLE if TEMPORARY else STAGE_TITLE + _CACHE_NOTE
+    title = STAGE_TITLE if IS_TEMPORARY else STAGE_TITLE + _CACHE_NOTE
     if not (units and sys.executable and has_receiver()):
         report_line(f"{title} ...")
     if not units or not sys.executable:

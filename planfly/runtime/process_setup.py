@@ -42,10 +42,10 @@ def watch_address_space() -> None:
     if limit is None:
         return
     # Imported here: few processes are limited, and `import planfly` in a script loads nothing else.
-    from world.address_space import RoomFinder
+    from world.address_space import AddressSpaceGuard
 
-    if not any(isinstance(finder, RoomFinder) for finder in sys.meta_path):
-        sys.meta_path.insert(0, RoomFinder(limit))
+    if not any(isinstance(finder, AddressSpaceGuard) for finder in sys.meta_path):
+        sys.meta_path.insert(0, AddressSpaceGuard(limit))
 
 
 def address_space_limit() -> int | None:

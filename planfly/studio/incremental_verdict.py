@@ -100,7 +100,7 @@ def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before
     true_airspeed = route.airspeed * np.array([_speed_factor(context, float(altitude)) for altitude in leg_altitudes])
     legs = list(dict.fromkeys([int(np.argmax(route.airspeed)), int(np.argmax(true_airspeed))]))
     windiest_altitude = float(
-        max(dict.fromkeys(altitudes.tolist()), key=lambda altitude: float(np.hypot(*wind.at(altitude))))
+        max(dict.fromkeys(altitudes.tolist()), key=lambda altitude: float(np.hypot(*wind.velocity_at(altitude))))
     )
     added_altitudes = np.array([windiest_altitude, *(leg_altitudes[leg] for leg in legs for _ in range(2))])
     leg_airspeeds = np.array([speed for leg in legs for speed in (route.airspeed[leg], route.airspeed[leg])])

@@ -15,7 +15,7 @@ from planfly.studio.edit_context import EditContext
 from planfly.studio.pilot import Advance
 from planfly.workflow.pipeline import fly_and_judge
 from world.errors import MissionError
-from world.extras import need_extra
+from world.extras import require_extra
 
 # Maximum number of returns that are judged along the route.
 _MAX_RETURNS = 240
@@ -55,7 +55,7 @@ def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str,
 
 def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly the mission `FLIGHT_COUNT` times, each time with another wind, aircraft, terrain error and start."""
-    need_extra("campaigns")
+    require_extra("campaigns")
     from planfly.campaigns.statistics.decision import wilson
 
     context, mission = payload

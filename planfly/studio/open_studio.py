@@ -17,7 +17,7 @@ from planfly.kernel_units.unit_kernels import PLANNING_AND_FLYING
 from planfly.runtime.first_start import with_warm_up
 from planfly.studio.session import open_session
 from world.errors import PlanflyError
-from world.extras import needs_extra
+from world.extras import requires_extra
 from world.files import temporary_folder
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def _never_stop() -> bool:
     return False
 
 
-@needs_extra("studio")
+@requires_extra("studio")
 @with_warm_up(*PLANNING_AND_FLYING)
 @takes_options
 def open_studio(

@@ -28,7 +28,7 @@ from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.suggestion_trials import SuggestionTrials
 from planner.plan import Plan
 from world.errors import MissionError, PlanflyError
-from world.files import write_whole
+from world.files import write_atomically
 from world.frames import to_geo
 
 Edit = Move | Insert | Delete | Raise | Apply
@@ -415,7 +415,7 @@ class Session:
             message = f"{path.name} was changed by another program since it was opened: save it under another name"
             raise PlanflyError(message, file=path)
         saved_file = self.save(self.document.kind)
-        write_whole(path, saved_file.data)
+        write_atomically(path, saved_file.data)
         self.document = replace(self.document, on_disk=saved_file.data)
         return saved_file
 
@@ -440,7 +440,7 @@ class Session:
             return
         first_autosave_file.parent.mkdir(parents=True, exist_ok=True)
         plan = self.judged.setup.plan
-        write_whole(
+        write_atomically(
             first_autosave_file, autosave_text(self.context, self.history.first, self.mission, plan, self.document.name)
         )
         self.autosaved_rev = self.rev

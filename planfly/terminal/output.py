@@ -21,7 +21,7 @@ from planfly.terminal.command_parser import wants_colour
 from planfly.terminal.control_characters import escaped_json, without_controls
 from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
-from world.files import read_at_most, write_whole
+from world.files import read_at_most, write_atomically
 
 if TYPE_CHECKING:
     from logs.verdict.verdict import Verdict
@@ -192,7 +192,7 @@ def _store_duration(kind: str, duration: _LastDuration) -> None:
     text = json.dumps(_last_durations() | {kind: tuple(float(f"{value:.4g}") for value in duration)}, indent=1)
     with contextlib.suppress(OSError):
         _durations_file().parent.mkdir(parents=True, exist_ok=True)
-        write_whole(_durations_file(), text)
+        write_atomically(_durations_file(), text)
 
 
 # ----------------------------------------------------------------------
@@ -512,7 +512,7 @@ def write_json_if_requested(args: argparse.Namespace, make_answer: Callable[[], 
     if target == STANDARD_OUTPUT:
         print(escaped_json(text), end="", file=_output.get() or sys.stdout)
     else:
-        write_whole(Path(target), text)
+        write_atomically(Path(target), text)
 
 
 def write_junit_if_requested(args: argparse.Namespace, verdicts: Mapping[str, "Verdict"]) -> None:
@@ -520,7 +520,7 @@ def write_junit_if_requested(args: argparse.Namespace, verdicts: Mapping[str, "V
     if args.junit is not None:
         from logs.verdict.junit import junit_text
 
-        write_whole(Path(args.junit), junit_text({name: verdict.present() for name, verdict in verdicts.items()}))
+        write_atomically(Path(args.junit), junit_text({name: verdict.present() for name, verdict in verdicts.items()}))
 
 
 def write_junit_error_if_requested(args: argparse.Namespace, message: str) -> None:
@@ -530,7 +530,7 @@ def write_junit_error_if_requested(args: argparse.Namespace, message: str) -> No
         from logs.verdict.junit import junit_error_text
 
         source = next(getattr(args, name) for name in ("what", "mission", "scenario", "log") if hasattr(args, name))
-        write_whole(Path(target), junit_error_text(str(source), message))
+        write_atomically(Path(target), junit_error_text(str(source), message))
 
 
 def _check_not_input(target: Path, args: argparse.Namespace) -> None:

@@ -13,7 +13,7 @@ from types import FrameType
 from typing import NoReturn
 
 from world.files import remove_temporary_folders
-from world.interruption import Interrupted, interrupt, remove_unfinished
+from world.interruption import Interrupted, interrupt, remove_temporary_paths
 
 # Signals that end a command.
 ENDING_SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -151,6 +151,6 @@ def _kill_children_and_exit(code: int) -> NoReturn:
             child.kill()
             killed_ids.add(child.pid)
         # A killed child may still complete a file that it was writing, so removing its folder may fail at first.
-        if all([remove_unfinished(), *map(remove_temporary_folders, killed_ids)]) or time.monotonic() > deadline:
+        if all([remove_temporary_paths(), *map(remove_temporary_folders, killed_ids)]) or time.monotonic() > deadline:
             os._exit(code)
         time.sleep(_RETRY_INTERVAL_S)

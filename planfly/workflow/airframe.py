@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aircraft.catalog import Aircraft, find_again, find_aircraft, model_hash
+from aircraft.catalog import Aircraft, find_aircraft, find_logged_aircraft, model_hash
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.autopilots.autopilot import Autopilot
@@ -107,7 +107,7 @@ def airframe_of(setup: FlightSetup) -> Airframe:
     >>> airframe_of(example_log().setup).aircraft.name
     'aerosonde'
     """
-    aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
+    aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     return Airframe(aircraft, setup.limits, setup.battery, setup.autopilot)
 
 

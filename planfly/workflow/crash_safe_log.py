@@ -16,7 +16,7 @@ from logs.verdict.verdict import Verdict
 from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
 from world.files import lock_path
 from world.geometry import leg_runs
-from world.interruption import uninterrupted
+from world.interruption import delay_signals
 
 # ----------------------------------------------------------------------
 # Limit the duration of a simulated flight and the size of its log, and predict the duration.
@@ -110,7 +110,7 @@ class CrashSafeLog:
         # Do not remove a symbolic link, even if its target does not exist.
         file_existed = path.exists() or path.is_symlink()
         try:
-            with uninterrupted(), self._errors_with_file_name():
+            with delay_signals(), self._errors_with_file_name():
                 path.touch()
                 # Take the lock before the file is emptied, so that a log locked by another process is not changed.
                 self._locks.enter_context(lock_path(path))
@@ -137,7 +137,7 @@ class CrashSafeLog:
                 self._close_unfinished(error_type)
 
     def _close_unfinished(self, error_type: type[BaseException] | None) -> None:
-        with uninterrupted():
+        with delay_signals():
             if error_type is None or not issubclass(error_type, KeyboardInterrupt):
                 self._recorder.abandon()
             elif self._rows:
@@ -148,7 +148,7 @@ class CrashSafeLog:
 
     def write(self, rows: Rows) -> None:
         """Record rows of the flight."""
-        with uninterrupted(), self._errors_with_file_name():
+        with delay_signals(), self._errors_with_file_name():
             self._recorder.write_rows(rows)
             self._rows += len(rows)
 
@@ -165,7 +165,7 @@ class CrashSafeLog:
         self, end_reason: str, verdict: Verdict, reference: ReferenceFlights | None, returns: DrawnReturns | None = None
     ) -> None:
         """Write the results of a judged flight, and close the log."""
-        with uninterrupted(), self._errors_with_file_name():
+        with delay_signals(), self._errors_with_file_name():
             self._recorder.finish(end_reason, verdict, reference, returns)
             self._is_open = False
 

@@ -25,8 +25,8 @@ from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
 from flight.simulation.simulate import Flight, join_blocks, simulate
 from flight.simulation.track import Track
-from logs.importers.clean_places import LONGEST_STEP
-from logs.importers.imported_flight import LoggedFlight, make_flight, mean_wind, track_of_flight, with_flown_heights
+from logs.importers.clean_positions import MAX_STEP_S
+from logs.importers.imported_flight import LoggedFlight, make_flight, make_track, mean_wind, with_flown_heights
 from logs.importers.open_log import open_log
 from logs.recording.reader import LogEvent
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, plan_mismatch
@@ -127,14 +127,14 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
         mission=mission_origin,
         plan_heights=has_plan_heights,
         aircraft_known=aircraft_known,
-        begins_in_flight=flight.begins,
+        begins_in_flight=flight.begins_in_flight,
         gaps=flight.gaps,
         faults=flight.faults,
         damage=flight.raw.damage,
         notes=notes,
     )
     setup = replace(setup, source=source)
-    track = track_of_flight(flight, scenario.origin)
+    track = make_track(flight, scenario.origin)
     if plan is not None and (mismatch := plan_mismatch(setup, track)) is not None:
         raise MissionError(f"{path}: not a flight of {plan}; {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
@@ -258,12 +258,12 @@ def _sha256(path: Path) -> str:
 def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
     """Describe the parts of the flight that are missing in the log: before its start, after its end, between rows."""
     notes = []
-    if flight.begins:
+    if flight.begins_in_flight:
         notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
-    if flight.ends:
+    if flight.ends_in_flight:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
     usual_step = float(np.median(np.diff(flight.time)))
-    if usual_step > LONGEST_STEP:
+    if usual_step > MAX_STEP_S:
         notes.append(f"the log has a position every {usual_step:.1f} s: the flight between them is unknown")
     return tuple(notes)
 
@@ -306,7 +306,7 @@ def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
     clock = flight.clock
     times = np.array([time for time, _ in messages])
     if clock is not None and messages:
-        times = clock.on_clock(times)
+        times = clock.to_steady_clock(times)
     events = zip(times.tolist(), messages, strict=True)
     events_in_flight = [
         LogEvent(max(start_time, time), text, "info")

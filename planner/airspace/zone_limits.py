@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
+from world.airspace.zone_kernels import ZoneRecords, edge_distance, height_outside_band, zone_records
 from world.airspace.zones import Zone
 from world.arrays import Floats, Heights
 from world.by_reference import by_reference
@@ -92,7 +92,7 @@ def _reduce_margins(
         zone, margin = records.zones[z], required[z]
         for k in range(ends.shape[0]):
             horizontal_distance = edge_distance(records, z, ends[k, 0], ends[k, 1])
-            vertical_distance = outside_band(zone, ends[k, 2], ground_heights[k])
+            vertical_distance = height_outside_band(zone, ends[k, 2], ground_heights[k])
             if not zone.exclusion:
                 margin.horizontal = min(margin.horizontal, max(0.0, -fraction * horizontal_distance))
                 margin.vertical = min(margin.vertical, max(0.0, -fraction * vertical_distance))
@@ -155,7 +155,7 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Pl
     terrain, max_height = scenario.terrain, scenario.limits.max_height_m
     ends = np.stack([scenario.start, scenario.destination])
     zones = add_margins(scenario.zones, ends, terrain, margins)
-    needs_depths = max_height is not None or any(zone.above_ground for zone in scenario.zones)
+    needs_depths = max_height is not None or any(zone.has_level_above_ground for zone in scenario.zones)
     # If unused, a small array of the right type.
     depths = -terrain.heights if terrain is not None and needs_depths else np.zeros((2, 2), dtype=np.float32)
     depths.setflags(write=False)

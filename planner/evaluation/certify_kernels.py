@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from aircraft.path_limits import downwind
+from aircraft.path_limits import downwind_vector
 from planner.evaluation.corners import (
     ARC_STEP,
     CORNER,
@@ -59,7 +59,7 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     """Return `TRACKED_PIECE` records for the legs of a path (w, 3), followed by those for its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
-    lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind(data.aircraft), data.tracking.across
+    lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind_vector(data.aircraft), data.tracking.across
     measure_legs(waypoints, legs)
     measure_corners(data, wind, waypoints, legs, corners)
     measure_lags(data.tracking, data.aircraft, wind, waypoints, legs, lags)
@@ -221,7 +221,7 @@ def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Float
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
-    wind = downwind(data.aircraft)
+    wind = downwind_vector(data.aircraft)
     measure_legs(waypoints, legs)
     measure_corners(data, wind, waypoints, legs, corners)
     for i in range(count - 1):

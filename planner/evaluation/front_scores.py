@@ -16,7 +16,7 @@ from world.arrays import Floats
 from world.frames import polymap
 from world.geometry import window_exposure
 from world.kernels import Record, compiled, inner
-from world.terrain import TILE, pixel_height
+from world.terrain import TILE_PIXELS, pixel_height
 
 _LENGTH_COLUMN = 0
 _EXPOSURE_COLUMN = 1
@@ -108,7 +108,10 @@ def _min_height(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: fl
             min_height = -math.inf if math.isnan(height) else height
         if k == count or min_height == -math.inf:
             return min_height
-        i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
+        i, j = (
+            min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1),
+            min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1),
+        )
         skip_fraction = (height - min_height) / (tiles[i, j] * horizontal_length + abs(dz) + 1e-9)
         skip_fraction = min(skip_fraction, data.slope_bounds.tile_side / (horizontal_length + 1e-9))
         k = min(count, k + max(1, int(skip_fraction * count)))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from aircraft.path_limits import arc_slope, downwind, slopes_along, wind_speed_at
+from aircraft.path_limits import arc_slope, downwind_vector, slopes_along, wind_speed_at
 from planner.evaluation.corners import Wind, courses_at, roll_length, settling_length, turn_length
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_clearance
 from world.arrays import Floats
@@ -174,7 +174,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
     return PrecomputedLimits(
         # No turn exceeds half a circle; -2 is below any rounded cosine.
         math.cos(data.max_turn) if data.max_turn < math.pi else -2.0,
-        downwind(data.aircraft),
+        downwind_vector(data.aircraft),
         math.tan(climb - data.angle_margin),
         math.tan(dive - data.angle_margin),
         slopes_by_aircraft,
@@ -237,7 +237,7 @@ def slope_limits(data: ProblemArrays, start: Floats, end: Floats) -> tuple[float
     dx, dy = end[0] - start[0], end[1] - start[1]
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / horizontal_length, dy / horizontal_length) if horizontal_length > 0.0 else (0.0, 1.0)
-    return _course_slope_limits(data, ux, uy, start[2], end[2], downwind(data.aircraft))
+    return _course_slope_limits(data, ux, uy, start[2], end[2], downwind_vector(data.aircraft))
 
 
 @inlined

@@ -36,9 +36,9 @@ from planner.evaluation.problem import (
 )
 from planner.evaluation.threat_index import Int32s, ThreatCells
 from world.arrays import Floats, Heights, Ints
-from world.geometry import CLOSEST
+from world.geometry import MIN_RANGE_M
 from world.kernels import Record, Records, compiled, inlined, inner
-from world.terrain import EDGE
+from world.terrain import EDGE_TOLERANCE
 
 # Number of points per leg (eq. 6).
 POINTS_PER_LEG = 6
@@ -154,7 +154,7 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
         top_right[b] = flat[k + right_step]
         low_left[b] = flat[k + down_step]
         low_right[b] = flat[k + down_step + right_step]
-    max_column, max_row = columns - 1 + EDGE, rows - 1 + EDGE
+    max_column, max_row = columns - 1 + EDGE_TOLERANCE, rows - 1 + EDGE_TOLERANCE
     for b in range(size):
         u, v = us[b], vs[b]
         top_height = top_left[b] * (1.0 - u) + top_right[b] * u
@@ -162,7 +162,9 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:
         ground[b] = top_height * (1.0 - v) + bottom_height * v
     for b in range(size):
         column, row = point_column[b], point_row[b]
-        is_on_raster = (column >= -EDGE) & (column <= max_column) & (row >= -EDGE) & (row <= max_row)
+        is_on_raster = (
+            (column >= -EDGE_TOLERANCE) & (column <= max_column) & (row >= -EDGE_TOLERANCE) & (row <= max_row)
+        )
         ground[b] = ground[b] if is_on_raster else math.nan
 
 
@@ -231,7 +233,7 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
             dx, dy = east[path] - sphere.east, north[path] - sphere.north
             dz = up[path] - sphere.up
             distance2 = dx * dx + dy * dy + dz * dz
-            closest2 = distance2 if distance2 > CLOSEST * CLOSEST else CLOSEST * CLOSEST
+            closest2 = distance2 if distance2 > MIN_RANGE_M * MIN_RANGE_M else MIN_RANGE_M * MIN_RANGE_M
             inverse4 = 1.0 / (closest2 * closest2)
             # Multiply, because a branch on the radius is unpredictable and a misprediction costs more.
             kill[path] += sphere.kill_scale4 * inverse4 * (1.0 if distance2 <= sphere.kill_radius2 else 0.0)

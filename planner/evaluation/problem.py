@@ -24,7 +24,7 @@ from world.errors import ScenarioError
 from world.frames import PolyMapRecord
 from world.kernels import Record, Records, inlined, inner
 from world.scenario import Scenario
-from world.terrain import TILE, Terrain, steepest_slopes
+from world.terrain import TILE_PIXELS, Terrain, steepest_slopes
 from world.threats import Threats
 
 # --- Arrays for compiled code ---
@@ -56,7 +56,7 @@ class SlopeBounds(NamedTuple):
     """Upper bounds on the slope of the ground, m per m.
 
     steepest: bound for the whole map.
-    tiles: bounds within `tile_side` m of each tile of `world.terrain.TILE` pixels a side.
+    tiles: bounds within `tile_side` m of each tile of `world.terrain.TILE_PIXELS` pixels a side.
     """
 
     steepest: float
@@ -464,7 +464,7 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
     shape = slopes.shape
     neighbourhood_max = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
     neighbourhood_max.setflags(write=False)
-    return SlopeBounds(max_slope, neighbourhood_max, TILE * terrain.spacing)
+    return SlopeBounds(max_slope, neighbourhood_max, TILE_PIXELS * terrain.spacing)
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:

@@ -16,7 +16,7 @@ from planner.evaluation.problem import RequiredClearance, SlopeBounds, clearance
 from world.arrays import Floats, Heights, Ints
 from world.frames import PolyMapRecord, polymap
 from world.kernels import Record, Records, inlined, inner
-from world.terrain import TILE, pixel_height
+from world.terrain import TILE_PIXELS, pixel_height
 
 # --- Height lag ---
 
@@ -144,7 +144,10 @@ def _take_sample(
     """
     ground = pixel_height(heights, column, row)
     excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH_M
-    i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
+    i, j = (
+        min(max(int(row) // TILE_PIXELS, 0), tiles.shape[0] - 1),
+        min(max(int(column) // TILE_PIXELS, 0), tiles.shape[1] - 1),
+    )
     # Fastest loss of height above ground, m per length of the line.
     max_fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * horizontal_length + abs(altitude_change) + 1e-9
     next_step, tile_step = (

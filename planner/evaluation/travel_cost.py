@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import Envelope
-from aircraft.path_limits import PerformanceTable, downwind, true_airspeed, wind_speed_at
+from aircraft.path_limits import PerformanceTable, downwind_vector, true_airspeed, wind_speed_at
 from world.arrays import Floats
 from world.by_reference import by_reference
 from world.kernels import compiled, inner
@@ -194,7 +194,7 @@ def _time_energy_cost(
     travel: TravelCost, table: PerformanceTable, dx: float, dy: float, dz: float, amsl: float
 ) -> tuple[float, bool]:
     """Return the cost of time and energy of a leg at one altitude, and True if the leg is flyable."""
-    conditions, (wx, wy) = _conditions_at_altitude(travel, table, amsl), downwind(table)
+    conditions, (wx, wy) = _conditions_at_altitude(travel, table, amsl), downwind_vector(table)
     time = leg_time(dx, dy, dz, conditions.wind * wx, conditions.wind * wy, conditions.airspeed)
     cost = travel.time * time.seconds
     if travel.energy != 0.0:
@@ -256,7 +256,7 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
     slopes[:], curvature[:] = 0.0, 0.0
     dx, dy, dz = finish[0] - start[0], finish[1] - start[1], finish[2] - start[2]
     length = max(1e-3, math.sqrt(dx * dx + dy * dy + dz * dz))
-    (wx, wy), step = downwind(table), (dx, dy, dz)
+    (wx, wy), step = downwind_vector(table), (dx, dy, dz)
     step_curvature = np.empty((3, 3))
     _add_step_model(
         curvature,

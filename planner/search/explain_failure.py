@@ -20,7 +20,7 @@ from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
 from planner.search.infeasibility_proof import closing_missiles, highest_level_flight
-from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
+from world.airspace.zone_kernels import ZoneRecords, edge_distance, height_outside_band, zone_records
 from world.arrays import Flags, Floats, Ints
 from world.kernels import compiled
 from world.scenario import Scenario
@@ -145,7 +145,7 @@ def _close_cells(
                     continue
                 for k in range(cells.shape[0]):
                     altitude = min_heights[i, j] + (max_heights[i, j] - min_heights[i, j]) * k / (cells.shape[0] - 1)
-                    is_within = is_inside and not outside_band(zone, altitude, ground[i, j]) > 0.0
+                    is_within = is_inside and not height_outside_band(zone, altitude, ground[i, j]) > 0.0
                     if cells[k, i, j] == _OPEN_CELL and is_within == zone.exclusion:
                         cells[k, i, j] = z
 
@@ -393,7 +393,7 @@ def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     for z, zone in enumerate(scenario.zones):
         is_inside = (
             edge_distance(records, z, east, north) <= 0.0
-            and not outside_band(records.zones[z], up, ground_height) > 0.0
+            and not height_outside_band(records.zones[z], up, ground_height) > 0.0
             for (east, north, up), ground_height in zip(points, ground, strict=True)
         )
         if any(is_inside) if zone.kind == "exclusion" else not all(is_inside):

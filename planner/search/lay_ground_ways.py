@@ -436,7 +436,7 @@ def _list_departures(
     next_point = (float(site.plan.waypoints[1, 0]), float(site.plan.waypoints[1, 1]))
     min_length = site.min_path_length(float(first_waypoint[2] - site.home[2]), False) + math.dist(end, next_point)
     for course, takeoff_end, first_leg_end in launches:
-        tailwind = site.scenario.wind.along(course, float(site.home[2]))[0]
+        tailwind = site.scenario.wind.components_on_course(course, float(site.home[2]))[0]
         for corners in candidate_chains(first_leg_end, course, end, next_course, site.turn_radius, laps):
             points = [home, first_leg_end, *corners, end]
             measures, takeoff_distance = (
@@ -526,7 +526,7 @@ def _find_finals(
 ) -> tuple[list[_Final], str]:
     """Return the clear and flyable finals on a course, shallowest first, and the reason if there are none."""
     field_altitude = float(point[2])
-    tailwind = site.scenario.wind.along(course, field_altitude)[0]
+    tailwind = site.scenario.wind.components_on_course(course, field_altitude)[0]
     max_slope = GLIDE_SLOPE_FRACTION * math.tan(
         site.limits.slopes(course, field_altitude, final_model.airspeed(tailwind, field_altitude))[1]
     )

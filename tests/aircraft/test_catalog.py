@@ -135,8 +135,8 @@ def test_bad_model_tables(folder: Path, text: str, message: str) -> None:
 
 
 def test_names_and_folders(tmp_path: Path, folder: Path) -> None:
-    assert find_aircraft("aerosonde").embedded
-    assert not find_aircraft(str(folder)).embedded
+    assert find_aircraft("aerosonde").is_embedded
+    assert not find_aircraft(str(folder)).is_embedded
     with pytest.raises(FlightError, match=r"nowhere\.toml: No such file"):
         find_aircraft(str(tmp_path / "nowhere"))
     (folder / "aerosonde.xml").unlink()

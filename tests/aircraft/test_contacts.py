@@ -9,8 +9,8 @@ from aircraft.contacts import (
     Gear,
     _center_of_gravity,
     _model_contacts,
-    contacts_of,
     default_contacts,
+    find_contacts,
     with_contacts,
 )
 from flight.dynamics.fdm import Fdm
@@ -89,7 +89,7 @@ def test_a_model_with_skids_of_its_own_stands_on_its_lowest_points_and_one_with_
 def test_an_aircraft_at_rest_stays_where_it_is(name: str, gear: Gear, slope: float) -> None:
     """On level ground, and on ground that is as high as a slope of 8 % makes it below the aircraft."""
     aircraft = load_aircraft(name)
-    stands = max(one.down for one in contacts_of(aircraft, gear) if one.stands)
+    stands = max(one.down for one in find_contacts(aircraft, gear) if one.stands)
     fdm = Fdm(aircraft, gear=gear)
     fdm.release((*START, 300.0 + stands), (0.0, 0.0, 0.5), (0.0, 0.0, 0.0), terrain_amsl=300.0)
     terrain = fdm.properties.setter("position/terrain-elevation-asl-ft")

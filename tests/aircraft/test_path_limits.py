@@ -122,7 +122,7 @@ def test_radius_is_for_the_highest_ground_speed_on_the_arc(
     radius = turn_radius_between(_limits(wind).performance(), course, course + turn, 500.0)
     courses = course + turn * np.linspace(0.0, 1.0, 2001)
     # The ground speed on each course, by the triangle of speeds.
-    east, north = wind.at(500.0)
+    east, north = wind.velocity_at(500.0)
     tail = east * np.sin(courses) + north * np.cos(courses)
     across = east * np.cos(courses) - north * np.sin(courses)
     fastest = (np.sqrt(25.0**2 - across**2) + tail).max()

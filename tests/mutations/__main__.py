@@ -23,7 +23,7 @@ from tests.mutations.covering import covering_tests, kernels_on, limits_at
 from tests.mutations.mutant import ROOT, Mutant
 from tests.mutations.workplace import Trial, Workplace
 from tests.soak import sources
-from world.files import write_whole
+from world.files import write_atomically
 
 TARGET = Path("runs") / "mutations.json"
 # Share of the mutants that may survive: some change nothing that anyone could see.
@@ -119,7 +119,7 @@ def _report(trials: list[Trial]) -> int:
 def _keep(trials: list[Trial]) -> None:
     TARGET.parent.mkdir(exist_ok=True)
     kept = {"sources": sources(), "trials": [_record(trial) for trial in trials]}
-    write_whole(TARGET, json.dumps(kept, indent=1) + "\n")
+    write_atomically(TARGET, json.dumps(kept, indent=1) + "\n")
 
 
 def _record(trial: Trial) -> dict[str, object]:

@@ -12,10 +12,10 @@ import pytest
 from logs.importers.open_log import open_log
 from world import address_space
 from world.address_space import (
-    LLVM_ROOM,
-    ROOM,
+    LLVM_MIN_FREE_BYTES,
+    MIN_FREE_BYTES,
     AddressSpaceError,
-    RoomFinder,
+    AddressSpaceGuard,
     has_room,
 )
 from world.raster import open_npz
@@ -44,12 +44,12 @@ def test_openblas_is_not_loaded_where_it_would_look_for_room_without_end() -> No
 
 def test_room_is_asked_for_by_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
-    monkeypatch.setattr(address_space, "has_room", lambda size: asked.append(size) or size < LLVM_ROOM)
-    finder = RoomFinder(LIMIT)
+    monkeypatch.setattr(address_space, "has_room", lambda size: asked.append(size) or size < LLVM_MIN_FREE_BYTES)
+    finder = AddressSpaceGuard(LIMIT)
     assert finder.find_spec("scipy.linalg") is None
     with pytest.raises(AddressSpaceError, match=r"leaves less than 192 MB to import llvmlite$"):
         finder.find_spec("llvmlite.binding")
-    assert asked == [ROOM, LLVM_ROOM]
+    assert asked == [MIN_FREE_BYTES, LLVM_MIN_FREE_BYTES]
 
 
 def test_room_is_what_can_be_mapped() -> None:

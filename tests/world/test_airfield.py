@@ -13,7 +13,7 @@ from world.airfield import LandingStrip, Launch
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, with_wind
 from world.scenario_file import parse_scenario
-from world.terrain import gridded_terrain
+from world.terrain import make_gridded_terrain
 from world.wind import Wind
 
 FIELD: dict[str, Any] = {
@@ -192,7 +192,7 @@ def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
 def test_where_the_ground_is_not_known(key: str) -> None:
     # A file with holes in the area is refused as a whole; ground from a log need not cover it.
     east, north = np.linspace(-3000.0, 0.0, 7), np.linspace(-2000.0, 2000.0, 5)
-    ground = gridded_terrain(np.full((5, 7), 100.0), east, north, source="west", sha256="", datum="mean sea level")
+    ground = make_gridded_terrain(np.full((5, 7), 100.0), east, north, source="west", sha256="", datum="mean sea level")
     spec = made_spec(threats=[], home={"place": "start"})
     assert from_spec(spec, "x", ground=ground).home is not None
     beyond = {key: {"east_m": 500.0, "north_m": 0.0}}

@@ -12,6 +12,7 @@ import pytest
 from world import file_locks
 from world.errors import MissionError, PlanflyError, ScenarioError
 from world.files import (
+    absolute_path,
     did_you_mean,
     lock_path,
     read_at_most,
@@ -19,9 +20,8 @@ from world.files import (
     read_toml,
     toml_table,
     utf8_text,
-    whole_path,
+    write_atomically,
     write_folder,
-    write_whole,
 )
 
 
@@ -84,8 +84,8 @@ def test_a_name_of_many_parts_takes_no_memory_by_its_square() -> None:
 def test_a_path_that_leads_nowhere_is_whole_anyhow(name: str, tmp_path: Path) -> None:
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     (tmp_path / "link").symlink_to(tmp_path / "there")
-    assert whole_path(tmp_path / name) == str(tmp_path / name)
-    assert whole_path(tmp_path / "link") == str(tmp_path / "there")
+    assert absolute_path(tmp_path / name) == str(tmp_path / name)
+    assert absolute_path(tmp_path / "link") == str(tmp_path / "there")
 
 
 def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:
@@ -148,16 +148,16 @@ def test_a_near_name_is_named_and_no_far_one(name: str, near: str) -> None:
 def test_text_and_bytes_replace_what_was_there(tmp_path: Path) -> None:
     file = tmp_path / "plan.json"
     file.write_text("old", encoding="utf-8")
-    write_whole(file, "höher\n")
+    write_atomically(file, "höher\n")
     assert file.read_bytes() == "höher\n".encode()
-    write_whole(file, b"\0\1")
+    write_atomically(file, b"\0\1")
     assert file.read_bytes() == b"\0\1"
     assert list(tmp_path.iterdir()) == [file]
 
 
 def test_a_result_has_the_permissions_of_any_new_file(tmp_path: Path) -> None:
     (tmp_path / "plain").write_text("", encoding="utf-8")
-    write_whole(tmp_path / "whole", "")
+    write_atomically(tmp_path / "whole", "")
     modes = [stat.S_IMODE((tmp_path / name).stat().st_mode) for name in ("plain", "whole")]
     assert modes[0] == modes[1]
 
@@ -171,7 +171,7 @@ def test_a_failed_write_leaves_what_was_there_and_nothing_else(tmp_path: Path, m
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(OSError, match="no space left"):
-        write_whole(file, "new")
+        write_atomically(file, "new")
     assert file.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [file]
 

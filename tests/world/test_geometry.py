@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from world.geometry import (
-    CLOSEST,
+    MIN_RANGE_M,
     leg_courses,
     leg_runs,
     leg_slopes,
@@ -136,7 +136,7 @@ def _brute(a: np.ndarray, b: np.ndarray, centre: np.ndarray, radius: float, scal
     fraction = (np.arange(200_000) + 0.5) / 200_000
     away = np.linalg.norm(a + fraction[:, None] * (b - a) - centre, axis=1)
     inside = away <= radius
-    return float(inside.mean()), float(np.where(inside, (scale / np.maximum(away, CLOSEST)) ** 4, 0.0).mean())
+    return float(inside.mean()), float(np.where(inside, (scale / np.maximum(away, MIN_RANGE_M)) ** 4, 0.0).mean())
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -191,6 +191,6 @@ def test_exposure_nearer_than_a_metre_stays_finite() -> None:
     a, b = np.array([-50.0, 0.0, 0.0]), np.array([50.0, 0.0, 0.0])
     share, mean = segment_exposure(a, b, np.zeros(3), 100.0, 1.0)
     assert share == 1.0
-    assert 0.0 < mean <= 1.0 / CLOSEST**4
+    assert 0.0 < mean <= 1.0 / MIN_RANGE_M**4
     assert segment_exposure(a, a, a, 100.0, 2.0) == (1.0, pytest.approx(16.0))
     assert segment_exposure(a, b, np.zeros(3) + 500.0, 100.0, 2.0) == (0.0, 0.0)

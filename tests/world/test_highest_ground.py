@@ -9,7 +9,7 @@ from scipy.interpolate import RegularGridInterpolator
 from world.arrays import Floats
 from world.frames import fit_polymap
 from world.highest_ground import highest_in_cells
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 
 def rough(spacing: float, turned: float, seed: int) -> tuple[Terrain, Floats, Floats]:
@@ -51,7 +51,7 @@ def test_it_is_the_highest_of_the_surface(spacing: float, cell: float, turned: f
 def test_a_crest_between_the_places_of_cells_is_as_high_as_it_is() -> None:
     """Pixels of 30 m, a crest of 60 m along one row of them, cells of 45 m that begin 17 m beside it."""
     line = np.arange(-300.0, 301.0, 30.0)
-    terrain = gridded_terrain(
+    terrain = make_gridded_terrain(
         np.where(line[:, None] == 0.0, 60.0, 0.0) + 0.0 * line, line, line, source="made", sha256="", datum=""
     )
     found = highest_in_cells(terrain, -100.0, -17.0 - 45.0, 45.0, 3, 4)
@@ -67,7 +67,7 @@ def test_a_single_pixel_of_a_fine_file_is_found() -> None:
     heights = np.zeros((line.size, line.size))
     heights[93, 107] = 80.0
     found = highest_in_cells(
-        gridded_terrain(heights, line, line, source="made", sha256="", datum=""), 0.0, 0.0, 20.0, 10, 10
+        make_gridded_terrain(heights, line, line, source="made", sha256="", datum=""), 0.0, 0.0, 20.0, 10, 10
     )
     assert found[4, 5] == 80.0
     assert np.count_nonzero(found) == 1
@@ -78,7 +78,7 @@ def test_a_cell_with_a_gap_in_its_data_is_not_known() -> None:
     heights = np.zeros((line.size, line.size))
     heights[7, 7] = np.nan
     found = highest_in_cells(
-        gridded_terrain(heights, line, line, source="made", sha256="", datum=""), -40.0, 0.0, 40.0, 4, 4
+        make_gridded_terrain(heights, line, line, source="made", sha256="", datum=""), -40.0, 0.0, 40.0, 4, 4
     )
     # Beyond the data, and about 70 m east, 70 m north: squares with that pixel end where the cells beside begin.
     assert np.isnan(found[:, 0]).all()

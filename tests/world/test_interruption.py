@@ -13,17 +13,17 @@ import pytest
 from world.interruption import (
     Interrupted,
     children_ignore_sigint,
+    delay_signals,
     interrupt,
-    remove_unfinished,
-    unfinished,
-    uninterrupted,
+    remove_at_end,
+    remove_temporary_paths,
 )
 
 
 def test_a_signal_waits_for_the_end_of_what_is_done_whole() -> None:
     done = []
-    with pytest.raises(Interrupted) as caught, uninterrupted():  # noqa: PT012
-        with uninterrupted():
+    with pytest.raises(Interrupted) as caught, delay_signals():  # noqa: PT012
+        with delay_signals():
             interrupt(signal.SIGTERM)
             done.append("inner")
         done.append("outer")
@@ -35,11 +35,11 @@ def test_a_signal_waits_for_the_end_of_what_is_done_whole() -> None:
 
 def test_what_is_unfinished_is_removed(tmp_path: Path) -> None:
     folder, file = tmp_path / "folder", tmp_path / "file"
-    with unfinished(folder), unfinished(file):
+    with remove_at_end(folder), remove_at_end(file):
         folder.mkdir()
         (folder / "inside").write_text("", encoding="utf-8")
         file.write_text("", encoding="utf-8")
-        remove_unfinished()
+        remove_temporary_paths()
         assert list(tmp_path.iterdir()) == []
         file.write_text("again", encoding="utf-8")
     assert list(tmp_path.iterdir()) == []
@@ -56,31 +56,31 @@ def test_what_others_still_write_in_is_removed_after_them(tmp_path: Path, monkey
 
     with monkeypatch.context() as writing:
         writing.setattr("world.interruption.shutil.rmtree", remove_too_soon)
-        with unfinished(folder):
+        with remove_at_end(folder):
             folder.mkdir()
-        assert not remove_unfinished()
+        assert not remove_temporary_paths()
         assert (folder / "late").exists()
-    assert remove_unfinished()
+    assert remove_temporary_paths()
     assert list(tmp_path.iterdir()) == []
 
 
 def test_what_is_gone_is_forgotten(tmp_path: Path) -> None:
     file = tmp_path / "file"
-    with unfinished(file):
+    with remove_at_end(file):
         file.write_text("half", encoding="utf-8")
     file.write_text("whole, and another's", encoding="utf-8")
-    assert remove_unfinished()
+    assert remove_temporary_paths()
     assert file.exists()
 
 
 PARENT = """
 import multiprocessing, sys, time
 from pathlib import Path
-from world.interruption import children_ignore_sigint, end_children, end_with_parent, unfinished
+from world.interruption import children_ignore_sigint, end_children, end_with_parent, remove_at_end
 
 def work(folder):
     end_with_parent()
-    with unfinished(Path(folder) / "half"):
+    with remove_at_end(Path(folder) / "half"):
         (Path(folder) / "half").write_text("")
         Path(folder, "begun").write_text("")
         time.sleep(600)

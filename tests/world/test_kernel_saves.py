@@ -42,7 +42,7 @@ class Tell(event.Listener):
 # Told of before planfly is, which waits then.
 event.register("numba:compile", Tell())
 from world import kernel_saves
-kernel_saves.PATIENCE = PATIENCE_S
+kernel_saves.LOCK_TIMEOUT_S = PATIENCE_S
 import kernels
 print(kernels.thrice(np.array([1.5])))
 """
@@ -69,7 +69,7 @@ def _hold(folder: Path) -> TextIO:
     """Lock the cache folder that the sources have within a folder, as a process does that is saving there."""
     kept = folder / "kept" / f"kernels-{sources_digest(ROOT)}"
     kept.mkdir(parents=True)
-    handle = (kept / kernel_saves.LOCK).open("w")
+    handle = (kept / kernel_saves.LOCK_NAME).open("w")
     fcntl.flock(handle, fcntl.LOCK_EX)
     return handle
 

@@ -10,7 +10,7 @@ from world.errors import ScenarioError
 from world.frames import GeoOrigin
 from world.map_positions import check_inside, make_threats, map_position
 from world.scenario_tables import PointTable, ThreatTable
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 ORIGIN = GeoOrigin(46.0, 8.0)
 BOUNDS = np.array([[-1000.0, 1000.0], [-2000.0, 2000.0]])
@@ -20,7 +20,7 @@ def ramp() -> Terrain:
     """Ground that is 200 m high at east 0 and rises by 0.1 m a metre to the east."""
     east, north = np.linspace(-3000.0, 3000.0, 7), np.linspace(-3000.0, 3000.0, 7)
     heights = np.tile(200.0 + 0.1 * east, (7, 1))
-    return gridded_terrain(heights, east, north, source="ramp", sha256="", datum="mean sea level")
+    return make_gridded_terrain(heights, east, north, source="ramp", sha256="", datum="mean sea level")
 
 
 def placed(ground: Terrain | None, **table: Any) -> list[float]:

@@ -18,7 +18,7 @@ from world.radio import (
     path_profile,
 )
 from world.scenario_tables import LinkTable
-from world.terrain import Peak, flat_terrain, peaks_terrain
+from world.terrain import Peak, make_flat_terrain, make_peaks_terrain
 
 GHZ = 1e9
 TABLE = {"frequency_mhz": 1000.0, "power_dbm": 20.0, "sensitivity_dbm": -100.0}
@@ -78,7 +78,7 @@ def test_two_edges_are_replaced_by_bullingtons_edge() -> None:
 
 def test_the_earth_bulges_between_the_antennas() -> None:
     """25 km from either end of 50 km it is 25000 * 25000 / (2 * 8494667) = 36.8 m."""
-    ground = flat_terrain(np.array([[-1000.0, 51_000.0], [-1000.0, 1000.0]]), 0.0, 0.0)
+    ground = make_flat_terrain(np.array([[-1000.0, 51_000.0], [-1000.0, 1000.0]]), 0.0, 0.0)
     profile = path_profile(ground, np.zeros(3), np.array([50_000.0, 0.0, 0.0]))
     assert pytest.approx(8_494_667.0, abs=1.0) == EFFECTIVE_EARTH_RADIUS_M
     assert profile.heights.max() == pytest.approx(36.8, abs=0.1)
@@ -88,7 +88,7 @@ def test_lines_of_sight_equal_a_march_along_the_ray() -> None:
     """10,000 rays over peaks, against a march in steps of a tenth of the terrain's spacing."""
     rng = np.random.default_rng(7)
     peaks = [Peak(float(e), float(n), float(h), 700.0) for e, n, h in rng.uniform((0, 0, 50), (9e3, 9e3, 400), (20, 3))]
-    ground = peaks_terrain(np.array([[0.0, 9000.0], [0.0, 9000.0]]), peaks, 500.0)
+    ground = make_peaks_terrain(np.array([[0.0, 9000.0], [0.0, 9000.0]]), peaks, 500.0)
     doubtful = differing = 0
     for _ in range(10_000):
         (east, north), (to_east, to_north) = rng.uniform(0.0, 9000.0, (2, 2))
@@ -125,14 +125,14 @@ def test_a_budget_adds_up() -> None:
     )
     link = make_link(table, "mine.toml", GeoOrigin(46.0, 8.0), None)
     assert link is not None
-    ground = flat_terrain(np.array([[-2000.0, 2000.0], [-2000.0, 2000.0]]), 0.0, 0.0)
+    ground = make_flat_terrain(np.array([[-2000.0, 2000.0], [-2000.0, 2000.0]]), 0.0, 0.0)
     found = link_points(link, ground, np.array([0.0, 0.0, 500.0]), np.array([[1000.0, 0.0, 500.0]]))
     assert found.margin[0] == pytest.approx(105.0 - 92.45, abs=0.01)
     assert found.distance[0] == pytest.approx(1000.0)
 
 
 def test_a_station_off_the_terrain_is_refused() -> None:
-    ground = flat_terrain(np.array([[-2000.0, 2000.0], [-2000.0, 2000.0]]), 0.0, 0.0)
+    ground = make_flat_terrain(np.array([[-2000.0, 2000.0], [-2000.0, 2000.0]]), 0.0, 0.0)
     table = LinkTable(**TABLE, east_m=90_000.0, north_m=0.0)
     with pytest.raises(ScenarioError, match=r"mine\.toml: link: east 90000 m, north 0 m: the elevation file"):
         make_link(table, "mine.toml", GeoOrigin(46.0, 8.0), ground)

@@ -18,10 +18,10 @@ from world.scenario import (
     embedded_scenarios,
     from_spec,
     load_scenario,
-    over_terrain,
     with_absolute_ends,
     with_flight,
     with_planner,
+    with_terrain,
     with_threats,
     with_wind,
     with_zones,
@@ -273,7 +273,7 @@ def test_ends_keep_their_heights_above_the_sea_whatever_is_below() -> None:
     ends = with_absolute_ends(before.to_json(), before.start, before.destination)
     assert [ends[key]["amsl_m"] for key in ("start", "destination")] == [before.start[2], before.destination[2]]
     assert not any("height_m" in ends[key] for key in ("start", "destination"))
-    after = over_terrain(before, "jacksboro")
+    after = with_terrain(before, "jacksboro")
     assert np.array_equal(after.start, before.start)
     assert np.array_equal(after.destination, before.destination)
     assert np.array_equal(after.bounds, before.bounds)

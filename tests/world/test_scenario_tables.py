@@ -56,7 +56,10 @@ def test_what_a_table_holds() -> None:
 FAULTS = {
     "no shape": (zone(""), "zones.0: polygon_m: give one of polygon_m, polygon_deg, rings_m, rings_deg, radius_m"),
     "two shapes": (zone(f"{SQUARE}\nradius_m = 5\neast_m = 0\nnorth_m = 0"), "zones.0: polygon_m: give one of"),
-    "a centre alone": (zone(f"{SQUARE}\neast_m = 0"), "zones.0: radius_m: missing; a centre is a cylinder's"),
+    "a centre alone": (
+        zone(f"{SQUARE}\neast_m = 0"),
+        "zones.0: radius_m: missing; a zone with a centre is a cylinder and needs a radius",
+    ),
     "a radius alone": (zone("radius_m = 50"), "zones.0: position: give east_m and north_m, or lat_deg and lon_deg"),
     "a kind": (zone(SQUARE, kind="prohibited"), 'zones.0.kind: "prohibited"'),
     "no name": (zone(SQUARE, name=""), "zones.0.name"),
@@ -224,7 +227,11 @@ CASES: dict[str, tuple[str, str, str]] = {
     "waypoints": ("", "[planner]\nwaypoints = 2", "planner.waypoints: 2: allowed 3..500"),
     "seed": ("", "[planner]\nseed = -1", "planner.seed: -1: allowed 0..9223372036854775807"),
     "returns": ("", '[returns]\nrequire = ["land"]', 'returns.require.0: "land": Input should be'),
-    "returns twice": ("", '[returns]\nrequire = ["glide", "glide"]', "require: glide, glide: name each one once"),
+    "returns twice": (
+        "",
+        '[returns]\nrequire = ["glide", "glide"]',
+        "require: glide, glide: name each requirement only once",
+    ),
     "goals": ("", "[planner.goals]\nlength_ratio = 0.5", "planner.goals.length_ratio: 0.5: allowed 1..100"),
     "airspeed": ("", "[flight]\nairspeed_mps = 14", "flight.airspeed_mps: 14: allowed 15..60"),
     "guidance": ("", '[flight]\nguidance = "luck"', 'flight.guidance: "luck"'),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
 from world.scenario import load_scenario
-from world.terrain import Peak, Terrain, flat_terrain, gridded_terrain, peaks_terrain
+from world.terrain import Peak, Terrain, make_flat_terrain, make_gridded_terrain, make_peaks_terrain
 
 EAST = np.linspace(-1000.0, 1400.0, 25)
 NORTH = np.linspace(-800.0, 700.0, 16)
@@ -18,7 +18,7 @@ BOUNDS = np.array([[-1000.0, 1400.0], [-800.0, 700.0]])
 
 
 def _rough() -> Terrain:
-    return gridded_terrain(ROUGH.astype(np.float64), EAST, NORTH, source="test", sha256="", datum="mean sea level")
+    return make_gridded_terrain(ROUGH.astype(np.float64), EAST, NORTH, source="test", sha256="", datum="mean sea level")
 
 
 ROUGH_TERRAIN = _rough()
@@ -87,7 +87,7 @@ def test_clearance_where_grid_and_path_line_up(a: list[float], b: list[float]) -
 def test_the_lowest_point_may_lie_inside_a_cell() -> None:
     # A saddle: along its diagonal the ground rises as u (1 - u) between two zero corners.
     heights = np.array([[0.0, 100.0], [100.0, 0.0]])
-    saddle = gridded_terrain(heights, np.array([0.0, 10.0]), np.array([0.0, 10.0]), source="", sha256="", datum="")
+    saddle = make_gridded_terrain(heights, np.array([0.0, 10.0]), np.array([0.0, 10.0]), source="", sha256="", datum="")
     low, at = saddle.clearance(np.array([0.0, 0.0, 60.0]), np.array([10.0, 10.0, 60.0]))
     assert (low, at) == (pytest.approx(10.0), pytest.approx(0.5))
 
@@ -98,18 +98,18 @@ def test_leaving_the_raster_or_its_data_is_nan() -> None:
     assert at == pytest.approx(0.7, abs=0.1)
     holed = ROUGH.copy()
     holed[8, 12] = np.nan
-    terrain = gridded_terrain(holed.astype(np.float64), EAST, NORTH, source="", sha256="", datum="")
+    terrain = make_gridded_terrain(holed.astype(np.float64), EAST, NORTH, source="", sha256="", datum="")
     assert math.isnan(terrain.clearance(np.array([-900.0, 0.0, 990.0]), np.array([900.0, 0.0, 990.0]))[0])
     assert not math.isnan(terrain.clearance(np.array([-900.0, 500.0, 990.0]), np.array([900.0, 500.0, 990.0]))[0])
 
 
 def test_flat_and_peaks() -> None:
-    flat = flat_terrain(BOUNDS, 123.0, 5000.0)
+    flat = make_flat_terrain(BOUNDS, 123.0, 5000.0)
     assert flat.height([-5999.0, 6399.0, 0.0], [0.0, 5699.0, 0.0]) == pytest.approx([123.0] * 3)
     low, _ = flat.clearance(np.array([0.0, 0.0, 200.0]), np.array([900.0, 0.0, 150.0]))
     assert low == pytest.approx(27.0)
     hills = np.array([[0.0, 0.0, 400.0, 300.0], [700.0, -200.0, 250.0, 160.0]])
-    peaks = peaks_terrain(BOUNDS, [Peak(*hill) for hill in hills.tolist()], 1000.0)
+    peaks = make_peaks_terrain(BOUNDS, [Peak(*hill) for hill in hills.tolist()], 1000.0)
     east, north = np.random.default_rng(1).uniform([[-1900.0], [-1700.0]], [[2300.0], [1600.0]], (2, 500))
     wanted = sum(h * np.exp(-((east - e) ** 2 + (north - n) ** 2) / (2 * s * s)) for e, n, h, s in hills)
     assert peaks.height(east, north) == pytest.approx(wanted, abs=0.002 * 400)

@@ -1,6 +1,6 @@
 """Read zones of an OpenAir file: one command a line, with classes, limits, polygons, arcs, circles and airways.
 
-The commands are those of WinPilot's original and of Naviter's version 2 (https://github.com/naviter/seeyou_file_formats):
+The commands follow WinPilot's original format and Naviter's version 2 (https://github.com/naviter/seeyou_file_formats):
 AC begins an airspace, AN names it, AY is its type, AL and AH are its limits, AA its times; DP, DA, DB, DC and DY draw
 it, with the variables that V sets.
 """
@@ -86,7 +86,7 @@ def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] 
         elif command in _COMMANDS:
             if block is None:
                 raise ScenarioError(
-                    f"{source}: line {number}: {command}: no airspace has begun: an AC is missing before it",
+                    f"{source}: line {number}: {command}: an airspace must begin with AC before it",
                     file=source,
                 )
             try:
@@ -117,6 +117,7 @@ def _clean_line(line: str) -> str:
 
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
+    """Return the location and entries of an airspace, as `openair_zones` yields them."""
     name = "".join(character for character in block.name if character.isprintable())[:80]
     location = f"line {block.line}" + (f" ({name})" if name else "")
     label = ", ".join(part for part in (block.airspace_class, block.kind) if part)
@@ -142,7 +143,9 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
 def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
     """Return the outline of an airway: its segments, extended by half its width to both sides and beyond its ends."""
     if len(block.airway) < 2 or not block.width > 0.0:
-        raise ScenarioError(f"{source}: DY: an airway has at least two points, and a width before (V W=)", file=source)
+        raise ScenarioError(
+            f"{source}: DY: an airway needs at least two points, and a width (V W=) before them", file=source
+        )
     origin = GeoOrigin(*block.airway[0])
     east, north = to_map(origin, [lat for lat, _ in block.airway], [lon for _, lon in block.airway])
     try:
@@ -167,6 +170,8 @@ def _read_times(block: _Block, text: str) -> None:
 
 
 def _limit_reader(key: str) -> Callable[[_Block, str], None]:
+    """Return the function for AL or AH, which sets the limit of this key in openAIP's form."""
+
     def read(block: _Block, text: str) -> None:
         if key in block.limits:
             raise ValueError("an airspace has one lower limit (AL) and one upper limit (AH)")
@@ -249,6 +254,8 @@ def _add_corners(corners: list[_Position], added_corners: list[_Position]) -> No
 
 
 def _text_reader(name: str) -> Callable[[_Block, str], None]:
+    """Return the function for AN or AY, which stores the text in this field of the airspace."""
+
     def read(block: _Block, text: str) -> None:
         setattr(block, name, text if name == "name" else text.upper())
 
@@ -296,7 +303,7 @@ def _parse_position(text: str) -> _Position:
     """Parse a latitude and longitude, degrees."""
     match = _COORDINATE.fullmatch(text.strip())
     if match is None:
-        raise ValueError("expected a place: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
+        raise ValueError("expected a position: 45:40:30N 014:18:20E, or 45:40.500N 014:18.333E")
     lat = _parse_degrees(match["lat"], 90.0) * (-1.0 if match["ns"].upper() == "S" else 1.0)
     lon = _parse_degrees(match["lon"], 180.0) * (-1.0 if match["ew"].upper() == "W" else 1.0)
     return lat, lon
@@ -314,7 +321,7 @@ def _parse_degrees(text: str, max_degrees: float) -> float:
 
 def _required_centre(block: _Block) -> _Position:
     if block.centre is None:
-        raise ValueError("no centre before it (V X=)")
+        raise ValueError("a centre (V X=) must come before it")
     return block.centre
 
 

@@ -115,7 +115,7 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return True if a limit is above ground, with its height, m; None if there is no valid limit."""
+    """Return whether a limit is above ground, and its height, m; None if there is no valid limit."""
     if not isinstance(limit, dict):
         return None
     try:
@@ -165,7 +165,7 @@ def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, floa
     if datum_name in _INEXACT_DATUMS:
         datum_text, max_below, max_above = _INEXACT_DATUMS[datum_name]
         if kind == "inclusion":
-            allowed = f"{datum_text} bounds no inclusion; give a height in metres above mean sea level"
+            allowed = f"{datum_text} cannot bound an inclusion; give a height in metres above mean sea level"
             raise ScenarioError.at(source, key, value, allowed, shown="")
         datum_name, height_m = "amsl", height_m + (max_above if limit_name == "ceiling" else -max_below)
     return {f"{limit_name}_{datum_name}_m": min(_HIGHEST_AMSL_M, max(_LOWEST_AMSL_M, height_m))}

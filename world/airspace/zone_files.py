@@ -223,7 +223,7 @@ def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
         ceilings.add(_ceiling_entry(polygon, [up for _, _, up in corners], source))
     if len(ceilings) > 1:
         raise ScenarioError(
-            f"{source}: its polygons have different heights: give each a placemark of its own", file=source
+            f"{source}: its polygons have different heights: give each polygon a placemark", file=source
         )
     key, height = ceilings.pop()
     states_ceiling = any(ceiling_key in entries for ceiling_key in ("ceiling_amsl_m", "ceiling_agl_m"))
@@ -241,7 +241,7 @@ def _ceiling_entry(polygon: _Element, heights: list[float], source: str) -> tupl
         message = f"{source}: altitudeMode {mode[:40]!r}: {allowed}"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode, allowed=allowed)
     if _kml_text(polygon, "extrude") not in ("1", "true"):
-        message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air contains no airspace"
+        message = f"{source}: altitudeMode {mode} without extrude: such a surface encloses no airspace"
         raise ScenarioError(message, file=source, field="altitudeMode", value=mode)
     if not heights or max(heights) - min(heights) > _LEVEL_TOLERANCE_M:
         raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)
@@ -393,8 +393,8 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
     if not file_zones.zones and not unrestricted_counts and not repaired_names[_EMPTY]:
         raise ScenarioError(f"{source}: contains no zone", file=source)
     for reason, count in unrestricted_counts.items():
-        subject = "1 zone keeps" if count == 1 else f"{count:,} zones keep"
-        file_zones.notes.append(f"{source}: {subject} nobody out: {reason}")
+        subject = "1 zone restricts" if count == 1 else f"{count:,} zones restrict"
+        file_zones.notes.append(f"{source}: {subject} no flight: {reason}")
     for note_text, names in repaired_names.items():
         if names:
             remainder = f", {len(names) - 5:,} more" if len(names) > 5 else ""

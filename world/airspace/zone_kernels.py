@@ -165,7 +165,7 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
 
 
 @compiled_inline
-def outside_band(zone: Record, up: float, ground: float) -> float:
+def height_outside_band(zone: Record, up: float, ground: float) -> float:
     """Return the height below a zone's floor or above its ceiling, m.
 
     Between floor and ceiling it is negative: minus the distance to the nearer one.

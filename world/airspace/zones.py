@@ -75,7 +75,7 @@ class Zone:
     ceiling: ZoneLevel | None = None
 
     @property
-    def above_ground(self) -> bool:
+    def has_level_above_ground(self) -> bool:
         """True if the floor or the ceiling is a height above ground."""
         return any(level is not None and level.datum == "ground" for level in (self.floor, self.ceiling))
 

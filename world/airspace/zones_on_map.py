@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
+from world.airspace.zone_kernels import ZoneRecords, edge_distance, height_outside_band, zone_records
 from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneLevel, is_hole, make_cylinder, make_polygon
 from world.arrays import Floats
 from world.errors import ScenarioError
@@ -61,11 +61,13 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     return list(zip(east.tolist(), north.tolist(), strict=True))
 
 
-def add_corners(count: int, shape: Polygon | Cylinder) -> int:
-    """Add the corners of a shape to a count and return it; raise ValueError above `MAX_MAP_CORNERS`.
+def add_corner_count(count: int, shape: Polygon | Cylinder) -> int:
+    """Return a count of corners plus the corners of a shape; raise ValueError above `MAX_MAP_CORNERS`.
 
-    >>> add_corners(4, make_polygon([[(0.0, 0.0), (90.0, 0.0), (90.0, 90.0)]])), add_corners(4, Cylinder(0.0, 0.0, 9.0))
-    (7, 4)
+    >>> add_corner_count(4, make_polygon([[(0.0, 0.0), (90.0, 0.0), (90.0, 90.0)]]))
+    7
+    >>> add_corner_count(4, Cylinder(0.0, 0.0, 9.0))
+    4
     """
     count += 0 if isinstance(shape, Cylinder) else sum(map(len, shape.rings))
     if count > MAX_MAP_CORNERS:
@@ -84,13 +86,13 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
         label = f"{source}: zones[{k}] ({table.name})"
         try:
             shape = _make_shape(table, origin)
-            corners = add_corners(corners, shape)
+            corners = add_corner_count(corners, shape)
         except ValueError as error:
             raise ScenarioError(f"{label}: {error}", file=source, field=f"zones[{k}]") from error
         floor = _make_level(table.floor_amsl_m, table.floor_agl_m)
         ceiling = _make_level(table.ceiling_amsl_m, table.ceiling_agl_m)
         zone = Zone(table.name, table.kind, shape, floor, ceiling)
-        if zone.above_ground and ground is None:
+        if zone.has_level_above_ground and ground is None:
             key = "floor_agl_m" if table.floor_agl_m is not None else "ceiling_agl_m"
             message = (
                 f"{label}: {key}: requires terrain; name an elevation file (--terrain), or give the height as amsl"
@@ -204,7 +206,7 @@ def _first_violated_by_records(
     ground_height = math.nan if ground is None else float(ground.height(east, north))
     for k, zone in enumerate(zones):
         distance = edge_distance(records, k, east, north)
-        height_outside = outside_band(records.zones[k], up, ground_height)
+        height_outside = height_outside_band(records.zones[k], up, ground_height)
         is_inside = distance <= 0.0 and not height_outside > 0.0
         if is_inside == (zone.kind == "exclusion"):
             return zone

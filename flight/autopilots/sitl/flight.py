@@ -12,7 +12,7 @@ from typing import Self
 import numpy as np
 
 from aircraft.catalog import Aircraft
-from aircraft.contacts import contacts_of
+from aircraft.contacts import find_contacts
 from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramFlight
 from flight.autopilots.sitl.conversation import Talk
@@ -208,7 +208,7 @@ class SitlFlight(ProgramFlight):
         ground_law = setup.autopilot.ground.control_law
         if self._ground_phases and ground_law is not None:
             gear = default_gear(self._ground_phases)
-            self._law = ground_law(self._ground_phases, aircraft, contacts_of(aircraft, gear))
+            self._law = ground_law(self._ground_phases, aircraft, find_contacts(aircraft, gear))
         super().__init__(setup, aircraft, load_gains(aircraft), gear=gear)
         self._release: Release | None = None
         self._rail = self._trim_on_rail(setup)

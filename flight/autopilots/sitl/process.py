@@ -17,7 +17,7 @@ from typing import Self
 from flight.autopilots.guard import Guard
 from world.errors import FlightError
 from world.files import temporary_folder
-from world.interruption import uninterrupted
+from world.interruption import delay_signals
 
 _OUTPUT_FILE = "output.txt"
 # Time for the program to end by itself, so that its log is complete, before it is killed, s.
@@ -168,7 +168,7 @@ class AutopilotProcess:
         logs = sorted(self._folder.glob(self._launch.logs))
         if not logs:
             return False
-        with uninterrupted():
+        with delay_signals():
             shutil.move(logs[-1], target)
         return True
 

@@ -265,7 +265,7 @@ class ColumnLog:
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
     def _clock_shift(self, name: str) -> float:
-        """Return the shift that best aligns a clock's column with its partner, s; 0 if no alignment is asked for."""
+        """Return the shift that best aligns a clock's column with its partner, s; 0 for a clock without `align`."""
         align = self.table.clocks[name].align
         if align is None:
             return 0.0

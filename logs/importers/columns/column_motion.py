@@ -9,8 +9,8 @@ import numpy as np
 from logs.importers.columns.column_checks import check_signs_and_units
 from logs.importers.columns.column_log import ColumnLog, Series
 from logs.importers.columns.quantities import FRACTION_UNITS
-from logs.importers.motion import MotionLog, Samples, first_on_ground, rising
-from logs.importers.wind_triangle import wind_of_triangle
+from logs.importers.motion import MotionLog, Samples, first_ground_position, sort_samples
+from logs.importers.wind_triangle import estimate_wind
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -20,7 +20,7 @@ _SEA_LEVEL_DENSITY = 1.225
 _GAS_CONSTANT = 287.05
 # Temperature of 0 degrees Celsius, K.
 _ZERO_CELSIUS_K = 273.15
-NONE = Samples(np.zeros(0), np.zeros((0, 1)))
+NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
 _SURFACES = ("elevator", "aileron", "rudder")
 
 
@@ -50,7 +50,7 @@ def read_column_motion(path: Path) -> MotionLog:
         program=log.table.program,
         vehicle="plane",
         inertial=_group(log, *inertial),
-        outputs=NONE,
+        outputs=NO_SAMPLES,
         attitude=_attitude(log),
         velocity=velocity,
         wind=air.wind,
@@ -59,7 +59,7 @@ def read_column_motion(path: Path) -> MotionLog:
         height=_group(log, "altitude"),
         battery=_group(log, "voltage", "current"),
         parameters=log.parameters(),
-        home=first_on_ground(place, velocity),
+        home=first_ground_position(place, velocity),
         program_kind="columns",
         controls=controls,
         angles=angles,
@@ -70,7 +70,7 @@ def read_column_motion(path: Path) -> MotionLog:
 def _group(log: ColumnLog, *quantities: str) -> Samples:
     """Return several quantities as one series, (n, k); no rows if the table lacks one of them."""
     if not log.has(*quantities):
-        return NONE
+        return NO_SAMPLES
     return join([log.series(quantity) for quantity in quantities])
 
 
@@ -84,9 +84,9 @@ def join(parts: list[Series]) -> Samples:
             continue
         known = np.isfinite(part.values)
         if known.sum() < 2:
-            return NONE
+            return NO_SAMPLES
         columns.append(np.interp(longest.time, part.time[known], part.values[known], left=math.nan, right=math.nan))
-    return rising(longest.time, np.column_stack(columns))
+    return sort_samples(longest.time, np.column_stack(columns))
 
 
 def _attitude(log: ColumnLog) -> Samples:
@@ -100,22 +100,22 @@ def read_velocity(log: ColumnLog) -> Samples:
         parts = [log.series("velocity_north"), log.series("velocity_east")]
     elif log.has("ground_speed", "ground_course"):
         speed, course = log.series("ground_speed"), log.series("ground_course")
-        heading = _at(course, speed.time, turning=True)
+        heading = _interpolate_at(course, speed.time, wraps=True)
         parts = [Series(speed.time, speed.values * function(heading)) for function in (np.cos, np.sin)]
     else:
-        return NONE
+        return NO_SAMPLES
     if log.has("velocity_down"):
         return join([*parts, log.series("velocity_down")])
     if not log.has("altitude"):
-        return NONE
+        return NO_SAMPLES
     altitude = join([log.series("altitude")])
     return join([*parts, Series(altitude.time, -np.gradient(altitude.values[:, 0], altitude.time))])
 
 
-def _at(series: Series, time: Floats, *, turning: bool = False) -> Floats:
-    """Interpolate a series; turning: true for an angle that wraps."""
+def _interpolate_at(series: Series, time: Floats, *, wraps: bool = False) -> Floats:
+    """Interpolate a series at these times.  wraps: True for an angle that wraps."""
     known = np.isfinite(series.values)
-    values = np.unwrap(series.values[known]) if turning else series.values[known]
+    values = np.unwrap(series.values[known]) if wraps else series.values[known]
     return np.asarray(np.interp(time, series.time[known], values))
 
 
@@ -124,7 +124,7 @@ class AirData:
     """Airspeed and wind of a log; no rows for what it lacks.
 
     airspeed: (n, 1) indicated.  true_airspeed: (n, 1).
-    ratio: (n, 1) of true to indicated airspeed; no rows if the standard atmosphere gives it.
+    ratio: (n, 1) ratio of true to indicated airspeed; no rows if it is taken from the standard atmosphere.
     wind: (n, 2) north, east, in the direction of the air's motion.  wind_source: for people.
     """
 
@@ -141,7 +141,7 @@ def read_air(log: ColumnLog) -> AirData:
     The ratio of true to indicated airspeed comes from static pressure and temperature if the table has both.  A log
     without wind gets the wind of the triangle of ground velocity, heading and airspeed.
     """
-    ratio = NONE
+    ratio = NO_SAMPLES
     if log.has("static_pressure", "temperature"):
         pressure = _group(log, "static_pressure", "temperature")
         density = pressure.values[:, 0] / (_GAS_CONSTANT * (pressure.values[:, 1] + _ZERO_CELSIUS_K))
@@ -155,7 +155,7 @@ def read_air(log: ColumnLog) -> AirData:
             true = Samples(airspeed.time, airspeed.values * factor)
     wind, source = _logged_wind(log), "wind of the table"
     if not len(wind.time):
-        wind, source = wind_of_triangle(read_velocity(log), _attitude(log), true), "the triangle of velocities"
+        wind, source = estimate_wind(read_velocity(log), _attitude(log), true), "the triangle of velocities"
     return AirData(airspeed, true, ratio, wind, source)
 
 
@@ -164,13 +164,13 @@ def _logged_wind(log: ColumnLog) -> Samples:
         return join([log.series("wind_north"), log.series("wind_east")])
     if log.has("wind_speed", "wind_direction"):
         speed, direction = log.series("wind_speed"), log.series("wind_direction")
-        origin = _at(direction, speed.time, turning=True)
+        origin = _interpolate_at(direction, speed.time, wraps=True)
         return join([Series(speed.time, -speed.values * function(origin)) for function in (np.cos, np.sin)])
-    return NONE
+    return NO_SAMPLES
 
 
 def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
-    """Return the ratio of true to indicated airspeed at the given times, by default of the standard atmosphere."""
+    """Return the ratio of true to indicated airspeed at these times; without rows the standard atmosphere's ratio."""
     if len(ratio.time):
         return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
     amsl = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
@@ -189,7 +189,7 @@ def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
     aileron = _surface(log, "aileron", ("elevon_left", "elevon_right") if halves else ("aileron_left", "aileron_right"))
     rudder = _surface(log, "rudder", ())
     if elevator is None or aileron is None or not log.has("throttle"):
-        return NONE, (False, False, False), halves
+        return NO_SAMPLES, (False, False, False), halves
     (elevator_series, elevator_unit), (aileron_series, aileron_unit) = elevator, aileron
     rudder_series, rudder_unit = rudder or (Series(elevator_series.time, 0.0 * elevator_series.values), "rad")
     negated = Series(elevator_series.time, -elevator_series.values), Series(rudder_series.time, -rudder_series.values)
@@ -211,4 +211,4 @@ def _surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series
         )
     left, right = (log.series(half) for half in halves)
     sign = -1.0 if name == "aileron" else 1.0
-    return Series(left.time, 0.5 * (left.values + sign * _at(right, left.time))), log.unit(halves[0])
+    return Series(left.time, 0.5 * (left.values + sign * _interpolate_at(right, left.time))), log.unit(halves[0])

@@ -22,7 +22,7 @@ def is_table(path: Path) -> bool:
 
 
 def find_table(path: Path) -> Path:
-    """Return the table of columns of a data file: its own or that of its folder.  Raises LogError without one."""
+    """Return the table of columns of a data file, or of its folder.  Raises LogError if there is neither."""
     choices = (path.with_name(f"{path.stem}{TABLE_SUFFIX}"), path.with_name(FOLDER_TABLE))
     for choice in choices:
         if choice.is_file():

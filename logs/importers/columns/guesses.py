@@ -178,6 +178,8 @@ class _Clock:
 
 @dataclass(frozen=True, slots=True)
 class _Guess:
+    """Guessed entry of the table.  reason: remark for the person who checks it."""
+
     quantity: str
     column: str
     clock: _Clock
@@ -196,7 +198,7 @@ def guess_table(paths: Sequence[Path], target: Path) -> str:
     times = [clock for file, data in files.items() for clock in _times(data, file)]
     clocks: list[_Clock] = []
     for clock in sorted(times, key=lambda clock: -clock.length):
-        # Of two columns of times in a group, the one that covers the times of the longest group.
+        # Of several columns of times in a group, use the one with the most time in common with the longest group.
         rivals = [
             other
             for other in times
@@ -223,6 +225,7 @@ def _relative(path: Path, target: Path) -> str:
 
 
 def _plain(name: str) -> str:
+    """Return a name in lower case without other characters than letters and digits."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
@@ -357,13 +360,13 @@ def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict
 def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
     """Yield the quantities that were not found, as remarks."""
     found = {guess.quantity for guess in guesses}
-    instead = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
+    substitutes = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
         "elevator": "elevon_left",
         "aileron": "aileron_left" if "aileron_left" in found else "elevon_left",
     }
     yield ""
     for purpose, quantities in _NEEDED.items():
-        missing = [name for name in quantities if name not in found and instead.get(name) not in found]
+        missing = [name for name in quantities if name not in found and substitutes.get(name) not in found]
         if missing:
             yield f"# Not found, and needed by planfly {purpose}: {', '.join(missing)}"
     settled = found.union(*_NEEDED.values(), QUATERNION if found.issuperset(ANGLES) else ())

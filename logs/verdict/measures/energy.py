@@ -41,7 +41,7 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
 
 def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
     """Return the path angle relative to the air on a leg, in the mean wind at an altitude (m AMSL), rad."""
-    tailwind, crosswind = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), up)
+    tailwind, crosswind = requirements.setup.scenario.wind.components_on_course(float(requirements.courses[leg]), up)
     slope, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):
         ground_track_speed = ground_speed(speed * math.cos(angle), tailwind, crosswind)

@@ -13,7 +13,7 @@ from aircraft.path_limits import (
     PerformanceTable,
     aircraft_slopes,
     arc_slope,
-    downwind,
+    downwind_vector,
     fly_over_run,
     ground_speed_on,
     roll_reversal_length,
@@ -205,7 +205,7 @@ def _reversal_lengths(
             course_east, course_north = math.sin(courses[leg]), math.cos(courses[leg])
             min_altitude = float(min(up[leg], up[leg + 1]))
             lengths[leg] = roll_reversal_length(
-                table, course_east, course_north, min_altitude, radius[leg], radius[leg + 1], *downwind(table)
+                table, course_east, course_north, min_altitude, radius[leg], radius[leg + 1], *downwind_vector(table)
             )
     return lengths
 
@@ -539,7 +539,7 @@ def _blend_lengths(setup: FlightSetup, route: Route, points: Floats, runs: Float
     """
     slopes = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend = np.zeros(len(points))
-    speed = float(route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
+    speed = float(route.airspeed.max()) + setup.scenario.wind.max_speed_at(points[:, 2])
     for i in range(1, len(points) - 1):
         slope_changes = [abs(slopes[i] - slopes[i - 1])]
         turn = abs(float(turns.turns[i]))

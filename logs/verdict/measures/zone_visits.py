@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from logs.verdict.measures.path_moves import BLOCK_MOVES, move_blocks, move_point
-from world.airspace.zone_kernels import ZoneRecords, box_distance, distance_to_edge, nearest_edge, outside_band
+from world.airspace.zone_kernels import ZoneRecords, box_distance, distance_to_edge, height_outside_band, nearest_edge
 from world.arrays import Heights
 from world.frames import POLYMAP, PolyMapRecord
 from world.kernels import Record, Records, compiled, inlined, inner, read_only, record_dtype
@@ -56,7 +56,7 @@ def distances_outside_zone(
     ground = 0.0
     if zone.floor_above_ground or zone.ceiling_above_ground:
         ground = ground_height(heights, to_pixel, east, north)
-    return outline_distance, outside_band(zone, up, ground), edge
+    return outline_distance, height_outside_band(zone, up, ground), edge
 
 
 @inlined

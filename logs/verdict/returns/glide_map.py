@@ -85,8 +85,8 @@ def glide_map(
     spheres, radii: centers (m, 3) and radii (m,) of kill spheres, m.
     map_margin: margin of the map around the positions, m.
 
-    >>> from world.terrain import flat_terrain
-    >>> ground = flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), 100.0, 0.0)
+    >>> from world.terrain import make_flat_terrain
+    >>> ground = make_flat_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), 100.0, 0.0)
     >>> made = glide_map(ground, np.zeros((1, 2)), 30.0, np.array([[0.0, 0.0, 100.0]]), np.array([500.0]))
     >>> row, column = made.cell_at(0.0, 0.0)
     >>> float(made.floor[row, column]), bool(made.sphere_tops[row, column] > 590.0), made.cell

@@ -15,7 +15,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from aircraft.catalog import Aircraft, find_again
+from aircraft.catalog import Aircraft, find_logged_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -391,7 +391,7 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         source = setup.mission.source
         message = f"{source}: home: not stated, so there is nowhere to return to"
         raise MissionError(message, file=source, field="home")
-    aircraft: Aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
+    aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     setup_parameters = setup.autopilot.model.parameters
     parameters = (
         setup_parameters if isinstance(setup_parameters, ArduPilotParameters) else ArduPilotParameters.load(aircraft)

@@ -182,7 +182,7 @@ def _ground_speeds(setup: FlightSetup) -> Floats:
     route, speeds = setup.route, []
     courses = leg_courses(route.waypoints)
     for leg, speed in enumerate(route.airspeed.tolist()):
-        wind = setup.scenario.wind.along(float(courses[leg]), float(route.waypoints[leg, 2]))
+        wind = setup.scenario.wind.components_on_course(float(courses[leg]), float(route.waypoints[leg, 2]))
         speed_over_ground = ground_speed(speed, *wind)
         speeds.append(speed_over_ground if speed_over_ground > 0.0 else speed)
     return np.array(speeds)

@@ -382,9 +382,8 @@ def approach_findings(
     if start_altitude <= point_altitude:
         reason = f"the glide begins {point_altitude - start_altitude:.0f} m below the landing point"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]
-    glide = setup.autopilot.ground.glide(
-        start_altitude - point_altitude, length, setup.scenario.wind.along(course, point_altitude)[0], point_altitude
-    )
+    tailwind, _ = setup.scenario.wind.components_on_course(course, point_altitude)
+    glide = setup.autopilot.ground.glide(start_altitude - point_altitude, length, tailwind, point_altitude)
     flare = (length - glide.flare_distance, point_altitude + glide.flare_height)
     path = straight_path(
         glide_start,

@@ -205,7 +205,7 @@ def _find_landing(
         or glide_start[2] <= ground_altitude
     ):
         return None
-    wind = setup.scenario.wind.along(course, ground_altitude)[0]
+    wind = setup.scenario.wind.components_on_course(course, ground_altitude)[0]
     point = np.array([landing_point[0], landing_point[1], ground_altitude])
     return _Landing(
         glide=setup.autopilot.ground.glide(float(glide_start[2]) - ground_altitude, leg_length, wind, ground_altitude),

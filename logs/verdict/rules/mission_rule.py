@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from aircraft.catalog import find_again
+from aircraft.catalog import find_logged_aircraft
 from flight.autopilots.parts import FeasibilityLimits, MissionParts
 from flight.mission.commands import PASSED_OVER, Treatment, support_of
 from flight.mission.fences import fence_problem
@@ -263,7 +263,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
     aircraft = None
     # The aircraft of a log may not be on this machine.
     with suppress(FlightError):
-        aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
+        aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     return MissionParts(
         returns=C.NAV_RETURN_TO_LAUNCH in commands or returns_after_last_item(setup),
         has_return_path=C.DO_RETURN_PATH_START in commands,
@@ -278,7 +278,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
             if item.command == C.DO_CHANGE_SPEED and item.params[0] == 0.0 and min(item.params[1:3]) > 0.0
         ),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
-        wind=setup.scenario.wind.strongest(setup.route.waypoints[:, 2]),
+        wind=setup.scenario.wind.max_speed_at(setup.route.waypoints[:, 2]),
         commands=frozenset(commands),
         aircraft=aircraft,
     )

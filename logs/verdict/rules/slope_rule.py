@@ -179,7 +179,7 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     if limit <= 0.0:
         return f"{condition} the aircraft cannot fly steadily on this course"
     wind = requirements.setup.scenario.wind
-    tailwind, crosswind = wind.along(float(requirements.courses[leg]), altitude)
+    tailwind, crosswind = wind.components_on_course(float(requirements.courses[leg]), altitude)
     if math.hypot(tailwind, crosswind) < CALM_WIND_MPS:
         return f"{condition} the aircraft can fly at most {math.degrees(limit):.1f}° in calm air"
     calm_limit = requirements.setup.envelope.slope_limits(speed, altitude)[0 if requirements.slopes[leg] >= 0.0 else 1]

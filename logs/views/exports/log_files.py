@@ -13,7 +13,7 @@ from flight.simulation.track import PITCH, ROLL, THROTTLE, YAW
 from logs.recording.reader import FlightLog
 from logs.recording.state_channel import FIELDS
 from world.arrays import Floats
-from world.extras import need_extra
+from world.extras import require_extra
 from world.frames import to_geo
 
 Columns = NDArray[Any]
@@ -70,7 +70,7 @@ def parquet_bytes(log: FlightLog) -> bytes:
     >>> parquet_bytes(example_log())[:4]
     b'PAR1'
     """
-    need_extra("tables", ".parquet needs")
+    require_extra("tables", ".parquet needs")
     import pyarrow as pa
     from pyarrow import parquet
 

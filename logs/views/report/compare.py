@@ -37,7 +37,7 @@ from logs.views.report.page import (
 from logs.views.report.text import NOTHING, number, verdict_badge
 from logs.views.scene import SceneView, script_json
 from world.arrays import Floats
-from world.files import write_whole
+from world.files import write_atomically
 from world.geometry import path_length
 from world.html_table import html_table
 
@@ -315,7 +315,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     files["compare.html"] = page.encode("utf-8")
     out_dir.mkdir(parents=True, exist_ok=True)
     for name, data in files.items():
-        write_whole(out_dir / name, data)
+        write_atomically(out_dir / name, data)
     return [out_dir / name for name in files]
 
 

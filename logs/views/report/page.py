@@ -40,7 +40,7 @@ from logs.views.report.text import (
     verdict_badge,
 )
 from logs.views.scene import script_json
-from world.files import write_whole
+from world.files import write_atomically
 
 if TYPE_CHECKING:
     from logs.recording.reader import LogEvent
@@ -255,7 +255,7 @@ def write_report(
     out_dir.mkdir(parents=True, exist_ok=True)
     files = {**pictures, "report.html": page.encode("utf-8")}
     for name, data in files.items():
-        write_whole(out_dir / name, data)
+        write_atomically(out_dir / name, data)
     return [out_dir / name for name in files]
 
 

@@ -17,7 +17,7 @@ from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
-from world.scenario import geographic
+from world.scenario import lat_lon_of_points
 
 if TYPE_CHECKING:
     from logs.recording.reader import LogEvent
@@ -159,7 +159,7 @@ def scenario_facts(setup: FlightSetup) -> Facts:
             ("Heights allowed", f"{floor_text}up to {number(scenario.ceiling)} m AMSL"),
         ]
     for name, point in (("Start", scenario.start), ("Destination", scenario.destination)):
-        lat, lon = geographic(scenario, point)
+        lat, lon = lat_lon_of_points(scenario, point)
         facts.append((name, f"{_position_text(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
     if terrain is None:
         facts.append(("Terrain", "none was given, so the ground is not judged"))

@@ -16,7 +16,7 @@ from tests.mission_lines import ORIGIN, setup_of, wp
 from world.airfield import LandingStrip, Launch
 from world.frames import to_geo
 from world.scenario import Scenario
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 from world.wind import Wind
 
 # To the north from home, at 100 m AMSL like all ground here, and landed on course 090.
@@ -55,7 +55,7 @@ def sloped(east: float, north: float) -> Terrain:
     """Ground that rises by so much to the east and to the north, m per m, from 100 m at the landing point."""
     axis = np.arange(-6000.0, 6001.0, 50.0)
     heights = 100.0 + east * (axis[None, :] - 2500.0) + north * (axis[:, None] - 2000.0)
-    return gridded_terrain(heights, axis, axis, source="slope", sha256="", datum="mean sea level")
+    return make_gridded_terrain(heights, axis, axis, source="slope", sha256="", datum="mean sea level")
 
 
 def test_a_mission_in_the_air_has_none() -> None:
@@ -152,7 +152,7 @@ def hill(north: float, top: float) -> Terrain:
     axis = np.arange(-6000.0, 6001.0, 50.0)
     heights = np.full((axis.size, axis.size), 100.0)
     heights[np.ix_(np.abs(axis - north) < 60.0, np.abs(axis) < 60.0)] = top
-    return gridded_terrain(heights, axis, axis, source="hill", sha256="", datum="mean sea level")
+    return make_gridded_terrain(heights, axis, axis, source="hill", sha256="", datum="mean sea level")
 
 
 @pytest.mark.parametrize(("north", "top", "told"), [(200.0, 179.0, False), (200.0, 181.0, True), (450.0, 181.0, False)])

@@ -150,7 +150,7 @@ def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraf
     _within(track, (0.10, 0.6), (0.10, 0.4))
     velocity = np.gradient(track.position, track.time, axis=0)[5:-5]
     assert velocity == pytest.approx(track.velocity[5:-5], abs=0.02)
-    east, north = setup.scenario.wind.at(500.0)
+    east, north = setup.scenario.wind.velocity_at(500.0)
     assert track.wind == pytest.approx(np.tile([east, north, 0.0], (len(track), 1)), abs=5e-4)
     # Ground velocity less wind is what the air sees: its size the airspeed, its direction the nose's but for sideslip.
     # Each axis is kept to 1 mm/s.

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logs.importers.dataflash_frames import PIECE, MappedFile, index_dataflash, pieces
+from logs.importers.dataflash_frames import PIECE_BYTES, MappedFile, index_dataflash, piece_ends
 from tests.logs.importers.written_logs import dataflash
 
 
@@ -12,14 +12,14 @@ def test_what_was_let_go_of_is_read_anew(tmp_path: Path) -> None:
     path.write_bytes(wanted.tobytes())
     file = MappedFile(path)
     assert np.array_equal(file.data, wanted)
-    file.let_go()
+    file.release_memory()
     assert np.array_equal(file.data, wanted)
 
 
 def test_each_piece_is_let_go_of() -> None:
     calls: list[int] = []
-    ends = list(pieces(2 * PIECE + 5, lambda: calls.append(1)))
-    assert ends == [PIECE, 2 * PIECE, 2 * PIECE + 5]
+    ends = list(piece_ends(2 * PIECE_BYTES + 5, lambda: calls.append(1)))
+    assert ends == [PIECE_BYTES, 2 * PIECE_BYTES, 2 * PIECE_BYTES + 5]
     assert len(calls) == 3
 
 

@@ -6,18 +6,27 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Mission, MissionItem
-from logs.importers.clean_places import DEGREE
+from logs.importers.clean_positions import DEGREE_LENGTH_M
 from logs.importers.imported_flight import (
-    FLYING,
+    MIN_FLYING_SPEED_MPS,
     choose_part,
-    flight_parts,
-    flown_spans,
+    find_flight_parts,
+    find_flight_spans,
     make_flight,
+    make_track,
     mean_wind,
-    track_of_flight,
     with_flown_heights,
 )
-from logs.importers.raw_log import BEFORE, LEG, SPEED, LoggedMission, LogSeries, ModeChange, RawLog, example_raw_log
+from logs.importers.raw_log import (
+    EXAMPLE_LEAD_S,
+    EXAMPLE_LEG_M,
+    EXAMPLE_SPEED_MPS,
+    LoggedMission,
+    LogSeries,
+    ModeChange,
+    RawLog,
+    example_raw_log,
+)
 from world.errors import LogError
 from world.frames import GeoOrigin
 
@@ -27,13 +36,13 @@ MISSION = example_raw_log().missions[0].mission
 def spans_at(speeds: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Spans of a log that goes north at these speeds (m/s) for these times (s)."""
     speed = np.concatenate([np.full(int(seconds * 5), value) for value, seconds in speeds])
-    lat = 46.0 + np.cumsum(speed * 0.2) / DEGREE
-    return flown_spans(np.arange(lat.size) * 0.2, lat, np.full(lat.size, 8.0))
+    lat = 46.0 + np.cumsum(speed * 0.2) / DEGREE_LENGTH_M
+    return find_flight_spans(np.arange(lat.size) * 0.2, lat, np.full(lat.size, 8.0))
 
 
 def test_slower_than_flying_is_no_flight() -> None:
-    assert spans_at([(FLYING - 0.1, 100.0)]) == []
-    assert len(spans_at([(FLYING + 0.1, 100.0)])) == 1
+    assert spans_at([(MIN_FLYING_SPEED_MPS - 0.1, 100.0)]) == []
+    assert len(spans_at([(MIN_FLYING_SPEED_MPS + 0.1, 100.0)])) == 1
 
 
 def test_a_short_dash_is_no_flight() -> None:
@@ -54,12 +63,12 @@ def test_stretches_are_those_in_auto() -> None:
         ModeChange(50.0, "FBWA", False),
         ModeChange(60.0, "AUTO", True),
     ]
-    (part,) = flight_parts([(10.0, 100.0)], modes, [LoggedMission(1.0, MISSION, "CMD")], 200.0)
+    (part,) = find_flight_parts([(10.0, 100.0)], modes, [LoggedMission(1.0, MISSION, "CMD")], 200.0)
     assert [(one.start, one.end, one.ended, one.next_mode) for one in part.stretches] == [
         (20.0, 50.0, "mode", "FBWA"),
         (60.0, 100.0, "landed", ""),
     ]
-    (cut,) = flight_parts([(10.0, 100.0)], modes, [], 101.0)
+    (cut,) = find_flight_parts([(10.0, 100.0)], modes, [], 101.0)
     assert cut.stretches[-1].ended == "log"
     assert (part.mission, cut.mission) == (0, -1)
 
@@ -67,18 +76,18 @@ def test_stretches_are_those_in_auto() -> None:
 def test_a_flight_with_two_missions_is_two_parts_and_the_longer_is_chosen() -> None:
     modes = [ModeChange(0.0, "AUTO", True), ModeChange(40.0, "LOITER", False), ModeChange(50.0, "AUTO", True)]
     missions = [LoggedMission(0.0, MISSION, "CMD"), LoggedMission(45.0, MISSION, "CMD")]
-    parts = flight_parts([(0.0, 200.0)], modes, missions, 300.0)
+    parts = find_flight_parts([(0.0, 200.0)], modes, missions, 300.0)
     assert [(part.mission, part.along_mission) for part in parts] == [(0, 40.0), (1, 150.0)]
     assert choose_part(parts) == 1
 
 
 def test_without_modes_all_of_a_flight_counts() -> None:
-    (part,) = flight_parts([(5.0, 90.0)], [], [LoggedMission(0.0, MISSION, "route")], 91.0)
+    (part,) = find_flight_parts([(5.0, 90.0)], [], [LoggedMission(0.0, MISSION, "route")], 91.0)
     assert [(one.start, one.end, one.mode, one.ended) for one in part.stretches] == [(5.0, 90.0, "", "log")]
 
 
 def test_a_flight_without_auto_is_shown_and_not_judged() -> None:
-    (part,) = flight_parts([(5.0, 90.0)], [ModeChange(0.0, "FBWA", False)], [], 91.0)
+    (part,) = find_flight_parts([(5.0, 90.0)], [ModeChange(0.0, "FBWA", False)], [], 91.0)
     assert part.stretches == ()
 
 
@@ -202,14 +211,16 @@ PLACES = {
 def test_the_flight_is_where_its_formula_has_it(place: str) -> None:
     lat, lon, up = PLACES[place]
     flight = make_flight(example_raw_log(lat, lon, up))
-    track = track_of_flight(flight, GeoOrigin(lat, lon))
-    run = SPEED * (track.time - 20.0 - BEFORE)
-    wanted = np.column_stack([np.maximum(run - LEG, 0.0), np.minimum(run, LEG), np.full(run.size, up)])
+    track = make_track(flight, GeoOrigin(lat, lon))
+    run = EXAMPLE_SPEED_MPS * (track.time - 20.0 - EXAMPLE_LEAD_S)
+    wanted = np.column_stack(
+        [np.maximum(run - EXAMPLE_LEG_M, 0.0), np.minimum(run, EXAMPLE_LEG_M), np.full(run.size, up)]
+    )
     assert np.abs(track.position - wanted).max() < 1e-3
 
 
 def test_what_the_log_does_not_hold_is_no_number() -> None:
-    track = track_of_flight(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
+    track = make_track(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
     for name in ("rates", "commands", "load_factor", "current", "energy"):
         assert np.isnan(getattr(track, name)).all()
     assert (track.controls[:, 3] == np.float32(0.6)).all()
@@ -219,5 +230,5 @@ def test_velocities_that_are_missing_are_those_of_the_places() -> None:
     raw = example_raw_log()
     series = {name: found for name, found in raw.series.items() if name != "velocity"}
     flight = make_flight(type(raw)(**{**{f: getattr(raw, f) for f in raw.__slots__}, "series": series}))
-    track = track_of_flight(flight, GeoOrigin(46.0, 8.0))
-    assert np.abs(np.hypot(*track.velocity[:, :2].T)[10:200] - SPEED).max() < 0.01
+    track = make_track(flight, GeoOrigin(46.0, 8.0))
+    assert np.abs(np.hypot(*track.velocity[:, :2].T)[10:200] - EXAMPLE_SPEED_MPS).max() < 0.01

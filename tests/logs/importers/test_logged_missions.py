@@ -4,14 +4,14 @@ import pytest
 
 from flight.mission.items import Command, MissionItem
 from flight.simulation.setup import MissingItems
-from logs.importers.logged_missions import Item, LoggedItems, gather_items, logged_mission
+from logs.importers.logged_missions import LoggedItem, LoggedItems, combine_items, logged_mission
 from logs.importers.raw_log import LoggedMission
 
 WAY = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + 0.01 * k, 8.0, 75.0) for k in range(4)]
 
 
-def items(time: float, way: list[MissionItem], total: int = 4) -> list[Item]:
-    return [Item(time, total, item) for item in way]
+def items(time: float, way: list[MissionItem], total: int = 4) -> list[LoggedItem]:
+    return [LoggedItem(time, total, item) for item in way]
 
 
 def made_of(way: list[MissionItem], total: int) -> LoggedMission | None:
@@ -19,37 +19,39 @@ def made_of(way: list[MissionItem], total: int) -> LoggedMission | None:
 
 
 def test_items_that_are_flown_make_no_mission() -> None:
-    rows = [*items(1.0, WAY), Item(30.0, 4, WAY[2]), Item(60.0, 4, WAY[3])]
-    assert [(start, len(found)) for start, _, found in gather_items(rows)] == [(1.0, 4)]
+    rows = [*items(1.0, WAY), LoggedItem(30.0, 4, WAY[2]), LoggedItem(60.0, 4, WAY[3])]
+    assert [(start, len(found)) for start, _, found in combine_items(rows)] == [(1.0, 4)]
 
 
 def test_the_same_mission_again_is_one() -> None:
-    assert len(gather_items([*items(1.0, WAY), *items(50.0, WAY)])) == 1
+    assert len(combine_items([*items(1.0, WAY), *items(50.0, WAY)])) == 1
 
 
 def test_another_place_begins_another_mission() -> None:
     moved = [WAY[0], replace(WAY[1], lat_deg=45.0), *WAY[2:]]
-    found = gather_items([*items(1.0, WAY), *items(50.0, moved)])
+    found = combine_items([*items(1.0, WAY), *items(50.0, moved)])
     assert [one.time for one in found] == [1.0, 50.0]
     assert found[1].items[1].lat_deg == 45.0
 
 
 def test_another_count_begins_another_mission() -> None:
-    found = gather_items([*items(1.0, WAY), *items(50.0, WAY[:3], total=3)])
+    found = combine_items([*items(1.0, WAY), *items(50.0, WAY[:3], total=3)])
     assert [(one.total, len(one.items)) for one in found] == [(4, 4), (3, 3)]
 
 
 def test_a_mission_that_is_downloaded_again_in_part_is_one() -> None:
     """The first three items of four, after all of them and before all of them."""
-    begins = Item(50.0, 4, WAY[0], begins=True)
+    begins = LoggedItem(50.0, 4, WAY[0], begins_mission=True)
     for rows in ([*items(1.0, WAY), begins, *items(51.0, WAY[1:3])], [*items(1.0, WAY[:3]), begins, *items(51.0, WAY)]):
-        (found,) = gather_items(rows)
+        (found,) = combine_items(rows)
         assert (found.time, found.total, found.items) == (1.0, 4, tuple(WAY))
 
 
 def test_a_second_upload_whose_first_items_are_lost_is_not_mixed_with_the_first() -> None:
     moved = [replace(item, lon_deg=9.0) for item in WAY]
-    found = gather_items([*items(1.0, WAY), Item(50.0, 4, moved[2], begins=True), Item(50.0, 4, moved[3])])
+    found = combine_items(
+        [*items(1.0, WAY), LoggedItem(50.0, 4, moved[2], begins_mission=True), LoggedItem(50.0, 4, moved[3])]
+    )
     assert [one.items for one in found] == [tuple(WAY), tuple(moved[2:])]
 
 
@@ -58,12 +60,14 @@ def test_a_mission_elsewhere_of_as_many_items_and_the_same_home_is_another(begin
     """Of the first the end is lost, of the second the beginning: but for home they have no item in common."""
     way = [replace(WAY[0], seq=k) for k in range(6)]
     north = [replace(item, lat_deg=47.0) for item in way[4:]]
-    rows = [*items(1.0, way[:3], 6), Item(50.0, 6, way[0], begins=begins), *items(50.0, north, 6)]
-    assert [one.items for one in gather_items(rows)] == [tuple(way[:3]), (way[0], *north)]
+    rows = [*items(1.0, way[:3], 6), LoggedItem(50.0, 6, way[0], begins_mission=begins), *items(50.0, north, 6)]
+    assert [one.items for one in combine_items(rows)] == [tuple(way[:3]), (way[0], *north)]
 
 
 def test_a_home_that_is_logged_again_begins_no_mission() -> None:
-    (found,) = gather_items([*items(1.0, WAY), Item(30.0, 4, WAY[0]), Item(30.0, 4, WAY[2]), Item(60.0, 4, WAY[0])])
+    (found,) = combine_items(
+        [*items(1.0, WAY), LoggedItem(30.0, 4, WAY[0]), LoggedItem(30.0, 4, WAY[2]), LoggedItem(60.0, 4, WAY[0])]
+    )
     assert found.items == tuple(WAY)
 
 
@@ -134,5 +138,5 @@ def test_a_home_that_is_not_in_the_log_is_told() -> None:
 
 
 def test_a_changed_item_alone_changes_the_mission() -> None:
-    found = gather_items([*items(1.0, WAY), Item(50.0, 4, replace(WAY[2], alt=90.0))])
+    found = combine_items([*items(1.0, WAY), LoggedItem(50.0, 4, replace(WAY[2], alt=90.0))])
     assert [(one.time, len(one.items), one.items[2].alt) for one in found] == [(1.0, 4, 75.0), (50.0, 4, 90.0)]

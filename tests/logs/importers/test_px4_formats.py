@@ -64,16 +64,16 @@ def test_formats_that_grow_are_refused_before_they_do(case: str, tmp_path: Path)
 def test_fields_are_counted_with_those_that_are_nested() -> None:
     formats = MessageFormats("a.ulg")
     for text in ("one:uint64_t timestamp;float[3] a;uint8_t[2] _padding0;", "two:uint64_t timestamp;one[4] x;one y;"):
-        formats.state(text)
+        formats.add_format(text)
     # 1 + 3 + 2; 1 + 4 * 6 + 6.
-    assert [formats.fields(name) for name in ("one", "two", "unknown")] == [6, 31, 1]
+    assert [formats.count_fields(name) for name in ("one", "two", "unknown")] == [6, 31, 1]
     for _ in range(MAX_FIELDS // 31):
-        formats.hold("two")
+        formats.add_topic("two")
     with pytest.raises(LogError):
-        formats.hold("two")
+        formats.add_topic("two")
     # A format that is stated anew counts as it is now.
-    formats.state("one:uint64_t timestamp;")
-    assert formats.fields("two") == 6
+    formats.add_format("one:uint64_t timestamp;")
+    assert formats.count_fields("two") == 6
 
 
 @pytest.mark.parametrize("letter", ["I", "M", "P", "Q"])

@@ -12,7 +12,7 @@ import pytest
 from pyulog import ULog
 
 from flight.mission.items import Home
-from logs.importers.clean_places import clean_places
+from logs.importers.clean_positions import clean_positions
 from logs.importers.logged_missions import plane_mode, px4_mode, px4_state
 from logs.importers.open_log import open_log
 from logs.importers.px4_log import find_damage, read_px4
@@ -127,7 +127,7 @@ def test_numbers_that_no_place_or_time_has_are_passed_over(tmp_path: Path) -> No
     missing = raw.missions[0].missing
     assert missing is not None
     assert (missing.numbers, missing.total) == ((2,), 3)
-    places = clean_places(raw.series["position"])
+    places = clean_positions(raw.series["position"])
     assert (len(places.time), places.faults.unusable) == (458, 2)
 
 

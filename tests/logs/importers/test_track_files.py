@@ -303,6 +303,6 @@ def test_as_many_times_as_places_are_expected(tmp_path: Path) -> None:
     path = kml(tmp_path / "a.kml")
     path.write_text(re.sub("<when>[^<]*10:00:10Z</when>", "", path.read_text()))
     with pytest.raises(
-        LogError, match=r"a track of \d+ times \(when\) and \d+ places \(gx:coord\): expected as many of both"
+        LogError, match=r"a track of \d+ times \(when\) and \d+ positions \(gx:coord\): expected equal numbers"
     ):
         read_kml(path)

@@ -75,7 +75,7 @@ def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyP
     def missing(name: str, _asked: str) -> None:
         raise FlightError(f"{name}: no such folder")
 
-    monkeypatch.setattr("logs.verdict.conditions.find_again", missing)
+    monkeypatch.setattr("logs.verdict.conditions.find_logged_aircraft", missing)
     line, _ = lines_of(make_setup())
     assert " kg" not in line
 

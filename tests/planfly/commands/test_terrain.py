@@ -122,7 +122,7 @@ def test_a_server_that_goes_away_costs_one_line_and_what_came_stays(
     [line] = [text for text in capsys.readouterr().err.splitlines() if text.startswith("planfly")]
     assert line.startswith(f"planfly: {server.url}/Copernicus_DSM_COG_10_N46_00_E008_00_DEM/")
     assert "cannot be fetched: " in line
-    assert " bytes came" in line
+    assert " bytes were received" in line
     assert not (here / "dem.tif").exists()
     before = server.sent
     assert main([*argv, "--json", "a.json"]) == 0
@@ -150,9 +150,9 @@ def test_nobody_there_is_one_line(here: Path, capsys: pytest.CaptureFixture[str]
         ({"length": 10**9}, "Content-Length: 1,000,000,000: expected 1 to 536,870,912 bytes"),
         ({"length": 10**20}, "Content-Length: 100,000,000,000,000,000,000: expected 1 to"),
         ({"garbage": True}, "the server's answer is not a readable GeoTIFF"),
-        ({"moved": ("N46", "N47")}, "another place: expected the degree from 46 N 8 E on"),
+        ({"moved": ("N46", "N47")}, "covers another area: expected latitude 46..47, longitude 8..9"),
         ({"odd": True}, "cannot be fetched: the server answers with 'bytes 1-"),
-        ({"status": 404}, "no tile of the area is there: open sea, or not such a server"),
+        ({"status": 404}, "the server has no tile for this area: open sea, or not a server of Copernicus GLO-30 tiles"),
     ],
 )
 def test_a_server_that_is_none_is_one_line(

@@ -21,7 +21,7 @@ from tests.planfly.conftest import FIELD
 from tests.soak import SOAK
 from tests.soak.test_hostile_files import WPL
 from world.errors import PlanflyError
-from world.files import lock_path, write_whole
+from world.files import lock_path, write_atomically
 
 ROOT = Path(__file__).parents[3]
 Done: TypeAlias = subprocess.CompletedProcess
@@ -84,7 +84,7 @@ def test_a_full_disk_leaves_what_was_there(folder: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, kept[1]))
     try:
         with pytest.raises(OSError, match="File too large") as caught:
-            write_whole(target, b"x" * 5000)
+            write_atomically(target, b"x" * 5000)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, kept)
     assert caught.value.filename == str(target)
@@ -171,7 +171,7 @@ def test_a_target_that_is_a_link_stays_one(folder: Path) -> None:
     # One that leads nowhere is an error with its own name.
     (folder / "lost.json").symlink_to(folder / "none" / "verdict.json")
     with pytest.raises(FileNotFoundError) as caught:
-        write_whole(folder / "lost.json", "{}")
+        write_atomically(folder / "lost.json", "{}")
     assert caught.value.filename == str(folder / "lost.json")
 
 

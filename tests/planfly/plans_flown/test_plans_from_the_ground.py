@@ -48,7 +48,7 @@ def heights_over_ground(
 ) -> tuple[float, float]:
     """Steepest climb and descent over the ground on a course, m per m: the wind's triangle, by hand."""
     climb, dive = airframe.limits.with_margin().envelope.air_angles(speed, amsl)
-    east, north = scenario.wind.at(amsl)
+    east, north = scenario.wind.velocity_at(amsl)
     along, across = (
         east * math.sin(course) + north * math.cos(course),
         east * math.cos(course) - north * math.sin(course),
@@ -96,11 +96,11 @@ def check_landing(scenario: Scenario, airframe: Airframe, points: Floats, land: 
     begin, last, point = points[-3:]
     course = course_of(last, point)
     assert course_of(begin, last) == pytest.approx(course, abs=1e-3)
-    assert scenario.wind.along(course, float(point[2]))[0] <= 1e-6
+    assert scenario.wind.components_on_course(course, float(point[2]))[0] <= 1e-6
     assert point[2] == pytest.approx(float(scenario.terrain.height(*point[:2])), abs=0.1)
     run, height = math.dist(last[:2], point[:2]), float(last[2] - point[2])
     assert begin[2] == pytest.approx(last[2], abs=1e-3)
-    tail = scenario.wind.along(course, float(point[2]))[0]
+    tail = scenario.wind.components_on_course(course, float(point[2]))[0]
     speed = airframe.autopilot.ground.airspeed(airframe.airspeed, tail, float(point[2]))
     _, steepest = heights_over_ground(scenario, airframe, course, float(point[2]), speed)
     assert height / run < steepest

@@ -139,7 +139,7 @@ def test_where_nothing_can_be_written_kernels_are_compiled_and_not_kept(tmp_path
         "tempfile.mkdtemp = lambda prefix: (_ for _ in ()).throw(OSError(30, 'read-only'))\n"
         "from world.geometry import wrap\n"
         "from world import kernels\n"
-        "print(wrap(4.0), kernels.TEMPORARY)\n"
+        "print(wrap(4.0), kernels.IS_TEMPORARY)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     number, temporary = done.stdout.split()

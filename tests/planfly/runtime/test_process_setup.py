@@ -9,7 +9,7 @@ import pytest
 
 from planfly.runtime import process_setup
 from planfly.runtime.process_setup import address_space_limit, prepare_process, watch_address_space, with_large_stack
-from world.address_space import RoomFinder
+from world.address_space import AddressSpaceGuard
 
 LIMIT = 480_000 * 1024
 
@@ -67,7 +67,7 @@ def test_only_a_process_with_a_limit_is_watched(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(process_setup, "address_space_limit", lambda: LIMIT)
     for _ in range(2):
         watch_address_space()
-    assert [type(one) for one in sys.meta_path[:2]] == [RoomFinder, type(before[0])]
+    assert [type(one) for one in sys.meta_path[:2]] == [AddressSpaceGuard, type(before[0])]
 
 
 def test_the_limit_is_the_systems(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,17 +14,17 @@ import pytest
 from planfly.terminal.signal_watch import end_process
 from tests.soak import at_most, only_in_soak, some
 from tests.stopwatch import Stopwatch
-from world.interruption import unfinished
+from world.interruption import remove_at_end
 
 # What a command may do when the signal comes; a file of its own that it has not finished.
 PROGRAM = """
 import hashlib, sys, time
 from pathlib import Path
 from planfly.terminal.signal_watch import end_process, end_on_signals
-from world.interruption import Interrupted, unfinished
+from world.interruption import Interrupted, remove_at_end
 mine = Path(sys.argv[1])
 with end_on_signals(grace=0.5) as heard:
-    with unfinished(mine):
+    with remove_at_end(mine):
         mine.write_text("half")
         print("begun", flush=True)
         {body}
@@ -191,7 +191,7 @@ def test_what_a_killed_child_makes_yet_is_removed_too(
 
     monkeypatch.setattr("multiprocessing.active_children", lambda: [Child()])
     monkeypatch.setattr(os, "_exit", ended)
-    with unfinished(folder):
+    with remove_at_end(folder):
         with Stopwatch() as watch, monkeypatch.context() as patch:
             patch.setattr(shutil, "rmtree", rmtree)
             with pytest.raises(SystemExit):

@@ -10,7 +10,7 @@ from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zo
 from planner.airspace.zone_limits import ZoneMargins, add_margins
 from tests.soak import scaled
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneKind, ZoneLevel, make_polygon
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 # ----------------------------------------------------------------------
 # What a leg in zones is charged: nothing where it keeps their margins, and more the deeper and longer it is in.
@@ -25,7 +25,7 @@ def slanting() -> Terrain:
     """Ground that rises by a tenth to the east, from 0 m at 0."""
     east, north = np.linspace(-5000.0, 5000.0, 101), np.linspace(-5000.0, 5000.0, 101)
     heights = np.broadcast_to(0.1 * east, (101, 101)).copy()
-    return gridded_terrain(heights, east, north, source="a slope", sha256="", datum="mean sea level")
+    return make_gridded_terrain(heights, east, north, source="a slope", sha256="", datum="mean sea level")
 
 
 GROUND = slanting()

@@ -37,7 +37,7 @@ def test_certificate_against_fine_samples(embedded: Plan) -> None:
     runs = [max(2, int(np.hypot(*step[:2]))) for step in np.diff(path, axis=0)]
     points = np.concatenate([np.linspace(path[i], path[i + 1], runs[i]) for i in range(len(runs))])
     above = points[:, 2] - scenario.terrain.height(points[:, 0], points[:, 1]) - scenario.limits.min_clearance_m
-    # The certificate takes a straight line for straight in pixels, `STRAIGHT_PIECE` m at a time.
+    # The certificate takes a straight line for straight in pixels, `STRAIGHT_PIECE_M` m at a time.
     assert above.min() >= embedded.certificate.clearance - 1e-3
     armed = scenario.threats.kill_radius > 0
     distance = np.linalg.norm(points[:, None] - scenario.threats.position[armed][None], axis=2)

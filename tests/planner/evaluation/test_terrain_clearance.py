@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aircraft.path_limits import Limits, downwind
+from aircraft.path_limits import Limits, downwind_vector
 from planner.evaluation.corners import LEG, measure_legs
 from planner.evaluation.problem import SlopeBounds, make_problem, required_clearance
 from planner.evaluation.terrain_clearance import HEIGHT_LAG, lag_at, measure_lags, terrain_excess
@@ -16,7 +16,7 @@ from tests.planner.tracking_limits import with_tracking_error
 from world.arrays import Floats
 from world.kernels import read_only
 from world.scenario import Scenario
-from world.terrain import TILE, steepest_slopes
+from world.terrain import TILE_PIXELS, steepest_slopes
 
 
 def test_steepest_slopes_bound_the_ground_of_each_tile() -> None:
@@ -30,7 +30,7 @@ def test_steepest_slopes_bound_the_ground_of_each_tile() -> None:
     across = np.maximum(abs(heights[:-1, 1:] - corner), abs(heights[1:, 1:] - heights[1:, :-1]))
     down = np.maximum(abs(heights[1:, :-1] - corner), abs(heights[1:, 1:] - heights[:-1, 1:]))
     for i, j in np.ndindex(slopes.shape):
-        inside = (rows // TILE == i) & (cols // TILE == j)
+        inside = (rows // TILE_PIXELS == i) & (cols // TILE_PIXELS == j)
         assert slopes[i, j] == pytest.approx(np.nanmax(np.hypot(across, down)[inside]) / 30.0, rel=1e-5)
 
 
@@ -41,7 +41,7 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
     rng = np.random.default_rng(seed)
     # Level ground with steep cones, and gentle ones in the other half of the map.
     rows, cols = np.indices(data.heights.shape)
-    pitch = float(data.slope_bounds.tile_side / TILE)
+    pitch = float(data.slope_bounds.tile_side / TILE_PIXELS)
     tops = rng.uniform([0.0, 0.0], data.heights.shape, (60, 2))
     rough = np.zeros(data.heights.shape, dtype=np.float32)
     for row, col in tops:
@@ -114,7 +114,7 @@ def lags_of(limits: Limits, scenario: Scenario, path: Floats) -> Any:
     data = make_problem(scenario, limits).search
     legs, lags = np.zeros(len(path) - 1, LEG), np.zeros(len(path) - 1, HEIGHT_LAG)
     measure_legs(path, legs)
-    measure_lags(data.tracking, data.aircraft, downwind(data.aircraft), path, legs, lags)
+    measure_lags(data.tracking, data.aircraft, downwind_vector(data.aircraft), path, legs, lags)
     return lags
 
 

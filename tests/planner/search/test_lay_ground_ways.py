@@ -17,7 +17,7 @@ from tests.setups import spec_around
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario, from_spec
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 Ground = Callable[[Floats, Floats], Floats]
 
@@ -36,7 +36,7 @@ def level(east: Floats, north: Floats) -> Floats:
 def terrain_of(heights: Ground) -> Terrain:
     axis = np.arange(-HALF - 1000.0, HALF + 1000.0 + GRID, GRID)
     made = np.broadcast_to(heights(axis[None, :], axis[:, None]), (axis.size, axis.size))
-    return gridded_terrain(np.array(made), axis, axis, source="walls", sha256="", datum="mean sea level")
+    return make_gridded_terrain(np.array(made), axis, axis, source="walls", sha256="", datum="mean sea level")
 
 
 def scenario_of(heights: Ground = level, **tables: Any) -> Scenario:

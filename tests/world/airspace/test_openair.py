@@ -114,7 +114,7 @@ def test_a_text_file_is_openair_by_its_first_command(encoding: str, tmp_path: Pa
     assert len(read_zone_file(path, "zones.txt").zones) == 1
     path.write_text(f"AN LAKE\nAC R\n{SQUARE}", encoding=encoding)
     assert is_zone_file(path)
-    with pytest.raises(ScenarioError, match="line 1: AN: no airspace has begun: an AC is missing before it"):
+    with pytest.raises(ScenarioError, match="line 1: AN: an airspace must begin with AC before it"):
         read_zone_file(path, "zones.txt")
 
 
@@ -136,7 +136,7 @@ def test_colours_without_an_airspace_are_none(tmp_path: Path) -> None:
     path.write_text(f"{colours}{HEAD}{SQUARE}AC CTR\nSB 1,1,1\n", encoding="utf-8")
     found = read_zone_file(path, "z.openair")
     assert [zone.name for zone in found.zones] == ["LAKE (R)"]
-    assert found.notes == ["z.openair: 2 zones keep nobody out: without name, limits and shape"]
+    assert found.notes == ["z.openair: 2 zones restrict no flight: without name, limits and shape"]
     path.write_text(f"{colours}{HEAD}", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"line 5 \(LAKE\): expected one shape"):
         read_zone_file(path, "z.openair")
@@ -223,12 +223,12 @@ def test_the_record_of_the_page_is_read_as_it_says() -> None:
 
 
 FAULTS = {
-    "AN LAKE": "line 1: AN: no airspace has begun: an AC is missing before it",
+    "AN LAKE": "line 1: AN: an airspace must begin with AC before it",
     HEAD + "AH FL95\n": "line 5: AH 'FL95': an airspace has one lower limit (AL) and one upper limit (AH)",
-    HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': expected a place",
+    HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': expected a position",
     HEAD + "DP 91:00:00N 008:00:00E\n": "line 5: DP '91:00:00N 008:00:00E': allowed 0..90 degrees",
     HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': expected degrees, and minutes and seconds",
-    HEAD + "DC 5\n": "line 5: DC '5': no centre before it (V X=)",
+    HEAD + "DC 5\n": "line 5: DC '5': a centre (V X=) must come before it",
     HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': expected a number of at least 0",
     HEAD + "V D=left": "line 5: V 'D=left': allowed D=+ (clockwise) or D=-",
     HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': expected radius, first and last bearing",
@@ -276,7 +276,7 @@ def test_what_a_file_does_not_hold_as_it_stands_is_said(tmp_path: Path) -> None:
     assert is_zone_file(path)
     found = read_zone_file(path, "zones.txt")
     assert found.notes == [
-        "zones.txt: 2 zones keep nobody out: class G, open to all",
+        "zones.txt: 2 zones restrict no flight: class G, open to all",
         "zones.txt: an outline that crosses itself is taken as the area it encloses: ZÜRICH (R)",
     ]
     (zone,) = found.zones

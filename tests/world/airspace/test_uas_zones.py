@@ -85,7 +85,7 @@ def test_limits_of_ed_269(limits: dict[str, Any], wanted: dict[str, float], tmp_
 def test_a_zone_without_a_restriction_keeps_nobody_out(tmp_path: Path) -> None:
     for data in (ed269(volume(), restriction="NO_RESTRICTION"), ed318(POLYGON, type="NO_RESTRICTION")):
         found = read(data, tmp_path)
-        assert (found.zones, found.notes) == ([], ["z.json: 1 zone keeps nobody out: NO_RESTRICTION"])
+        assert (found.zones, found.notes) == ([], ["z.json: 1 zone restricts no flight: NO_RESTRICTION"])
     for restriction in ("REQ_AUTHORISATION", "CONDITIONAL", "PROHIBITED"):
         assert len(read(ed269(volume(), restriction=restriction), tmp_path).zones) == 1
 

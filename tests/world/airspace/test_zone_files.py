@@ -68,7 +68,10 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "a height of the FAA's": ({"LOWER_VAL": "SFC", "LOWER_UOM": "FT"}, "LOWER_VAL: expected a number"),
     "a list of units": ({"upperLimit": limit(5, [1], 1)}, "upperLimit.unit: allowed"),
     "a datum": ({"lowerLimit": limit(5, 1, "QFE")}, "lowerLimit.referenceDatum: allowed 0, GND, AGL, SFC, 1, MSL"),
-    "a flight level of an inclusion": ({"kind": "inclusion", "upperLimit": limit(65, 6, 2)}, "bounds no inclusion"),
+    "a flight level of an inclusion": (
+        {"kind": "inclusion", "upperLimit": limit(65, 6, 2)},
+        "cannot bound an inclusion",
+    ),
 }
 
 
@@ -256,7 +259,7 @@ KML_FAULTS = {
     "a point alone": (document(placemark("<Point><coordinates>8,46</coordinates></Point>")), "expected a Polygon"),
     "a sheet in the air": (
         document(placemark(polygon(mode=ABSOLUTE, up=300.0))),
-        "altitudeMode absolute without extrude: a sheet in the air contains no airspace",
+        "altitudeMode absolute without extrude: such a surface encloses no airspace",
     ),
     "a sloping roof": (
         document(placemark(f"<Polygon><extrude>1</extrude>{ABSOLUTE}{ring(up=300.0, last=301.0)}</Polygon>")),
@@ -565,7 +568,7 @@ def test_a_fence_of_openair_beside_a_scenario(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")
     scenario = read_named_fences([str(path)]).add_to_scenario(load_scenario(str(tmp_path / "small.toml")))
     assert [zone.name for zone in scenario.zones] == ["CTR (D)"]
-    assert scenario.notes == (f"{path}: 1 zone keeps nobody out: class G, open to all",)
+    assert scenario.notes == (f"{path}: 1 zone restricts no flight: class G, open to all",)
 
 
 def test_a_large_geojson_file_takes_at_most_eight_times_its_size(tmp_path: Path) -> None:

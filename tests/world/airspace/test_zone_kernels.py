@@ -10,8 +10,8 @@ from world.airspace.zone_kernels import (
     ZoneRecords,
     box_distance,
     edge_distance,
+    height_outside_band,
     inside_fraction,
-    outside_band,
     segment_distance,
     zone_records,
 )
@@ -108,13 +108,13 @@ def test_a_band_of_heights() -> None:
         (None, None),
     )
     zones = zone_records([Zone("z", "inclusion", shape, floor, ceiling) for floor, ceiling in bands]).zones
-    assert [outside_band(zones[0], up, 500.0) for up in (190.0, 260.0, 310.0)] == [10.0, -40.0, 10.0]
-    assert [outside_band(zones[1], up, 500.0) for up in (520.0, 590.0, 621.0)] == [10.0, -30.0, 1.0]
-    assert outside_band(zones[2], 0.0, 500.0) == -620.0
-    assert [outside_band(zones[3], up, math.nan) for up in (190.0, 9000.0)] == [10.0, -8800.0]
-    assert outside_band(zones[4], 0.0, math.nan) == -math.inf
+    assert [height_outside_band(zones[0], up, 500.0) for up in (190.0, 260.0, 310.0)] == [10.0, -40.0, 10.0]
+    assert [height_outside_band(zones[1], up, 500.0) for up in (520.0, 590.0, 621.0)] == [10.0, -30.0, 1.0]
+    assert height_outside_band(zones[2], 0.0, 500.0) == -620.0
+    assert [height_outside_band(zones[3], up, math.nan) for up in (190.0, 9000.0)] == [10.0, -8800.0]
+    assert height_outside_band(zones[4], 0.0, math.nan) == -math.inf
     for z in (1, 2):
-        assert math.isnan(outside_band(zones[z], 520.0, math.nan))
+        assert math.isnan(height_outside_band(zones[z], 520.0, math.nan))
 
 
 def test_boxes() -> None:

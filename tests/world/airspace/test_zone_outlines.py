@@ -5,7 +5,7 @@ import pytest
 
 from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
 from world.airspace.zones_on_map import level_heights, zone_parts, zone_rings, zone_walls
-from world.terrain import gridded_terrain
+from world.terrain import make_gridded_terrain
 
 SQUARE = [(0.0, 0.0), (900.0, 0.0), (900.0, 900.0), (0.0, 900.0)]
 HOLE = [(300.0, 300.0), (600.0, 300.0), (600.0, 600.0), (300.0, 600.0)]
@@ -37,7 +37,7 @@ def test_levels_over_the_ground() -> None:
 
 def test_walls_stand_on_the_ground_and_end_at_the_ceiling() -> None:
     places = np.linspace(-2000.0, 2000.0, 41)
-    slope = gridded_terrain(
+    slope = make_gridded_terrain(
         np.broadcast_to(0.1 * places, (41, 41)).copy(), places, places, source="", sha256="", datum=""
     )
     levels = ZoneLevel(-50.0, "amsl"), ZoneLevel(80.0, "ground")

@@ -8,7 +8,7 @@ import pytest
 from tests.world.made.made_scenario import SMALL
 from world.airspace.zone_times import is_active, parse_period, parse_span
 from world.errors import ScenarioError
-from world.scenario import at_time, from_spec, load_scenario
+from world.scenario import from_spec, load_scenario, with_flight_time
 
 # 2026-05-01 is a Friday.
 FRIDAY_NIGHT = "../.. FRI 22:00/06:00"
@@ -94,7 +94,7 @@ def test_a_zone_that_is_not_active_is_left_out_and_said(tmp_path: Path) -> None:
     scenario = load_scenario(str(path))
     assert [zone.name for zone in scenario.zones] == ["market", "mast"]
     assert scenario.notes == ("1 zone has times of activity, and is active at all times (--at applies them)",)
-    friday = at_time(scenario, "2026-05-01T10:00Z")
+    friday = with_flight_time(scenario, "2026-05-01T10:00Z")
     assert [zone.name for zone in friday.zones] == ["mast"]
     assert friday.notes == (
         "1 of 1 zones with times of activity is not active 2026-05-01 10:00 to 2026-05-01 11:00 UTC: ignored",
@@ -102,7 +102,7 @@ def test_a_zone_that_is_not_active_is_left_out_and_said(tmp_path: Path) -> None:
     # What is written down of it is the same scenario again, in which another time can be asked for.
     again = from_spec(json.loads(json.dumps(friday.to_json())), "a log")
     assert again.zones == friday.zones
-    assert [zone.name for zone in at_time(again, "2026-05-02T10:00Z").zones] == ["market", "mast"]
+    assert [zone.name for zone in with_flight_time(again, "2026-05-02T10:00Z").zones] == ["market", "mast"]
 
 
 @pytest.mark.parametrize(
@@ -110,4 +110,4 @@ def test_a_zone_that_is_not_active_is_left_out_and_said(tmp_path: Path) -> None:
 )
 def test_what_is_no_time_of_a_flight(at: str) -> None:
     with pytest.raises(ScenarioError, match="at"):
-        at_time(load_scenario("tight"), at)
+        with_flight_time(load_scenario("tight"), at)

@@ -76,6 +76,6 @@ def test_what_is_no_cylinder(place: tuple[float, float, float], wanted: str) -> 
 def test_a_zone_knows_whether_it_needs_the_ground() -> None:
     sea, ground = ZoneLevel(500.0, "amsl"), ZoneLevel(120.0, "ground")
     shape = Cylinder(0.0, 0.0, 50.0)
-    assert not Zone("a", "inclusion", shape, sea, sea).above_ground
-    assert Zone("a", "inclusion", shape, sea, ground).above_ground
-    assert Zone("a", "inclusion", shape, ground).above_ground
+    assert not Zone("a", "inclusion", shape, sea, sea).has_level_above_ground
+    assert Zone("a", "inclusion", shape, sea, ground).has_level_above_ground
+    assert Zone("a", "inclusion", shape, ground).has_level_above_ground

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from aircraft.catalog import find_again
+from aircraft.catalog import find_logged_aircraft
 from flight.mission.ground_ways import Approach
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
 from flight.simulation.setup import FlightSetup
@@ -77,7 +77,7 @@ def make_ground_setup(scenario: Scenario, mission: Mission, **parameters: float)
 
 def fly(setup: FlightSetup) -> Flown:
     """Fly a setup to its end."""
-    return Flown(setup, fly_to_end(Flight(setup, find_again(setup.aircraft, setup.scenario.flight.aircraft))))
+    return Flown(setup, fly_to_end(Flight(setup, find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft))))
 
 
 @functools.cache

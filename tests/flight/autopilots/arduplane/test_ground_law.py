@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aircraft.catalog import find_again
+from aircraft.catalog import find_logged_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.ground_law import (
     APPROACHING,
@@ -277,7 +277,7 @@ def test_in_the_flare_of_47_the_least_airspeed_is_that_of_the_stall(
 @pytest.mark.parametrize("version", ["4.6", "4.7"])
 def test_each_release_flares_by_its_own_sink_rate(version: ArduPlaneVersion) -> None:
     setup = circuit(None, STRIP)
-    aircraft = find_again(setup.aircraft, setup.scenario.flight.aircraft)
+    aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     assert isinstance(setup.autopilot, ArduPlane)
     own = record(ARDUPLANE_GROUND)
     ground_law = setup.autopilot.in_release(version).ground.control_law

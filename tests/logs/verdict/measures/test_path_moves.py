@@ -14,7 +14,7 @@ from logs.verdict.measures.track_alignment import align_track
 from tests.logs.verdict.measures.test_zone_visits import move
 from tests.synthetic import bank_radius, fly_path, make_setup
 from world.kernels import Records, read_only
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 # North for 2 km and up, a right angle, east and level.
 CORNER = [[0.0, 0.0, 300.0], [0.0, 2000.0, 400.0], [2000.0, 2000.0, 400.0]]
@@ -131,7 +131,7 @@ def ridge() -> Terrain:
     """Level ground with a step of 30 m over 100 m at east 1,000 m, and one of 80 m at east -1,500 m."""
     axis = np.arange(-2000.0, 2001.0, 100.0)
     heights = np.where(axis >= 1000.0, 30.0, 0.0) + np.where(axis >= -1500.0, 80.0, 0.0)
-    return gridded_terrain(np.tile(heights, (41, 1)), axis, axis, source="", sha256="", datum="")
+    return make_gridded_terrain(np.tile(heights, (41, 1)), axis, axis, source="", sha256="", datum="")
 
 
 def test_a_block_holds_its_moves() -> None:
@@ -187,7 +187,7 @@ def test_all_the_ground_below_a_long_block_counts(turned: bool, begin: float, sl
     ground = ridge()
     axis = np.arange(-2000.0, 2001.0, 100.0)
     if turned:
-        ground = gridded_terrain(ground.heights[::1].T[::1].copy(), axis, axis, source="", sha256="", datum="")
+        ground = make_gridded_terrain(ground.heights[::1].T[::1].copy(), axis, axis, source="", sha256="", datum="")
     east, north, course = (0.0, begin, 0.0) if turned else (begin, 0.0, 90.0)
     way: Records = np.array([move(east, north, 500.0, course=course, length=2100.0)], MOVE)
     block = move_blocks(way, ground.heights, ground.to_pixel.record, ground.spacing, True)[0]
@@ -198,7 +198,7 @@ def test_a_single_peak_is_as_steep_as_both_its_sides_together() -> None:
     axis = np.arange(-500.0, 501.0, 100.0)
     heights = np.zeros((11, 11))
     heights[5, 5] = 50.0
-    ground = gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
+    ground = make_gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
     way: Records = np.array([move(-20.0, -20.0, 500.0, length=10.0)], MOVE)
     block = move_blocks(way, ground.heights, ground.to_pixel.record, ground.spacing, True)[0]
     # 0.5 to either side, and a hair for single precision.

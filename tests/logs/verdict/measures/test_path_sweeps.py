@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from logs.verdict.measures.path_sweeps import passages, path_clearance, path_spheres, segment_clearances
 from tests.synthetic import make_scenario
 from world.geometry import segment_exposure
-from world.terrain import flat_terrain
+from world.terrain import make_flat_terrain
 
 STRAIGHT = np.column_stack([np.linspace(0.0, 4000.0, 1001), np.zeros(1001), np.full(1001, 300.0)])
 TIME = np.linspace(0.0, 160.0, 1001)
@@ -90,7 +90,7 @@ def test_a_flight_that_starts_and_ends_inside() -> None:
 
 
 def test_garbage_positions_meet_nothing() -> None:
-    ground = flat_terrain(np.array([[-1e3, 1e3], [-1e3, 1e3]]), 5.0, 100.0)
+    ground = make_flat_terrain(np.array([[-1e3, 1e3], [-1e3, 1e3]]), 5.0, 100.0)
     position = np.array(
         [[0.0, 0.0, 50.0], [10.0, 0.0, 40.0], [math.nan, 0.0, 0.0], [1e300, 0.0, 0.0], [0.0, 0.0, 20.0]]
     )
@@ -109,6 +109,6 @@ def test_no_sphere_and_no_way_have_no_stay() -> None:
         assert passages(np.arange(2.0), way, np.zeros(3), radius) == []
     for rows in (0, 1):
         assert passages(np.arange(2.0)[:rows], np.zeros((rows, 3)), np.zeros(3), 50.0) == []
-    ground = flat_terrain(np.array([[-1e3, 1e3], [-1e3, 1e3]]), 5.0, 100.0)
+    ground = make_flat_terrain(np.array([[-1e3, 1e3], [-1e3, 1e3]]), 5.0, 100.0)
     for rows in (0, 1):
         assert [one.size for one in segment_clearances(ground, np.zeros((rows, 3)))] == [0, 0]

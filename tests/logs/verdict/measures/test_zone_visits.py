@@ -21,7 +21,7 @@ from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel, make_polygon
 from world.frames import POLYMAP
 from world.kernels import Record, Records
-from world.terrain import Terrain, flat_terrain, gridded_terrain
+from world.terrain import Terrain, make_flat_terrain, make_gridded_terrain
 
 # ----------------------------------------------------------------------
 # How a path meets a zone, by plain sums: depths, times, places of entry and exit, on lines and arcs, over slopes.
@@ -59,7 +59,7 @@ def box(kind: str = "exclusion", *, floor: ZoneLevel | None = None, ceiling: Zon
 def slope(rise: float) -> Terrain:
     """Ground that rises this many m per m to the east, 0 m at east 0."""
     east, north = np.linspace(-2000.0, 2000.0, 41), np.linspace(-2000.0, 2000.0, 41)
-    return gridded_terrain(np.tile(rise * east, (41, 1)), east, north, source="slope", sha256="", datum="")
+    return make_gridded_terrain(np.tile(rise * east, (41, 1)), east, north, source="slope", sha256="", datum="")
 
 
 @pytest.mark.parametrize("aside", [80.0, 20.0, 5.0, 0.5])
@@ -176,7 +176,7 @@ def test_a_ridge_between_two_looks_is_seen() -> None:
     east = np.linspace(-1000.0, 1000.0, 201)
     heights = np.zeros((201, 201))
     heights[:, 121] = 40.0  # at east 210 m
-    ridge = gridded_terrain(heights, east, east, source="ridge", sha256="", datum="")
+    ridge = make_gridded_terrain(heights, east, east, source="ridge", sha256="", datum="")
     found = visit(
         [move(-100.0, 100.0, 130.0, length=600.0, lasts=600.0)], box(ceiling=ZoneLevel(100.0, "ground")), ridge
     )
@@ -187,7 +187,7 @@ def test_a_ridge_between_two_looks_is_seen() -> None:
 
 def test_unknown_ground_is_not_judged() -> None:
     way = [move(-100.0, 100.0, 130.0, length=600.0, lasts=60.0)]
-    for terrain in (None, flat_terrain(np.array([[-5000.0, -4000.0], [0.0, 1.0]]), 0.0, 10.0)):
+    for terrain in (None, make_flat_terrain(np.array([[-5000.0, -4000.0], [0.0, 1.0]]), 0.0, 10.0)):
         found = visit(way, box(ceiling=ZoneLevel(100.0, "ground")), terrain)
         assert (found.unknown, found.entries) == (True, 0)
         # Beside its shape a zone is not violated whatever the ground.
@@ -376,7 +376,7 @@ def test_an_arc_is_bounded_by_its_bow_up_to_a_radian(turned: float, bounded: boo
     [(None, ZoneLevel(100.0, "ground"), -30.0), (ZoneLevel(100.0, "ground"), None, 30.0)],
 )
 def test_levels_above_ground_count_from_it(floor: ZoneLevel | None, ceiling: ZoneLevel | None, off: float) -> None:
-    ground = flat_terrain(np.array([[-900.0, 900.0], [-900.0, 900.0]]), 80.0, 100.0)
+    ground = make_flat_terrain(np.array([[-900.0, 900.0], [-900.0, 900.0]]), 80.0, 100.0)
     records = zone_records([Zone("z", "exclusion", Cylinder(0.0, 0.0, 300.0), floor, ceiling)])
     found = distances_outside_zone(records, 0, ground.heights, ground.to_pixel.record, 0.0, 0.0, 150.0)
     assert found[1] == pytest.approx(off)

@@ -8,7 +8,7 @@ import numpy as np
 from flight.autopilots.arduplane.point_mass import POINT_MASS, PointMass
 from logs.verdict.returns.glide_map import GlideMap, glide_map
 from world.kernels import Record
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 AIRSPEED, SINK, BANK = 18.0, 1.8, math.radians(30.0)
 # Without spheres.
@@ -54,7 +54,7 @@ def ground(function: "np.ufunc | object", half: float = 6000.0, pitch: float = 5
     """Ground of a function of east and north (m) within so far from the middle; its pixels so far apart and shifted."""
     line = np.arange(-half, half + 0.5 * pitch, pitch) + shift
     heights = np.asarray(function(line[None, :], line[:, None]) + np.zeros((line.size, line.size)))  # type: ignore[operator]
-    return gridded_terrain(heights, line, line, source="made", sha256="", datum="mean sea level")
+    return make_gridded_terrain(heights, line, line, source="made", sha256="", datum="mean sea level")
 
 
 @cache

@@ -12,7 +12,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_flight
 from tests.flight.autopilots.arduplane.flown_grounds import Flown, circuit, fly
 from world.airfield import LandingStrip, Launch
-from world.terrain import gridded_terrain
+from world.terrain import make_gridded_terrain
 
 RAIL = Launch("catapult", math.radians(90.0), 20.0, 6.0, math.radians(12.0))
 STRIP = LandingStrip(500.0, 600.0, length=600.0)
@@ -38,7 +38,7 @@ def with_hole(setup: FlightSetup, east: float, north: float) -> FlightSetup:
     axis = np.arange(-3000.0, 4501.0, 50.0)
     heights = np.zeros((axis.size, axis.size))
     heights[np.ix_(np.abs(axis - north) < 120.0, np.abs(axis - east) < 60.0)] = math.nan
-    ground = gridded_terrain(heights, axis, axis, source="hole", sha256="", datum="mean sea level")
+    ground = make_gridded_terrain(heights, axis, axis, source="hole", sha256="", datum="mean sea level")
     return setup.in_scenario(replace(setup.scenario, terrain=ground))
 
 

@@ -24,7 +24,7 @@ from world.airspace.zones import Cylinder, Zone, ZoneLevel
 from world.arrays import Floats
 from world.frames import to_geo
 from world.scenario import load_scenario
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 Ground = Callable[[Floats, Floats], Floats]
 
@@ -39,7 +39,7 @@ TAKEOFF = ("3 22 15 0 0 0 0 0 300", *FAR)
 def terrain_of(heights: Ground) -> Terrain:
     axis = np.arange(-4000.0, 4000.0 + GRID, GRID)
     made = np.broadcast_to(heights(axis[None, :], axis[:, None]), (axis.size, axis.size))
-    return gridded_terrain(np.array(made), axis, axis, source="walls", sha256="", datum="mean sea level")
+    return make_gridded_terrain(np.array(made), axis, axis, source="walls", sha256="", datum="mean sea level")
 
 
 def wall(north: float, top: float, width: float = 1500.0, base: float = 100.0) -> Ground:

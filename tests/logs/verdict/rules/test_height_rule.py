@@ -14,7 +14,7 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rules.height_rule import max_segment_heights
 from tests.logs.verdict.judging import ROUTE, judge, leg, of, suggested
 from tests.synthetic import edited, fly_path, make_setup
-from world.terrain import Terrain, gridded_terrain
+from world.terrain import Terrain, make_gridded_terrain
 
 
 def limited(most: float, **how: Any) -> FlightSetup:
@@ -83,7 +83,7 @@ def valley() -> Terrain:
     axis = np.arange(-1000.0, 1001.0, 100.0)
     heights = np.full((21, 21), 100.0)
     heights[axis == 500.0] = 60.0
-    return gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
+    return make_gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
 
 
 def test_the_height_over_a_valley_is_found_between_two_points() -> None:
@@ -98,7 +98,7 @@ def test_the_height_over_a_valley_across_the_map() -> None:
     """The same with the ground's axes changed over: a place's east counts as it is."""
     ground = valley()
     axis = np.arange(-1000.0, 1001.0, 100.0)
-    turned = gridded_terrain(ground.heights.T.copy(), axis, axis, source="", sha256="", datum="")
+    turned = make_gridded_terrain(ground.heights.T.copy(), axis, axis, source="", sha256="", datum="")
     points = np.array([[-900.0, 0.0, 200.0], [900.0, 0.0, 200.0]])
     for terrain in (turned, valley()):
         most, at = max_segment_heights(terrain, points if terrain is turned else points[:, [1, 0, 2]])
@@ -142,7 +142,7 @@ def test_where_it_is_highest_is_told() -> None:
     axis = np.arange(-1300.0, 1301.0, 100.0) + 3.3
     heights = np.full((27, 27), 100.0)
     heights[np.isclose(np.abs(axis - 3.3), 500.0)] = 60.0
-    ground = gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
+    ground = make_gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
     setup = replace(setup, scenario=replace(setup.scenario, terrain=ground))
     (item,) = findings(setup, fly_path(setup))
     assert item.flown == pytest.approx(240.0, abs=0.01)
@@ -155,7 +155,7 @@ def test_ground_that_is_known_in_part_judges_what_is_above_it(most: float, ok: b
     axis = np.arange(-1300.0, 1301.0, 100.0)
     heights = np.full((27, 27), 100.0)
     heights[np.abs(axis) > 650.0] = np.nan
-    ground = gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
+    ground = make_gridded_terrain(heights, axis, axis, source="", sha256="", datum="")
     setup = replace(setup, scenario=replace(setup.scenario, terrain=ground))
     track = fly_path(setup)
     (item,) = findings(setup, track)

@@ -26,7 +26,7 @@ from logs.views.replay.timeline import timeline
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp
 from tests.soak import some
-from world.terrain import Peak, peaks_terrain
+from world.terrain import Peak, make_peaks_terrain
 
 HOME = "36.5 -84.2 100"
 RTL = "0 20 0 0 0 0 0 0 0"
@@ -133,7 +133,9 @@ def test_a_return_too_low_over_ground_fails_by_the_clearance(parameters: dict[st
 def test_a_return_that_meets_a_ridge_has_not_got_to_its_end() -> None:
     setup = by_arduplane(setup_of(*WAY, home=HOME))
     # A hill of 400 m in the middle of the way, which is flown at some 300 m there.
-    hill = peaks_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), [Peak(1250.0, 500.0, 400.0, 300.0)], 1000.0)
+    hill = make_peaks_terrain(
+        np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), [Peak(1250.0, 500.0, 400.0, 300.0)], 1000.0
+    )
     walled = setup.in_scenario(replace(setup.scenario, terrain=hill))
     verdict, ended = flown(walled)
     assert ended == "ground contact"
@@ -145,7 +147,7 @@ def test_a_return_that_meets_a_ridge_has_not_got_to_its_end() -> None:
 @pytest.mark.parametrize("hill", [Peak(60.0, 0.0, 600.0, 60.0), Peak(-100.0, 0.0, 600.0, 80.0)])
 def test_a_return_that_meets_a_hill_at_home_has_not_got_to_its_end(hill: Peak) -> None:
     setup = by_arduplane(setup_of(*WAY, home=HOME))
-    ground = peaks_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), [hill], 100.0)
+    ground = make_peaks_terrain(np.array([[-5000.0, 5000.0], [-5000.0, 5000.0]]), [hill], 100.0)
     verdict, ended = flown(setup.in_scenario(replace(setup.scenario, terrain=ground)))
     assert ended == "ground contact"
     assert of(verdict, "return").ok is None

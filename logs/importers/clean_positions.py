@@ -1,4 +1,4 @@
-"""Put a log's positions in order: doubled, late or impossible rows are dropped and counted, and none is added.
+"""Put a log's positions in order: drop and count doubled, late and impossible rows; add no rows.
 
 First the clock is made steady, then rows are sorted, then positions that no aircraft can have reached are removed.
 """
@@ -16,10 +16,10 @@ from world.arrays import Flags, Floats, Ints
 # ----------------------------------------------------------------------
 # The clock: permanent jumps back are removed, and late rows are sorted.
 
-# A clock that is behind by more than this has jumped if it stays behind; less is a row out of order, s.
-BEHIND = 1.0
+# Largest lag behind the latest time of a row out of order, s; a clock that stays behind by more has jumped.
+MAX_CLOCK_LAG_S = 1.0
 # Number of successive rows for which a clock that jumped is behind.
-ROWS_BEHIND = 8
+MIN_LATE_ROWS = 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +34,15 @@ class SteadyClock:
     jumps: tuple[float, ...]
 
 
-def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
+def remove_clock_jumps(time: Floats, usual: float = 0.1) -> SteadyClock:
     """Remove jumps back from the times (n,) of a log's rows in the order of the file.
 
     A clock that goes back and stays there has been reset: later rows are shifted to follow ``usual`` s after the row
     before.  A single row out of order keeps its time.
 
-    >>> steady_clock(np.array([10.0, 11.0, *range(2, 14)]), usual=1.0).time.tolist()
+    >>> remove_clock_jumps(np.array([10.0, 11.0, *range(2, 14)]), usual=1.0).time.tolist()
     [10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0]
-    >>> float(steady_clock(np.array([10.0, 11.0, 5.0, *range(12, 24)])).time[2])
+    >>> float(remove_clock_jumps(np.array([10.0, 11.0, 5.0, *range(12, 24)])).time[2])
     5.0
     """
     moved = np.array(time, dtype=np.float64)
@@ -50,7 +50,7 @@ def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
     begin = 0
     while begin < moved.size:
         latest = np.maximum.accumulate(moved[begin:])
-        behind = np.flatnonzero(moved[begin:] < latest - BEHIND)
+        behind = np.flatnonzero(moved[begin:] < latest - MAX_CLOCK_LAG_S)
         jump = _first_late_row(behind, moved[begin:], latest)
         if jump < 0:
             break
@@ -64,34 +64,34 @@ def steady_clock(time: Floats, usual: float = 0.1) -> SteadyClock:
 def _first_late_row(behind: Ints, time: Floats, latest: Floats) -> int:
     """Return the first row after which enough rows (or all to the end) are late to show a jump; -1 if there is none."""
     for k in behind.tolist():
-        end_row = min(k + ROWS_BEHIND, time.size)
-        if end_row - k >= min(ROWS_BEHIND, 2) and (time[k:end_row] < latest[k - 1] - BEHIND).all():
+        end_row = min(k + MIN_LATE_ROWS, time.size)
+        if end_row - k >= min(MIN_LATE_ROWS, 2) and (time[k:end_row] < latest[k - 1] - MAX_CLOCK_LAG_S).all():
             return int(k)
     return -1
 
 
 # ----------------------------------------------------------------------
-# Places, gaps and glitches.
+# Positions, gaps and glitches.
 
 # A pause between rows longer than this is a gap, s.
-LONGEST_STEP = 1.0
-# The same in usual steps, if rows are rarer.
-USUAL_STEPS = 1.5
-# A place that requires this much more than `GLITCH_TIMES` the usual speed to reach and leave is a glitch, m/s: GPS
-# receivers jump by kilometres, and no aircraft gains as much between two rows.
-GLITCH_SPEED = 60.0
-# Multiple of the usual speed in that test.
-GLITCH_TIMES = 3.0
-# Greatest number of successive rows of a glitch; more is a new place.
-GLITCH_ROWS = 20
+MAX_STEP_S = 1.0
+# Longest pause as a ratio to the median step, if that is longer.
+MAX_STEP_RATIO = 1.5
+# Speed, m/s, that is added to `GLITCH_SPEED_RATIO` times the usual speed: a position that is reached and left at a
+# higher speed is a glitch. GPS receivers jump by kilometres, and no aircraft gains this speed between two rows.
+GLITCH_SPEED_MPS = 60.0
+# Factor on the usual speed in that test.
+GLITCH_SPEED_RATIO = 3.0
+# Greatest number of successive rows of a glitch; more rows are a new position.
+MAX_GLITCH_ROWS = 20
 # A pause longer than this without a corresponding distance is a jump of the clock, s.
-JUMP = 5.0
+MIN_CLOCK_JUMP_S = 5.0
 # Distance in usual steps that an aircraft travels at most in a jump of the clock.
-JUMP_STEPS = 6.0
-# Least usual speed for that test, m/s: an aircraft on the ground travels no distance in any time.
-MOVING = 5.0
+MAX_JUMP_STEPS = 6.0
+# Least usual speed for that test, m/s: an aircraft that stands on the ground shows no jump of the clock.
+MIN_MOVING_SPEED_MPS = 5.0
 # Length of a degree of latitude, m, on a sphere of the mean radius of WGS 84.
-DEGREE = math.radians(1.0) * 6_371_008.8
+DEGREE_LENGTH_M = math.radians(1.0) * 6_371_008.8
 # Lowest altitude that is accepted, m.
 _MIN_ALTITUDE_M = -1000.0
 # Highest altitude that is accepted, m.
@@ -99,13 +99,13 @@ _MAX_ALTITUDE_M = 50_000.0
 
 
 @dataclass(frozen=True, slots=True)
-class Places:
-    """Places of the vehicle, in order.
+class CleanPositions:
+    """Positions of the vehicle, in order of time.
 
     time: (n,) s, increasing.  lat, lon: (n,) degrees.  up: (n,) m, NaN if not in the log.
     faults: numbers of corrected faults.
     gaps: pauses.
-    shifts: times from which on, and seconds by which, the log's clock was shifted back to remove its jumps.
+    shifts: for each removed jump of the log's clock, the time from which it is shifted back, and by how many seconds.
     """
 
     time: Floats
@@ -116,7 +116,7 @@ class Places:
     gaps: tuple[Gap, ...]
     shifts: tuple[tuple[float, float], ...] = ()
 
-    def on_clock(self, time: Floats) -> Floats:
+    def to_steady_clock(self, time: Floats) -> Floats:
         """Convert times of the log's clock to the clock without jumps."""
         moved = np.array(time, dtype=np.float64)
         for start, seconds in self.shifts:
@@ -124,7 +124,7 @@ class Places:
         return moved
 
 
-def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Places:
+def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> CleanPositions:
     """Clean and sort rows of latitude, longitude and altitude.
 
     earlier_jumps: jumps of the clock that the reader has removed already.
@@ -132,7 +132,7 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     >>> rows = np.array([[46.0, 8.0, 500.0], [46.0002, 8.0, 500.0], [46.0002, 8.0, 500.0], [47.0, 8.0, 500.0]])
     >>> more = np.array([[46.0004 + 0.0002 * k, 8.0, 500.0] for k in range(4)])
     >>> time = np.array([0.0, 1.0, 1.0, 1.5, 2.0, 3.0, 4.0, 9.0])
-    >>> found = clean_places(LogSeries("POS", time, np.concatenate([rows, more])))
+    >>> found = clean_positions(LogSeries("POS", time, np.concatenate([rows, more])))
     >>> found.time.tolist(), found.faults.doubled, found.faults.glitches, found.gaps
     ([0.0, 1.0, 2.0, 3.0, 4.0, 9.0], 1, 1, (Gap(start=4.0, end=9.0),))
     """
@@ -157,7 +157,7 @@ def clean_places(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> Pl
     jumps = tuple(sorted((*earlier_jumps, *(start for start, _ in shifts))))
     faults = RowFaults(doubled, unordered, unusable, int(out.sum()), jumps)
     lat, lon, up = values.T if len(values) else np.zeros((3, 0))
-    return Places(time, lat.copy(), lon.copy(), up.copy(), faults, find_gaps(time), shifts)
+    return CleanPositions(time, lat.copy(), lon.copy(), up.copy(), faults, find_gaps(time), shifts)
 
 
 def find_gaps(time: Floats) -> tuple[Gap, ...]:
@@ -165,37 +165,38 @@ def find_gaps(time: Floats) -> tuple[Gap, ...]:
     if time.size < 2:
         return ()
     steps = np.diff(time)
-    max_step = max(LONGEST_STEP, USUAL_STEPS * float(np.median(steps)))
+    max_step = max(MAX_STEP_S, MAX_STEP_RATIO * float(np.median(steps)))
     # The tolerance covers rounding: a second between rows is no gap.
     return tuple(Gap(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > max_step + 1e-6))
 
 
 def metres_between(lat: Floats, lon: Floats) -> Floats:
-    """Return distances between successive places (n,), m: (n - 1,), also across the 180th meridian."""
-    north = np.diff(lat) * DEGREE
+    """Return distances between successive positions (n,), m: (n - 1,), also across the 180th meridian."""
+    north = np.diff(lat) * DEGREE_LENGTH_M
     east = (np.diff(lon) + 180.0) % 360.0 - 180.0
-    return np.hypot(north, east * DEGREE * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
+    return np.hypot(north, east * DEGREE_LENGTH_M * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
 
 
 def _usable_rows(time: Floats, values: Floats) -> Flags:
+    """Return a mask of rows with a valid time, position and altitude."""
     lat, lon, up = values.T
     with np.errstate(invalid="ignore"):
         placed = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
-        # A log without altitudes has none in any row; otherwise a row without altitude is unusable.
+        # A row without altitude is unusable, unless no row has one.
         has_valid_altitude = ~np.isfinite(up) | ((up > _MIN_ALTITUDE_M) & (up < _MAX_ALTITUDE_M))
         is_known = np.isfinite(up) if np.isfinite(up).any() else np.ones(up.size, bool)
         return np.asarray((time >= 0.0) & (time < 1e9) & placed & has_valid_altitude & is_known)
 
 
 def _glitch_rows(time: Floats, values: Floats) -> Flags:
-    """Return a mask of rows with impossible positions, because the vehicle was elsewhere before and after."""
+    """Return a mask of glitches: rows that no vehicle can have reached from the row before, and left again."""
     out = np.zeros(time.size, bool)
     if time.size < 5:
         return out
     lat, lon, up = values.T
     steps = np.diff(time)
     speed = metres_between(lat, lon) / np.maximum(steps, 1e-3)
-    max_speed = GLITCH_SPEED + GLITCH_TIMES * float(np.median(speed))
+    max_speed = GLITCH_SPEED_MPS + GLITCH_SPEED_RATIO * float(np.median(speed))
     rise = np.abs(np.diff(up)) / np.maximum(steps, 1e-3)
     leaps = np.flatnonzero((speed > max_speed) | (np.nan_to_num(rise) > max_speed))
     k = 0
@@ -203,7 +204,7 @@ def _glitch_rows(time: Floats, values: Floats) -> Flags:
         # Away with one leap and back with a later one.
         begin = int(leaps[k])
         for back in leaps[k + 1 :].tolist():
-            if back - begin > GLITCH_ROWS:
+            if back - begin > MAX_GLITCH_ROWS:
                 break
             if _is_reachable(time, values, begin, back + 1, max_speed):
                 out[begin + 1 : back + 1] = True
@@ -219,6 +220,7 @@ def _glitch_rows(time: Floats, values: Floats) -> Flags:
 
 
 def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_speed: float) -> bool:
+    """Return True if a vehicle can get from one row to another at this speed, m/s, over ground and vertically."""
     pair = [first, second]
     distance = float(metres_between(values[pair, 0], values[pair, 1])[0])
     rise = abs(float(values[second, 2] - values[first, 2]))
@@ -227,10 +229,10 @@ def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_spe
 
 
 def _is_in_main_group(time: Floats) -> Flags:
-    """Select rows, by their sorted times (n,), except small groups far away in time from all others."""
+    """Return a mask of rows (n,), from their sorted times, without small groups far away in time from all others."""
     parts = np.cumsum(np.concatenate([[0], np.diff(time) > LATEST])) if time.size else np.zeros(0, np.int64)
     counts = np.bincount(parts)
-    return np.asarray((counts >= min(ROWS_BEHIND, int(counts.max(initial=0))))[parts])
+    return np.asarray((counts >= min(MIN_LATE_ROWS, int(counts.max(initial=0))))[parts])
 
 
 def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
@@ -241,13 +243,13 @@ def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[fl
     steps = np.diff(time)
     distances = metres_between(values[:, 0], values[:, 1])
     usual = float(np.median(steps))
-    for k in np.flatnonzero(steps > max(JUMP, 2.0 * JUMP_STEPS * usual)).tolist():
+    for k in np.flatnonzero(steps > max(MIN_CLOCK_JUMP_S, 2.0 * MAX_JUMP_STEPS * usual)).tolist():
         around = slice(max(0, k - 5), k + 6)
-        ordinary = steps[around] <= JUMP_STEPS * usual
+        ordinary = steps[around] <= MAX_JUMP_STEPS * usual
         if ordinary.sum() < 4:
             continue
         speed = float((distances[around][ordinary] / steps[around][ordinary]).min())
-        if speed > MOVING and distances[k] <= speed * JUMP_STEPS * usual:
+        if speed > MIN_MOVING_SPEED_MPS and distances[k] <= speed * MAX_JUMP_STEPS * usual:
             shifts.append((float(time[k + 1]), float(steps[k] - usual)))
     moved = time.copy()
     for start, seconds in shifts:
