@@ -30,7 +30,7 @@ _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Return signals with the airspeed that fits the wind triangle best, its factor and its sd."""
+    """Return signals with the airspeed scaled to fit the wind triangle, and the factor's standard deviation."""
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
 
@@ -43,14 +43,14 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     from scipy.signal import lfilter
 
     north_air, east_air = _air_velocity(signals, flow)
-    thinned = signals.thinned(_THINNING, {"ahead": north_air, "right": east_air})
+    thinned = signals.thin(_THINNING, {"ahead": north_air, "right": east_air})
     north_air, east_air = thinned.extra["ahead"], thinned.extra["right"]
     north, east, _ = thinned.velocity.T
     stretches = list(zip(thinned.edges[:-1], thinned.edges[1:], strict=True))
-    # Wind is ground velocity minus air velocity; the heading's error rotates the latter. A gust is in the wind, in the
-    # airspeed and its direction, and after a while in the ground velocity, since the aircraft drifts with it: a
-    #     regressor with the gust in it would bias the scale. The regressor of the scale is therefore the mean airspeed
-    #     along the flown course, smoothed over the time in which gusts change.
+    # Wind is ground velocity minus air velocity; an error of the heading rotates the air velocity. A gust is in the
+    # wind, in the airspeed and its direction, and after a while in the ground velocity, since the aircraft drifts with
+    # it: a regressor with the gust in it would bias the scale. The regressor of the scale is therefore the mean airspeed
+    # along the flown course, smoothed over the time in which gusts change.
     mean_air = np.empty((2, len(north_air)))
     for first, last in stretches:
         rows = slice(first, last)

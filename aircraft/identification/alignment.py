@@ -78,10 +78,10 @@ class Signals:
             smoothed[first:last] = low_pass(values[first:last], cutoff, self.hertz)
         return smoothed
 
-    def thinned(self, step: int, extra: Mapping[str, Floats]) -> "Signals":
-        """Return every ``step``-th row, after low-pass filtering.
+    def thin(self, step: int, extra: Mapping[str, Floats]) -> "Signals":
+        """Return every ``step``-th row of the low-passed signals.
 
-        extra: (n,) further columns to thin alike.
+        extra: further columns (n,) by name, thinned in the same way.
         """
         edges, blocks, pieces = [0], [], []
         columns = {name: getattr(self, name) for name in _SAMPLED_FIELDS} | dict(extra)
@@ -109,7 +109,7 @@ class Signals:
             extra=extra_columns,
         )
 
-    def delayed(self, values: Floats, delay: float) -> Floats:
+    def delay(self, values: Floats, delay: float) -> Floats:
         """Return values delayed by ``delay`` (s), each stretch separately."""
         delayed_values = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
@@ -140,7 +140,7 @@ _AIRSPEED_CUTOFF_HZ = 2.0
 
 
 def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: float) -> Signals:
-    """Put stretches in sequence, each on the clock of its accelerometers.
+    """Join stretches in sequence, each on the clock of its accelerometers.
 
     motor_lag: s.
     """

@@ -1,11 +1,11 @@
 """Predict parts of a log that no estimate has seen, as bands of 95 %, and count how often the flight is inside.
 
 The judged part of the log is cut into windows. Each window starts from the measured state and follows the logged
-controls. Forty flights of a window differ in what is not known: each flies with another draw of the aircraft, and adds
-the errors of the central aircraft over one window of an earlier part of the log, drawn at random. These blocks of
-errors hold gusts, noise of the sensors and what the model lacks, with their growth over time and their correlation (a
-block bootstrap: Kunsch 1989; Politis and Romano 1994). Biases of the sensors, trim offsets and the filter of the gusts
-come from the earlier part too. Nothing is fitted to the judged part.
+controls. The forty simulated flights of a window differ in what is not known: each uses another draw of the aircraft,
+and adds the errors of the central aircraft over one window of an earlier part of the log, drawn at random. These blocks
+of errors contain gusts, noise of the sensors and what the model lacks, with their growth over time and their
+correlation (a block bootstrap: Kunsch 1989; Politis and Romano 1994). Biases of the sensors, trim offsets and the
+filter of the gusts come from the earlier part too. Nothing is fitted to the judged part.
 """
 
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from aircraft.identification.airspeed import airspeed_scale
 from aircraft.identification.alignment import Clocks, Signals, align
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
-from aircraft.identification.flow import motor_of, vane, voltage_of
+from aircraft.identification.flow import battery_voltage, flow_from_forces, make_motor
 from aircraft.identification.level import level_signals
 from aircraft.identification.parameters import prior_means
 from aircraft.identification.prediction import GustFilter, Predictor
@@ -78,8 +78,8 @@ class Band:
     along: (n,) time or distance.
     low, high: (n,) ends of the band.
     flown: (n,) the flight; NaN where it is not known.
-    unchanged: half the width of the band of a quantity that keeps the value with which each window starts; NaN if that
-        is not a prediction.
+    unchanged: half the width of the band if the quantity is predicted to keep its value at the start of each window;
+        NaN if this is not a prediction.
     """
 
     name: str
@@ -111,7 +111,7 @@ class Band:
 def band_limits(values: Floats) -> tuple[Floats, Floats]:
     """Return the ends of the band (n,) of draws (d, n), at the plotting positions k / (d + 1) (Weibull 1939).
 
-    The next draw is inside with the probability `COVERAGE`; percentiles of the draws themselves would hold fewer.  The
+    The next draw is inside with the probability `COVERAGE`; percentiles of the draws would contain fewer.  The
     band is unknown (NaN) where fewer than `_MIN_KNOWN_FRACTION` of the draws have a value.
 
     >>> low, high = band_limits(np.arange(39.0)[:, np.newaxis])
@@ -144,9 +144,9 @@ class BlindPrediction:
     ) -> None:
         raw = align(earlier, [clocks] * len(earlier), base.motor_lag)
         self._earlier = level_signals(raw)
-        scale, _ = airspeed_scale(self._earlier, vane(self._earlier, base, prior_means()))
-        self._earlier = _scaled(self._earlier, scale)
-        self._judged = _scaled(
+        scale, _ = airspeed_scale(self._earlier, flow_from_forces(self._earlier, base, prior_means()))
+        self._earlier = _scale_airspeed(self._earlier, scale)
+        self._judged = _scale_airspeed(
             level_signals(align(judged, [clocks] * len(judged), base.motor_lag), reference=raw), scale
         )
         self._times = np.concatenate([record.time for record in judged])
@@ -154,14 +154,14 @@ class BlindPrediction:
         central = Predictor(self._earlier, base, prior_means())
         self._filters: Sequence[GustFilter] = central.filters
         starts = _window_starts(self._earlier, self._count, round(_CALIBRATION_STEP_S * self._earlier.hertz))
-        measured = _measured(self._earlier, starts, self._count)
+        measured = _measured_quantities(self._earlier, starts, self._count)
         self._errors = measured - self._fly(self._earlier, base, starts)
         self._changes = measured - measured[:, :1]
-        # Of the height, the change beyond that of a constant height rate.
+        # For the height, the change beyond the change at a constant height rate.
         seconds = np.arange(measured.shape[1]) * _THINNING_FACTOR / GRID_HZ
         self._changes[:, :, _HEIGHT] -= measured[:, :1, _HEIGHT_RATE] * seconds
         self._starts = _window_starts(self._judged, self._count, self._count)
-        self._flown = _measured(self._judged, self._starts, self._count)
+        self._flown = _measured_quantities(self._judged, self._starts, self._count)
 
     @property
     def windows(self) -> tuple[int, int]:
@@ -180,7 +180,7 @@ class BlindPrediction:
         )
         flights[:, :, :, _POWER] = np.maximum(0.0, flights[:, :, :, _POWER])
         low, high = band_limits(flights)
-        times = self._times[self._starts[:, np.newaxis] + _rows(self._count)].ravel()
+        times = self._times[self._starts[:, np.newaxis] + _kept_rows(self._count)].ravel()
         bands = []
         for k, quantity in enumerate(QUANTITIES):
             unchanged = np.quantile(np.abs(self._changes[:, :, k]), COVERAGE, axis=0)
@@ -197,9 +197,9 @@ class BlindPrediction:
         states = np.stack(list(predictor.fly(starts, self._count)), axis=1)
         rows = starts[:, np.newaxis] + np.arange(self._count + 1)
         measured_velocity = signals.velocity[rows[:, 0]]
-        motor = motor_of(base, values)
+        motor = make_motor(base, values)
         airspeed = np.linalg.norm(states[:, :, :3], axis=2)
-        volts = voltage_of(signals, base)
+        volts = battery_voltage(signals, base)
         battery = volts[rows] if isinstance(volts, np.ndarray) else np.full(rows.shape, volts)
         flat = [array.ravel() for array in (airspeed, signals.throttle[rows], signals.density[rows], battery)]
         _, current = motor.thrust_and_current(*flat)
@@ -207,14 +207,16 @@ class BlindPrediction:
         air = _to_ground(states, heading)
         # The air moves as it did at the start of the window.
         velocity = air + (measured_velocity - air[:, 0])[:, np.newaxis]
-        return _quantities(states[:, :, 6:8], airspeed, velocity, current.reshape(rows.shape) * battery, signals.hertz)
+        return _stack_quantities(
+            states[:, :, 6:8], airspeed, velocity, current.reshape(rows.shape) * battery, signals.hertz
+        )
 
 
-def _scaled(signals: Signals, factor: float) -> Signals:
+def _scale_airspeed(signals: Signals, factor: float) -> Signals:
     return replace(signals, airspeed=signals.airspeed * factor)
 
 
-def _rows(count: int) -> Ints:
+def _kept_rows(count: int) -> Ints:
     """Return the samples of a window that are kept, without its start, which is measured."""
     return np.arange(_THINNING_FACTOR, count + 1, _THINNING_FACTOR)
 
@@ -230,10 +232,10 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
     )
 
 
-def _measured(signals: Signals, starts: Ints, count: int) -> Floats:
+def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
     """Return the measured `QUANTITIES` (w, k, q) over windows; the power is NaN for a log without current."""
     rows = starts[:, np.newaxis] + np.arange(count + 1)
-    return _quantities(
+    return _stack_quantities(
         signals.attitude[rows, :2],
         signals.airspeed[rows],
         signals.velocity[rows],
@@ -242,13 +244,13 @@ def _measured(signals: Signals, starts: Ints, count: int) -> Floats:
     )
 
 
-def _quantities(angles: Floats, airspeed: Floats, velocity: Floats, power: Floats, hertz: float) -> Floats:
+def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power: Floats, hertz: float) -> Floats:
     """Return `QUANTITIES` (w, k, q) over windows, of bank and pitch (w, n, 2), and velocity (w, n, 3)."""
     north, east, down = np.moveaxis(velocity, 2, 0)
     course = np.arctan2(east[:, :1], north[:, :1])
     right = east * np.cos(course) - north * np.sin(course)
     height, track = (np.cumsum(speed, axis=1) / hertz for speed in (-down, right))
-    kept = _rows(angles.shape[1] - 1)
+    kept = _kept_rows(angles.shape[1] - 1)
     columns = (angles[:, :, 0], angles[:, :, 1], airspeed, -down, height - height[:, :1], track - track[:, :1], power)
     return np.stack([column[:, kept] for column in columns], axis=2)
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.flow import Flow, lift_curve, other_lift, pressure_of, voltage_of
+from aircraft.identification.flow import Flow, battery_voltage, dynamic_force, lift_curve, other_lift
 from aircraft.identification.parameters import PARAMETERS, prior_means, prior_sds
 from aircraft.identification.regression import Fit, fit_with_prior
 from world.arrays import Floats
 
 # Cutoff below which forces are compared, Hz.
-FORCE_BAND = 1.0
+FORCE_CUTOFF_HZ = 1.0
 # One of this many samples is used.
 FORCE_THINNING = 10
 # Other uncertain quantities, which the log hardly informs, with standard deviations; they are estimated with drag and
@@ -93,10 +93,10 @@ class ForwardForces:
         unknown: parameters, then nuisances.
         """
         force, current = self._raw(unknown)
-        return self.signals.smooth(force, FORCE_BAND), self.signals.smooth(current, FORCE_BAND)
+        return self.signals.smooth(force, FORCE_CUTOFF_HZ), self.signals.smooth(current, FORCE_CUTOFF_HZ)
 
     def _raw(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return both before the low-pass."""
+        """Return forward acceleration (n,), m/s^2, and current (n,), A, before the low-pass."""
         zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, elevator_drag, *tilts = unknown
         motor = self.base.motor.with_factors(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
         signals = self.signals
@@ -113,11 +113,13 @@ class ForwardForces:
         return force / self.base.mass + bias, current
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return the derivatives (n, p) of both by each unknown."""
+        """Return the derivatives (n, p) of forward acceleration and current by each unknown."""
         steps = _DIFFERENCE_STEP * np.eye(len(unknown))
         # One low-pass of all columns: a call costs far more than a column.
         forces, currents = zip(*(self._raw(unknown + step) for step in (0.0 * steps[0], *steps)), strict=True)
-        force, current = (self.signals.smooth(np.column_stack(samples), FORCE_BAND) for samples in (forces, currents))
+        force, current = (
+            self.signals.smooth(np.column_stack(samples), FORCE_CUTOFF_HZ) for samples in (forces, currents)
+        )
         return (force[:, 1:] - force[:, :1]) / _DIFFERENCE_STEP, (current[:, 1:] - current[:, :1]) / _DIFFERENCE_STEP
 
 
@@ -126,8 +128,8 @@ def fit_drag(
 ) -> tuple[Fit, Floats, Floats]:
     """Fit drag and motor; return the fit, the parameters' values (5,), and their covariance (5, 5).
 
-    The values give the same forces and currents with the base's own resistance, idle current, voltage and elevator drag
-    as the fit does with its own.
+    With the base model's resistance, idle current, voltage and elevator drag, these values give the same forces and
+    currents as the fit does with its fitted ones.
 
     values: (n,) of all parameters, of which the parameters of lift are used.
     uncertainty: uncertainty of the lift curve.
@@ -141,7 +143,7 @@ def fit_drag(
     if with_current:
         fit = _fit_from(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)
     force, _ = forces.predicted(fit.estimate)
-    measured = thinned.smooth(thinned.acceleration[:, 0], FORCE_BAND)
+    measured = thinned.smooth(thinned.acceleration[:, 0], FORCE_CUTOFF_HZ)
     explained = 1.0 - float((measured - force).var() / measured.var())
     drag_values, jacobian = _fold_nuisances(forces, fit.estimate)
     return (
@@ -188,8 +190,8 @@ class _Measurement:
     """Measured forward acceleration and, with the current, the current, (n,), low-passed."""
 
     def __init__(self, signals: Signals, *, with_current: bool) -> None:
-        self.force = signals.smooth(signals.acceleration[:, 0], FORCE_BAND)
-        self.current = signals.smooth(signals.current, FORCE_BAND) if with_current else None
+        self.force = signals.smooth(signals.acceleration[:, 0], FORCE_CUTOFF_HZ)
+        self.current = signals.smooth(signals.current, FORCE_CUTOFF_HZ) if with_current else None
         self.block, self.floor = signals.block, FORCE_FLOOR**2 * FLOOR_SECONDS * signals.hertz
 
 
@@ -226,8 +228,8 @@ def forward_forces(
     values, uncertainty: see `fit_drag`.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
-    thinned = signals.thinned(FORCE_THINNING, {"alpha": flow.alpha})
-    alpha, pressure = thinned.extra["alpha"], pressure_of(thinned, base)
+    thinned = signals.thin(FORCE_THINNING, {"alpha": flow.alpha})
+    alpha, pressure = thinned.extra["alpha"], dynamic_force(thinned, base)
     lift = slope * alpha + zero
     forward_pressure, lift_excess = -pressure * np.cos(alpha), lift - coefficients.lift_least_drag
     tilt = pressure * lift * np.cos(alpha)
@@ -240,5 +242,5 @@ def forward_forces(
         drags=forward_pressure
         * np.vstack([np.full(len(alpha), coefficients.drag_zero), coefficients.drag_induced * np.square(lift_excess)]),
         elevator=forward_pressure * coefficients.drag_elevator * thinned.surfaces[:, 0],
-        volts=voltage_of(thinned, base),
+        volts=battery_voltage(thinned, base),
     )

@@ -18,9 +18,9 @@ from aircraft.identification.airspeed import SCALE_SD, with_airspeed_scale
 from aircraft.identification.alignment import Clocks, Signals, align, find_clocks, invert_first_order_lag
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.drag import FORCE_THINNING, AlphaUncertainty, fit_drag
-from aircraft.identification.fixed_parameters import HELD_FIXED, NOISE
+from aircraft.identification.fixed_parameters import ACCELEROMETER_NOISE, FIXED_PARAMETERS
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
-from aircraft.identification.flow import motor_of, vane
+from aircraft.identification.flow import flow_from_forces, make_motor
 from aircraft.identification.level import LEVEL_SD, level_signals
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
@@ -34,8 +34,8 @@ from world.arrays import Floats
 ALIGNED_SECONDS = 200.0
 # Number of passes over lift curve and drag, each with the angle of attack of the pass before.
 _PASSES = 2
-# Fraction of an interval's variance below which the logs hardly inform a parameter.
-SILENT = 0.2
+# Fraction of a parameter's variance that the logs must remove; with less the logs hardly determine the parameter.
+MIN_LOG_FRACTION = 0.2
 # Name of the shift that shows how much the moments depend on the times ahead of the compared predictions.
 LONGER_PREDICTIONS = "time ahead of the predictions (0.1 to 0.2 s longer)"
 # Title, unit and samples per second of each equation.
@@ -79,7 +79,7 @@ class Estimate:
     equations: the fitted equations.
     shifts: change (n,) of the estimate for one standard deviation of each quantity that is held fixed.
     with_current: True if the battery's current was used.
-    dynamics: True if the moments were estimated; their parameters are the prior's otherwise.
+    dynamics: True if the moments were estimated; False if their parameters are the prior's.
     airspeed: ratio of true to measured airspeed from the wind triangle, and its standard deviation.
     seconds: length of the flight that was used.
     refinement: refinement of the moments; None if they were not estimated.
@@ -101,16 +101,16 @@ class Estimate:
         """Standard deviations (n,)."""
         return np.sqrt(np.diag(self.covariance))
 
-    def silent(self) -> tuple[str, ...]:
-        """Return a line for each parameter that the logs hardly inform, with an informative maneuver."""
-        fractions = self.of_log().tolist()
+    def uninformed_lines(self) -> tuple[str, ...]:
+        """Return a line for each parameter that the logs hardly determine, with a maneuver that would determine it."""
+        fractions = self.log_fractions().tolist()
         return tuple(
-            f"{parameter.title}: its interval stays the prior's; fly {parameter.show}"
+            f"{parameter.title}: its interval stays as assumed before the logs; fly {parameter.show}"
             for parameter, fraction in zip(PARAMETERS, fractions, strict=True)
-            if fraction < SILENT
+            if fraction < MIN_LOG_FRACTION
         )
 
-    def of_log(self) -> Floats:
+    def log_fractions(self) -> Floats:
         """Return the fraction (n,) of each interval that comes from the logs.
 
         It is 1 minus the ratio of the remaining variance to the prior's variance.
@@ -121,14 +121,14 @@ class Estimate:
 def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics: bool = True) -> Estimate:
     """Estimate all parameters from stretches of flight.
 
-    dynamics: True to include the moments; otherwise only lift, drag and thrust, for logs too slow for the rest.
+    dynamics: True to estimate the moments too; False for logs with too few rows per second to show them.
     """
     default_clocks = Clocks(servo_lag=base.servo_lag)
     clocks = align_clocks(records, base) if dynamics else tuple(default_clocks for _ in records)
     signals = aligned_signals(records, clocks, base)
     nominal = fit_all(signals, base, dynamics=dynamics)
     shifts = {}
-    for fixed in HELD_FIXED:
+    for fixed in FIXED_PARAMETERS:
         if fixed.applies(with_current=nominal.with_current):
             shifted_signals, shifted_base = fixed.change(signals, base)
             shifted_estimate = fit_all(
@@ -145,9 +145,9 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
         shift = np.zeros(len(PARAMETERS))
         shift[IS_MOMENT] = longer.values - nominal.refinement.values
         shifts[LONGER_PREDICTIONS] = shift
-    # Noise in a regressor flattens its slope; the effect of as much noise again is taken back (Cook and Stefanski 1994,
+    # Noise in a regressor flattens its slope; the effect of doubling the noise is subtracted (Cook and Stefanski 1994,
     # with the straight line of their extrapolants).
-    noise_bias = np.where(IS_MOMENT, shifts[NOISE], 0.0)
+    noise_bias = np.where(IS_MOMENT, shifts[ACCELEROMETER_NOISE], 0.0)
     covariance = total_covariance(nominal.covariance, shifts)
     values = nominal.values - noise_bias
     if dynamics:
@@ -179,7 +179,7 @@ def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floa
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
     """Return all stretches on the clocks of their accelerometers, leveled, with wind-triangle airspeed."""
     signals = level_signals(align(records, clocks, base.motor_lag))
-    return with_airspeed_scale(signals, vane(signals, base, prior_means()))
+    return with_airspeed_scale(signals, flow_from_forces(signals, base, prior_means()))
 
 
 def score_predictions(
@@ -217,8 +217,8 @@ def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Cloc
 
         def misfit(clock: Clocks, part: FlightRecord = part) -> float:
             signals = align([part], [clock], base.motor_lag)
-            alpha, beta, _ = vane(signals, base, prior_means())
-            # The clocks are to fit the data, not the prior.
+            alpha, beta, _ = flow_from_forces(signals, base, prior_means())
+            # A wide prior, so that the clocks fit the data and not the prior.
             fits = fit_moments(signals, base, alpha, beta, spread=10.0)
             return sum(_log_unexplained(fits[axis], clock.lag) for axis in AXES)
 
@@ -267,19 +267,19 @@ def fit_all(
     if lift is not None:
         store("lift", lift, np.zeros((2, 2)))
     for _ in range(_PASSES):
-        flow = vane(signals, base, values)
+        flow = flow_from_forces(signals, base, values)
         if lift is None:
             fits["lift"], curve, spread = fit_lift(signals, base, flow.lift, level)
             store("lift", curve, spread)
             uncertainty = alpha_uncertainty(fits["lift"], flow.lift)
-            flow = vane(signals, base, values)
+            flow = flow_from_forces(signals, base, values)
         fits["drag"], drag_values, spread = fit_drag(signals, base, values, flow, uncertainty)
         store("drag", drag_values, spread)
     refinement = nominal
     if refinement is not None:
         values[IS_MOMENT] = refinement.shifted(signals, base, values)
     elif dynamics:
-        fits |= fit_moments(signals, base, flow.alpha, flow.beta, motor_of(base, values))
+        fits |= fit_moments(signals, base, flow.alpha, flow.beta, make_motor(base, values))
         for axis in AXES:
             is_in_axis = np.array([parameter.group == axis for parameter in PARAMETERS])
             values[is_in_axis] = fits[axis].estimate[: is_in_axis.sum()]

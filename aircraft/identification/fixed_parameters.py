@@ -7,7 +7,7 @@ import numpy as np
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.flow import VANE_BAND
+from aircraft.identification.flow import VANE_CUTOFF_HZ
 from world.arrays import Floats
 
 # Signals and model after a change.
@@ -22,7 +22,7 @@ class FixedParameter:
     change: function that returns signals and model with the quantity one standard deviation higher.
     level: change of the autopilot's level, rad.
     air: change of the vertical air velocity, m/s.
-    of_current: True if it applies only to logs with the battery's current.
+    of_current: True if the quantity matters only for logs with the battery's current.
     """
 
     name: str
@@ -36,7 +36,7 @@ class FixedParameter:
         return self.level + (self.air / float(signals.airspeed.mean()) if self.air else 0.0)
 
     def applies(self, *, with_current: bool) -> bool:
-        """Return True if it applies to logs with or without the battery's current."""
+        """Return True if the quantity matters for a log with, or without, the battery's current."""
         return with_current or not self.of_current
 
 
@@ -96,7 +96,7 @@ def _double_noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Chang
         noisy, generator = signals.acceleration.copy(), np.random.default_rng(1)
 
         def noise_level(values: Floats) -> float:
-            return float((values - signals.smooth(values, VANE_BAND)).std())
+            return float((values - signals.smooth(values, VANE_CUTOFF_HZ)).std())
 
         for axis in axes:
             white_noise = generator.standard_normal(len(noisy))
@@ -108,13 +108,13 @@ def _double_noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Chang
 
 def _delay_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (
-        replace(signals, acceleration=signals.delayed(signals.acceleration, seconds)),
+        replace(signals, acceleration=signals.delay(signals.acceleration, seconds)),
         base,
     )
 
 
 def _delay_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    return lambda signals, base: (replace(signals, surfaces=signals.delayed(signals.surfaces, seconds)), base)
+    return lambda signals, base: (replace(signals, surfaces=signals.delay(signals.surfaces, seconds)), base)
 
 
 def _scale_current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
@@ -126,13 +126,13 @@ def _unchanged(signals: Signals, base: BaseModel) -> Changed:
 
 
 # Name of the quantity for the accelerometers' noise.
-NOISE = "noise of the accelerometers"
+ACCELEROMETER_NOISE = "noise of the accelerometers"
 # Standard deviation of the autopilot's level, rad.
 _LEVEL_SD_RAD = float(np.radians(0.2))
 # Standard deviations are ratios to the base's value. Base models leave out small values, and a value of 0 is no more
 # certain than the Aerosonde's (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2), which gives the
 # smallest standard deviation.
-HELD_FIXED = (
+FIXED_PARAMETERS = (
     FixedParameter("lift of the elevator (50 %)", _change_coefficient("lift_elevator", 0.5)),
     FixedParameter("lift of the pitch rate (50 %)", _change_coefficient("lift_rate", 0.5)),
     FixedParameter("side force of sideslip (30 %)", _change_coefficient("side_beta", 0.3)),
@@ -149,6 +149,6 @@ HELD_FIXED = (
     ),
     FixedParameter("mean vertical air (0.04 m/s)", _unchanged, air=0.04),
     FixedParameter("downward accelerometer (0.03 m/s2)", _bias_acceleration(2, 0.03)),
-    FixedParameter(NOISE, _double_noise((1, 2))),
+    FixedParameter(ACCELEROMETER_NOISE, _double_noise((1, 2))),
     FixedParameter("scale of the current (2 %)", _scale_current(1.02), of_current=True),
 )

@@ -15,7 +15,7 @@ from aircraft.identification.parameters import INDEX
 from world.arrays import Floats
 
 # Cutoff of the vane, Hz.
-VANE_BAND = 8.0
+VANE_CUTOFF_HZ = 8.0
 
 
 class Flow(NamedTuple):
@@ -35,18 +35,18 @@ def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
     return c.lift_alpha * float(values[INDEX["lift-slope"]]), c.lift_zero + float(values[INDEX["lift-offset"]])
 
 
-def motor_of(base: BaseModel, values: Floats) -> Motor:
-    """Return the motor with one set of values (n,)."""
+def make_motor(base: BaseModel, values: Floats) -> Motor:
+    """Return the base model's motor with the factors of the parameter values (n,)."""
     thrust, speed, torque = (float(values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
     return base.motor.with_factors(thrust, speed, torque)
 
 
-def voltage_of(signals: Signals, base: BaseModel) -> Floats | float:
+def battery_voltage(signals: Signals, base: BaseModel) -> Floats | float:
     """Return the battery's voltage, V: the logged voltage, or the base model's voltage."""
     return signals.voltage if np.isfinite(signals.voltage).all() else base.motor.voltage
 
 
-def pressure_of(signals: Signals, base: BaseModel) -> Floats:
+def dynamic_force(signals: Signals, base: BaseModel) -> Floats:
     """Return dynamic pressure times wing area (n,), N."""
     return np.asarray(0.5 * signals.density * np.square(signals.airspeed) * base.area)
 
@@ -58,16 +58,16 @@ def other_lift(signals: Signals, base: BaseModel) -> Floats:
     return np.asarray(c.lift_rate * pitching + c.lift_elevator * signals.surfaces[:, 0])
 
 
-def vane(signals: Signals, base: BaseModel, values: Floats, *, smooth: bool = True) -> Flow:
-    """Return the flow angles derived from the accelerometers.
+def flow_from_forces(signals: Signals, base: BaseModel, values: Floats, *, smooth: bool = True) -> Flow:
+    """Estimate the flow angles from the accelerometers, which measure lift and side force.
 
     values: (n,) of `aircraft.identification.parameters.PARAMETERS`, of which the parameters of lift and motor are used.
-    smooth: True to smooth them forwards and backwards; False for values that no later sample enters.
+    smooth: True to low-pass the angles forwards and backwards; False for angles that depend on no later sample.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
-    pressure, other_coefficient = pressure_of(signals, base), other_lift(signals, base)
-    thrust, _ = motor_of(base, values).thrust_and_current(
-        signals.airspeed, signals.throttle, signals.density, voltage_of(signals, base)
+    pressure, other_coefficient = dynamic_force(signals, base), other_lift(signals, base)
+    thrust, _ = make_motor(base, values).thrust_and_current(
+        signals.airspeed, signals.throttle, signals.density, battery_voltage(signals, base)
     )
     x = base.mass * signals.acceleration[:, 0] - thrust
     z = base.mass * signals.acceleration[:, 2]
@@ -84,7 +84,7 @@ def vane(signals: Signals, base: BaseModel, values: Floats, *, smooth: bool = Tr
     side = base.mass * signals.acceleration[:, 1] / pressure - rate_force
     beta = (side - coefficients.side_aileron * aileron - coefficients.side_rudder * rudder) / coefficients.side_beta
     flow = Flow(alpha, beta, lift)
-    return Flow(*(signals.smooth(angle, VANE_BAND) for angle in flow)) if smooth else flow
+    return Flow(*(signals.smooth(angle, VANE_CUTOFF_HZ) for angle in flow)) if smooth else flow
 
 
 def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:

@@ -70,7 +70,7 @@ def lateral_biases(signals: Signals) -> Floats:
 
 
 def level_signals(signals: Signals, reference: Signals | None = None) -> Signals:
-    """Return signals without biases, and with the forward excess divided between level and accelerometer.
+    """Remove the biases of the sensors, and divide the forward excess between level and accelerometer.
 
     reference: signals of the same sensors whose mean biases are used; None for the biases of each stretch itself.
     """

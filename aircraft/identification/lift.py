@@ -14,7 +14,7 @@ from aircraft.identification.regression import Fit, fit_with_prior
 from world.arrays import Floats
 
 # Cutoff below which lift and angle of attack are compared, Hz.
-LIFT_BAND = 0.15
+LIFT_CUTOFF_HZ = 0.15
 
 
 def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0) -> tuple[Fit, Floats, Floats]:
@@ -23,8 +23,8 @@ def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0
     lift: (n,) lift coefficient.
     level: rad.
     """
-    measured = signals.smooth(attitude_alpha(signals, level), LIFT_BAND)
-    smoothed = signals.smooth(lift, LIFT_BAND)
+    measured = signals.smooth(attitude_alpha(signals, level), LIFT_CUTOFF_HZ)
+    smoothed = signals.smooth(lift, LIFT_CUTOFF_HZ)
     c = base.coefficients
     slope_sd, offset_sd = prior_sds()[:2]
     # About the mean lift, where slope and angle are uncorrelated.

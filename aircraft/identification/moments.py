@@ -8,7 +8,7 @@ import numpy as np
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.flow import pressure_of
+from aircraft.identification.flow import dynamic_force
 from aircraft.identification.motor import Motor
 from aircraft.identification.parameters import PARAMETERS, Group
 from aircraft.identification.regression import Fit, fit_with_prior
@@ -18,7 +18,7 @@ from world.arrays import Floats
 AXES: tuple[Group, ...] = ("pitch", "roll", "yaw")
 
 # Cutoff below which moments are compared, Hz.
-MOMENT_BAND = 4.0
+MOMENT_CUTOFF_HZ = 4.0
 # One of this many samples is used.
 MOMENT_THINNING = 2
 # Standard deviation of the moment coefficient from an aircraft's asymmetry, or a surface's trim, in a stretch.
@@ -42,8 +42,8 @@ def fit_moments(
     motor: motor whose torque rolls the aircraft; None for the base's motor.
     spread: factor on the priors' standard deviations.
     """
-    thinned = signals.thinned(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
-    pressure = pressure_of(thinned, base)
+    thinned = signals.thin(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
+    pressure = dynamic_force(thinned, base)
     required = required_moments(thinned, base, base.motor if motor is None else motor)
     terms = _moment_regressors(thinned, base)
     fits = {}
@@ -59,7 +59,7 @@ def fit_moments(
         equation = np.column_stack(
             [required[axis] / inertia - scale * known_part, *(scale * column for column in columns)]
         )
-        equation = thinned.smooth(equation, MOMENT_BAND)
+        equation = thinned.smooth(equation, MOMENT_CUTOFF_HZ)
         fits[axis] = fit_with_prior(
             equation[:, 1:], equation[:, 0], np.array(means), spread * np.array(sds), thinned.block
         )

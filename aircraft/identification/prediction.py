@@ -18,7 +18,7 @@ import numpy as np
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.flow import Flow, lift_curve, motor_of, vane, voltage_of
+from aircraft.identification.flow import Flow, battery_voltage, flow_from_forces, lift_curve, make_motor
 from aircraft.identification.level import GRAVITY
 from aircraft.identification.moments import required_moments
 from aircraft.identification.parameters import INDEX
@@ -117,8 +117,8 @@ class Predictor:
         self._signals, self._base, self._values = signals, base, values
         self._with_flow = with_flow
         # A prediction must not start from later samples.
-        self._flow = vane(signals, base, values, smooth=with_flow)
-        self._motor = motor_of(base, values)
+        self._flow = flow_from_forces(signals, base, values, smooth=with_flow)
+        self._motor = make_motor(base, values)
         required = self._required_accelerations()
         modelled = self._accelerations(self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed)))
         self.trims = np.empty_like(modelled)
@@ -263,7 +263,7 @@ class Predictor:
             + c.side_rudder * rudder
         )
         density = signals.density[rows]
-        volts = voltage_of(signals, base)
+        volts = battery_voltage(signals, base)
         thrust, _ = self._motor.thrust_and_current(
             airspeed, signals.throttle[rows], density, volts[rows] if isinstance(volts, np.ndarray) else volts
         )

@@ -254,7 +254,7 @@ def _print_uncertain_properties(result: "planfly.IdentifiedAircraft") -> None:
         print(f"  conflict {result.conflict.text}")
     for wide_number in result.wide:
         print(f"  wide     {wide_number.text}")
-    for line in result.estimate.silent():
+    for line in result.estimate.uninformed_lines():
         print(f"  not seen {line}")
     for log_name in result.without_current:
         print(

@@ -45,7 +45,7 @@ def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int],
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.
     """
-    log_fractions = estimate.of_log()
+    log_fractions = estimate.log_fractions()
     for name, control in _CONTROL_BY_PARAMETER.items():
         k = INDEX[name]
         if estimate.values[k] < 0.0 and (

@@ -293,7 +293,7 @@ def posterior_text(identified: Identified) -> str:
         power = min(1.0, max(power, math.log(conflict.largest_power / conflict.power) / 1.96))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
     fastest = fastest_level(identified.numbers, identified.draws, DENSITY)
-    log_fractions = estimate.of_log()
+    log_fractions = estimate.log_fractions()
     lines = [
         "# What flight logs say of this aircraft.  Each property is one of the model's: a factor on the base's",
         "# coefficient, or an offset to it; the model's own value of it is the estimate.",

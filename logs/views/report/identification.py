@@ -61,7 +61,7 @@ class ParameterRow(NamedTuple):
 
 def parameter_rows(estimate: Estimate) -> list[ParameterRow]:
     """Return every parameter with its prior, its estimate and its 95 % interval."""
-    shares = np.round(100.0 * estimate.of_log()).astype(int).tolist()
+    shares = np.round(100.0 * estimate.log_fractions()).astype(int).tolist()
     rows = []
     for parameter, value, sd, share in zip(
         PARAMETERS, estimate.values.tolist(), estimate.sds.tolist(), shares, strict=True
@@ -115,7 +115,7 @@ def identification_page(facts: IdentificationFacts) -> str:
         minutes=f"{facts.estimate.seconds / 60.0:.1f}",
         fits=_fit_charts(facts.estimate, charts, pictures),
         parameters=parameter_rows(facts.estimate),
-        silent=facts.estimate.silent(),
+        silent=facts.estimate.uninformed_lines(),
         shifts=shift_rows(facts.estimate),
         predictions=prediction_rows(facts.predicted),
         whiteness=[f"{100.0 * share:.0f} %" for share in facts.predicted.predictions[-1].whiteness],

@@ -30,7 +30,7 @@ def test_stretches_stand_behind_each_other_and_are_smoothed_apart() -> None:
     # 500 m of flight through the air are a block.
     way = float(record.airspeed.mean()) * 40.0
     assert len(set(signals.block.tolist())) == 2 * math.ceil(way / 500.0)
-    assert len(signals.thinned(10, {}).airspeed) == 2 * half // 10
+    assert len(signals.thin(10, {}).airspeed) == 2 * half // 10
 
 
 def test_the_clocks_of_one_log_are_one() -> None:

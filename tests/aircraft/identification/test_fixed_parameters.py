@@ -9,7 +9,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.identification.alignment import align
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.fixed_parameters import HELD_FIXED, NOISE, FixedParameter
+from aircraft.identification.fixed_parameters import ACCELEROMETER_NOISE, FIXED_PARAMETERS, FixedParameter
 from planfly.identification.base_numbers import base_model
 from tests.aircraft.identification.flown_truth import flown_truth
 from tests.aircraft.identification.made_signals import steady
@@ -23,7 +23,7 @@ MIN_SHIFTS = {
 
 
 def changed(title: str, base: BaseModel) -> BaseModel:
-    (held,) = (held for held in HELD_FIXED if held.name.startswith(title))
+    (held,) = (held for held in FIXED_PARAMETERS if held.name.startswith(title))
     signals: Any = None
     return held.change(signals, base)[1]
 
@@ -51,7 +51,7 @@ def test_of_noise_there_is_as_much_again() -> None:
     flown = flown_truth()
     still = align(flown.records, flown.estimate.clocks, flown.base.motor_lag)
     noise = 0.2 * np.random.default_rng(7).standard_normal(still.acceleration.shape)
-    (held,) = (held for held in HELD_FIXED if held.name == NOISE)
+    (held,) = (held for held in FIXED_PARAMETERS if held.name == ACCELEROMETER_NOISE)
     noisier, base = held.change(replace(still, acceleration=noise), flown.base)
     added = noisier.acceleration - noise
     assert added.std(axis=0) == pytest.approx([0.0, 0.2, 0.2], rel=0.05)
@@ -62,14 +62,14 @@ def test_rising_air_tilts_a_slow_aircrafts_flow_more() -> None:
     """0.04 m/s are 0.09 degrees of the flow at 25 m/s, and 0.15 at 15."""
     flown = flown_truth()
     signals = align(flown.records, flown.estimate.clocks, flown.base.motor_lag)
-    (held,) = (held for held in HELD_FIXED if held.name.startswith("mean vertical air"))
+    (held,) = (held for held in FIXED_PARAMETERS if held.name.startswith("mean vertical air"))
     for speed, degrees in ((25.0, 0.0917), (15.0, 0.1528)):
         at = replace(signals, airspeed=np.full_like(signals.airspeed, speed))
         assert np.degrees(held.tilt(at)) == pytest.approx(degrees, abs=1e-3)
 
 
 def titled(title: str) -> FixedParameter:
-    (held,) = (held for held in HELD_FIXED if held.name.startswith(title))
+    (held,) = (held for held in FIXED_PARAMETERS if held.name.startswith(title))
     return held
 
 
@@ -100,7 +100,7 @@ def test_a_product_of_inertia_is_in_doubt_by_half_of_it() -> None:
 def test_sensors_are_in_doubt_by_what_is_said() -> None:
     base = base_model(load_aircraft("aerosonde"))
     still = replace(steady(current=10.0), airspeed_sd=0.013)
-    moved = {one.name.split(" (")[0]: one.change(still, base)[0] for one in HELD_FIXED}
+    moved = {one.name.split(" (")[0]: one.change(still, base)[0] for one in FIXED_PARAMETERS}
     assert moved["airspeed"].airspeed == pytest.approx(25.0 * 1.013)
     assert moved["scale of the current"].current == pytest.approx(10.2)
     assert moved["downward accelerometer"].acceleration[5].tolist() == pytest.approx([0.0, 0.0, 0.03])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
-from aircraft.identification.flow import attitude_alpha, vane
+from aircraft.identification.flow import attitude_alpha, flow_from_forces
 from aircraft.identification.parameters import prior_means
 from planfly.identification.base_numbers import base_model
 from tests.aircraft.identification.made_signals import steady
@@ -58,7 +58,7 @@ def test_a_wing_that_rolls_has_side_force_without_sideslip() -> None:
         voltage=np.nan * one,
         smooth=lambda values, band: values,
     )
-    assert vane(turning, base, prior_means()).beta == pytest.approx(np.zeros(4), abs=1e-4)
+    assert flow_from_forces(turning, base, prior_means()).beta == pytest.approx(np.zeros(4), abs=1e-4)
 
 
 def test_the_vane_tells_the_flow_that_made_the_forces() -> None:
@@ -84,7 +84,7 @@ def test_the_vane_tells_the_flow_that_made_the_forces() -> None:
         airspeed=speed,
         density=density,
     )
-    found = vane(made, base, prior_means())
+    found = flow_from_forces(made, base, prior_means())
     assert found.alpha == pytest.approx(alpha, abs=2e-4)
     assert found.beta == pytest.approx(beta, abs=1e-4)
     assert found.lift == pytest.approx(0.23 + 5.61 * alpha, abs=1e-3)

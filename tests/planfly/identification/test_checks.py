@@ -86,5 +86,5 @@ def test_under_10_hz_the_performance_alone_is_estimated() -> None:
     slow = estimate_model([record.part(60.0) for record in flown.records], flown.base, dynamics=False)
     assert not slow.dynamics
     for name in ("roll-damping", "elevator-power", "yaw-damping", "pitch-offset"):
-        assert slow.of_log()[INDEX[name]] == pytest.approx(0.0, abs=1e-9)
-    assert slow.of_log()[INDEX["thrust"]] > 0.5
+        assert slow.log_fractions()[INDEX[name]] == pytest.approx(0.0, abs=1e-9)
+    assert slow.log_fractions()[INDEX["thrust"]] > 0.5
