@@ -49,7 +49,7 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     stretches = list(zip(thinned.edges[:-1], thinned.edges[1:], strict=True))
     # Wind is ground velocity minus air velocity; an error of the heading rotates the air velocity. A gust is in the
     # wind, in the airspeed and its direction, and after a while in the ground velocity, since the aircraft drifts with
-    # it: a regressor with the gust in it would bias the scale. The regressor of the scale is therefore the mean airspeed
+    # it: a regressor with the gust in it would bias the scale. The regressor is therefore the mean airspeed
     # along the flown course, smoothed over the time in which gusts change.
     mean_air = np.empty((2, len(north_air)))
     for first, last in stretches:
