@@ -217,7 +217,7 @@ UNLIMITED = wp(4500, 500, 600, command=17)
 def behind_a_hill(*lines: str, summit: float = 450.0, **parameters: float) -> FlightSetup:
     """A mission over a hill half way: a return sinks evenly to RTL_ALTITUDE, 100 m over home at 100 m."""
     hill = Peak(2250.0, 250.0, summit, 300.0)
-    ground = peaks_terrain(np.array([[-6000.0, 6000.0], [-6000.0, 6000.0]]), [hill], 100.0)
+    ground = make_peaks_terrain(np.array([[-6000.0, 6000.0], [-6000.0, 6000.0]]), [hill], 100.0)
     setup = by_arduplane(setup_of(*lines, home="36.5 -84.2 0"), **{"RTL_ALTITUDE": 100.0, **parameters})
     return setup.in_scenario(replace(setup.scenario, terrain=ground))
 
