@@ -287,10 +287,9 @@ class BatteryFailsafe(NamedTuple):
     parameter: name of the parameter of its threshold.
     threshold: value of that parameter, mAh that remain, V, or the fraction that remains.
     used_charge: used charge at which the autopilot leaves the mission, mAh; NaN if it acts by the voltage.
-    shares_charge: True if several batteries are monitored, so that the share of this battery in the used charge is unknown.
+    shares_charge: True if several batteries are monitored: the share of this battery in the used charge is unknown.
     remaining_fraction: remaining fraction of the energy, estimated from the voltage, at which the autopilot leaves the
-        mission;
-        NaN for a threshold of the charge or of the voltage itself.
+        mission; NaN for a threshold of the charge or of the voltage itself.
     """
 
     parameter: str

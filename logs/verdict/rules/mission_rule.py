@@ -181,7 +181,7 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     itinerary = make_itinerary(setup.mission, resets_jump_counters=setup.autopilot.checks.resets_jump_counters)
     last = next((k for k, item in enumerate(items) if item.seq == itinerary.stops[-1].item), -1)
     end = items[last]
-    if itinerary.endless >= 0 or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
+    if itinerary.endless_jump >= 0 or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
         return []
     behind = itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[last + 1 :])
     unreached = [item for item in behind if item.seq in itinerary.unreached and is_navigation(item.command)]

@@ -80,7 +80,7 @@ def test_a_program_flies_without_an_airspeed_sensor_where_the_file_says_so() -> 
 
 def test_a_program_gets_the_settings_of_the_attitude_controllers() -> None:
     own = {"RLL2SRV_RMAX": 40.0, "RLL2SRV_TCONST": 0.7, "PTCH2SRV_RMAX_UP": 40.0, "PTCH2SRV_TCONST": 0.7}
-    assert autopilot_parameters(setup_at(), AEROSONDE, SERVOS, own).changed == own
+    assert collect_arduplane_parameters(setup_at(), AEROSONDE, SERVOS, own).changed == own
 
 
 def test_a_persons_file_is_read_by_present_names_and_units(tmp_path: Path) -> None:
