@@ -49,9 +49,9 @@ def autopilot_cost(make_flight: Callable[[int], SitlFlight], seed: int) -> Autop
     cpu, started = os.times(), time.perf_counter()
     with make_flight(seed) as flight:
         flight.prepare()
-        begun, before = flight.exchanged, time.perf_counter() - started
+        begun, before = flight.autopilot_time, time.perf_counter() - started
         fly_to_end(flight)
-        spent, flown = time.perf_counter() - started, flight.exchanged
+        spent, flown = time.perf_counter() - started, flight.autopilot_time
     after = os.times()
     ours = after.user + after.system - cpu.user - cpu.system
     theirs = after.children_user + after.children_system - cpu.children_user - cpu.children_system

@@ -159,7 +159,7 @@ class Performance:
 
 def performance(aircraft: Aircraft, variation: Variation | None = None) -> Performance:
     """Compute a model's performance at its cruise speed; NaN for a flight that it cannot trim."""
-    fdm = Fdm(aircraft, variation=variation, tried=True)
+    fdm = Fdm(aircraft, variation=variation, is_tested=True)
     speed = aircraft.airspeed
     level = steady_flight(fdm, speed, AMSL)
     power = math.nan

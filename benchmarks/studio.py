@@ -23,7 +23,7 @@ import numpy as np
 import psutil
 from websockets.sync.client import connect
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from flight.mission_files.formats import mission_text
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
@@ -132,10 +132,12 @@ def _long_mission(count: int) -> Mission:
     north = 1_500.0 * np.sin(east / 3_000.0)
     lat, lon = to_geo(scenario.origin, east, north)
     items = [
-        MissionItem(k + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(a), on_grid(b), 1_080.0)
+        MissionItem(
+            k + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, round_to_grid(a), round_to_grid(b), 1_080.0
+        )
         for k, (a, b) in enumerate(zip(lat.tolist(), lon.tolist(), strict=True))
     ]
-    return Mission(Home(on_grid(float(lat[0])), on_grid(float(lon[0])), 300.0), tuple(items))
+    return Mission(Home(round_to_grid(float(lat[0])), round_to_grid(float(lon[0])), 300.0), tuple(items))
 
 
 def _zones(path: np.ndarray) -> str:

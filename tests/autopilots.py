@@ -43,8 +43,8 @@ def arduplane_program(program: Path) -> ArduPlaneSitl:
 
 def shorten_run_in(patch: pytest.MonkeyPatch) -> None:
     """For the fakes, which fly steadily at once, where a real autopilot needs the run-in to settle."""
-    patch.setattr(sitl_flight, "RUN_IN", 100.0)
-    patch.setattr(sitl_flight, "RUN_IN_SECONDS", 4.0)
+    patch.setattr(sitl_flight, "MIN_RUN_IN_DISTANCE_M", 100.0)
+    patch.setattr(sitl_flight, "MIN_RUN_IN_TIME_S", 4.0)
 
 
 def find_arduplane() -> Path | None:

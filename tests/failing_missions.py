@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from flight.mission_files.wpl import waypoints_text
 from world.arrays import Floats
 from world.frames import to_geo
@@ -209,7 +209,9 @@ def _draw_sound_mission(rng: np.random.Generator, cruise: float) -> Draft:
 
 def _as_mission(draft: Draft) -> Mission:
     lat, lon = to_geo(WORLD.origin, draft.points[:, 0], draft.points[:, 1])
-    home = Home(on_grid(float(lat[0])), on_grid(float(lon[0])), round(float(ground(draft.points[:1])[0]), 1))
+    home = Home(
+        round_to_grid(float(lat[0])), round_to_grid(float(lon[0])), round(float(ground(draft.points[:1])[0]), 1)
+    )
     items: list[MissionItem] = []
     speed = draft.cruise
     for k in range(1, len(draft.points)):
@@ -219,7 +221,7 @@ def _as_mission(draft: Draft) -> Mission:
             items.append(
                 MissionItem(len(items) + 1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), params, 0.0, 0.0, 0.0)
             )
-        place = on_grid(float(lat[k])), on_grid(float(lon[k])), round(float(draft.points[k, 2]), 1)
+        place = round_to_grid(float(lat[k])), round_to_grid(float(lon[k])), round(float(draft.points[k, 2]), 1)
         items.append(MissionItem(len(items) + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, *place))
     return Mission(home, tuple(items), source="drawn.waypoints")
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_grid
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from world.arrays import Floats
 from world.frames import to_geo
@@ -148,7 +148,13 @@ def _made(name: str, way: Floats, tables: dict[str, Any], close_to: str, *, exce
     lat, lon = to_geo(scenario.origin, way[:, 0], way[:, 1])
     items = [
         MissionItem(
-            k + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(y), on_grid(x), round(float(up), 2)
+            k + 1,
+            int(Command.NAV_WAYPOINT),
+            int(Frame.GLOBAL),
+            (0.0,) * 4,
+            round_to_grid(y),
+            round_to_grid(x),
+            round(float(up), 2),
         )
         for k, (y, x, up) in enumerate(zip(lat.tolist(), lon.tolist(), way[:, 2], strict=True))
     ]

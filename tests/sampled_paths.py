@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.guidance.path import FlyByPath, arc_point, profile
+from flight.guidance.path import FlyByPath, arc_point, profile_at
 
 
 def sample_path(path: FlyByPath, step: float) -> NDArray[np.float64]:
@@ -14,5 +14,5 @@ def sample_path(path: FlyByPath, step: float) -> NDArray[np.float64]:
     for k, (number, distance) in enumerate(zip(numbers, distances, strict=True)):
         piece = path.pieces[number]
         points[k, :2] = arc_point(piece, distance - piece.start)
-        points[k, 2] = profile(path.nodes, distance)[0]
+        points[k, 2] = profile_at(path.nodes, distance)[0]
     return points

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope
 from flight.dynamics.envelope_tables import load_envelope
-from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_grid
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, make_limits
 from world.arrays import Floats
@@ -82,7 +82,7 @@ def waypoint_mission(points: Floats, speeds: Floats, origin: GeoOrigin) -> Missi
     items: list[MissionItem] = []
     lat, lon = to_geo(origin, points[:, 0], points[:, 1])
     for k, (point, y, x) in enumerate(zip(points, lat.tolist(), lon.tolist(), strict=True)):
-        place = (on_grid(y), on_grid(x), float(point[2]))
+        place = (round_to_grid(y), round_to_grid(x), float(point[2]))
         items.append(MissionItem(len(items) + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, *place))
         if k < len(speeds) and (k == 0 or speeds[k] != speeds[k - 1]):
             change = (0.0, float(speeds[k]), -1.0, 0.0)

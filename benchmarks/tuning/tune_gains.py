@@ -55,7 +55,8 @@ EFFORT = 0.5
 BEYOND = 0.2
 # Cost of a failed flight.
 FAILED = 1000.0
-# Bank that guidance may add in the search and the report, rad; flights use `flight.simulation.simulate.BANK_RESERVE`.
+# Bank that guidance may add in the search and the report, rad; flights use
+# `flight.simulation.simulate.BANK_RESERVE_RAD`.
 RESERVE = math.radians(2.7)
 # Significant digits of the gains.
 DIGITS = 3
@@ -66,13 +67,13 @@ TICK = 0.017
 def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
     """Fly a case with these gains, and with slightly less bank reserve than flights have, so that some is left."""
     module: Any = simulation
-    usual = module.BANK_RESERVE
-    module.BANK_RESERVE = RESERVE
+    usual = module.BANK_RESERVE_RAD
+    module.BANK_RESERVE_RAD = RESERVE
     try:
         with flown_with(gains):
             return fly_to_end(Flight(case.setup, aircraft, variation=case.variation))
     finally:
-        module.BANK_RESERVE = usual
+        module.BANK_RESERVE_RAD = usual
 
 
 def cost(aircraft: Aircraft, gains: Gains, case: Case) -> float:

@@ -1,12 +1,12 @@
-"""Define the interface of an autopilot, through which the rest of planfly uses what controls a flight.
+"""Define the interface through which the rest of planfly uses an autopilot.
 
-An `Autopilot` carries its own settings.  A `FlightSetup` contains an autopilot; planning, flights, verdicts and
-recordings use its operations and parts, and never test which autopilot it is.  Each autopilot has a folder next to this
-file; `flight.autopilots.catalog.AUTOPILOTS` lists all of them.
+An `Autopilot` contains its own settings.  A `FlightSetup` contains an autopilot; planning, flights, verdicts and
+recordings use its operations and parts, and do not depend on which autopilot it is.  Each autopilot has a folder next
+to this file; `flight.autopilots.catalog.AUTOPILOTS` lists all of them.
 
-An autopilot states its `name`, its `title` and its `control_law`.  Everything else has a default: an autopilot without
-parameters, whose parts (`flight.autopilots.parts`) say that it flies the fly-by path as it was planned, at the
-commanded true airspeeds, and returns to launch as ArduPlane does by its defaults.
+A subclass must define `name`, `title` and `control_law`.  By default an autopilot has no parameters, and its parts
+(`flight.autopilots.parts`) state that it flies the planned fly-by path at the commanded true airspeeds, and returns to
+launch as ArduPlane does with its default parameters.
 """
 
 from abc import ABC, abstractmethod
@@ -26,13 +26,14 @@ from flight.autopilots.parts import (
     SpeedRules,
     TurnRules,
 )
-from flight.mission.loiter_circles import USUAL_LOITERS, LoiterRules
+from flight.mission.loiter_circles import DEFAULT_LOITER_RULES, LoiterRules
 from flight.mission.route import RouteRules
 from world.errors import ScenarioError
 from world.json_schema import DocumentConfig
 from world.scenario_tables import FlightTable, Guidance
 
-# Question that a flight answers: can the aircraft itself fly the mission, or can the aircraft with its autopilot.
+# Question that a flight answers: whether the aircraft can fly the mission ("airframe"), or whether the aircraft with
+# its autopilot can ("autopilot").
 Level = Literal["airframe", "autopilot"]
 
 # ----------------------------------------------------------------------
@@ -54,7 +55,7 @@ _SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraf
 
 
 def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Describe the values of a file that contradict the order of two parameters.
+    """Return a text for each value of the user's file that contradicts the order of two parameters.
 
     orders: names of parameters whose values must not decrease from one parameter to the next.
 
@@ -162,10 +163,10 @@ class StoredAutopilot(NamedTuple):
 class Autopilot(ABC):
     """Autopilot of a flight, with its settings; subclasses are frozen dataclasses.
 
-    name: name in `[flight] autopilot`.
+    name: name in `[flight] autopilot` of a scenario.
     title: name in texts.
-    level: question that its flight answers.  "airframe": the autopilot stands only for the aircraft.  "autopilot": its
-        verdict is compared with a reference flight by planfly's guidance.
+    level: question that a flight answers.  "airframe": whether the aircraft can fly the mission.  "autopilot": whether
+        the aircraft with this autopilot can; the verdict is compared with a reference flight by planfly's guidance.
     parameters: None for an autopilot without parameters.
     program: program that flew; None for a simulated autopilot and before the flight.
     """
@@ -176,14 +177,14 @@ class Autopilot(ABC):
     parameters: Parameters | None = None
     program: AutopilotProgram | None = None
 
-    # The one operation that every autopilot defines.
+    # Operation that every autopilot must define.
 
     @property
     @abstractmethod
     def control_law(self) -> ControlLaw:
         """Compiled control law, with the settings of the autopilot."""
 
-    # Construction from a scenario or a log, and settings; the defaults are those of an autopilot without settings.
+    # Construction from a scenario or a log, and settings; the defaults suit an autopilot without settings.
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
@@ -215,13 +216,13 @@ class Autopilot(ABC):
     def of_flight_log(
         cls, program: str, parameters: Mapping[str, float], source: str
     ) -> tuple[Self, tuple[str, ...]] | None:
-        """Return the autopilot that wrote a log, and notes on its parameters; None for another autopilot's log.
+        """Return the autopilot that wrote a flight log, and notes on logged parameters that could not be used.
 
-        program: name of the flown program in the log.
-        parameters: values by name.
-        source: the log's file.
+        Returns None for the log of another autopilot.
 
-        The notes name the parameters that could not be used.
+        program: name of the program in the log.
+        parameters: logged values by name.
+        source: file of the log.
         """
         return None
 
@@ -254,10 +255,10 @@ class Autopilot(ABC):
         return ""
 
     def describe(self, aircraft: str) -> str:
-        """Return a description of the autopilot with the settings that matter most in a flight."""
+        """Return the autopilot's name with its most important settings, for a report on a flight of an aircraft."""
         return self.title
 
-    # Parts; the default of each says that the autopilot has no such thing.
+    # Parts; by default the autopilot has no special behaviour in the part.
 
     @property
     def turns(self) -> TurnRules:
@@ -272,7 +273,7 @@ class Autopilot(ABC):
     @property
     def loiters(self) -> LoiterRules:
         """Rules of loiters: default radius, entry and exit."""
-        return USUAL_LOITERS
+        return DEFAULT_LOITER_RULES
 
     @property
     def returns(self) -> ReturnBehaviour:
@@ -286,7 +287,7 @@ class Autopilot(ABC):
 
     @property
     def checks(self) -> MissionChecks:
-        """Reading and checks of a mission, and settings that decide about it."""
+        """Reading and checks of missions, and the settings on which they depend."""
         return MissionChecks()
 
     @property
@@ -296,7 +297,7 @@ class Autopilot(ABC):
 
     @property
     def route_rules(self) -> RouteRules:
-        """Rules by which the autopilot flies the route of a mission, from its parts."""
+        """Rules by which a mission becomes the route of this autopilot, from the autopilot's parts."""
         turns = self.turns
         return RouteRules(
             self.returns.rules,
@@ -308,9 +309,9 @@ class Autopilot(ABC):
 
 
 def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -> str:
-    """Return a description of a program; the verdict's data contains every parameter.
+    """Return a description of a program with its version, checksum and changed parameters.
 
-    named: maximum number of changed parameters in the description.
+    named: maximum number of changed parameters in the description.  The verdict's data contains all of them.
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
     remainder = f", +{len(changed) - named} more" if len(changed) > named else ""

@@ -6,14 +6,14 @@ from world.wind import W20, Turbulence
 _GUST_SIGMAS = 2.33
 # Assumed duration of that gust, s.  In 303 flights of planfly's guidance in moderate turbulence (scenarios 4000 to 4599
 # and 12000 to 12299 of `benchmarks.plans_and_verdicts`, three streams each) one leg in a hundred sank by 34 m with 0.3
-# to 1.2 m/s of spare climb rate, by 28 m with 1.4, by 21 m with 1.8 and by 9 m with 3.5.  Of 132 legs of ArduPlane
-# with 1.3 to 1.6 m/s of spare sink rate (two streams, from 16000) three in a hundred rose by 18 m and one by 34 m; of
-# 54 legs with 2 to 2.5 m/s none rose by 19 m.
+# to 1.2 m/s of spare climb rate, by 28 m with 1.4 m/s, by 21 m with 1.8 m/s and by 9 m with 3.5 m/s.  Of 132 legs of
+# ArduPlane with 1.3 to 1.6 m/s of spare sink rate (two streams, from 16000) three in a hundred rose by 18 m and one by
+# 34 m; of 54 legs with 2 to 2.5 m/s none rose by 19 m.
 _GUST_DURATION_S = 12.0
 # Spare rate below which several gusts add up, in standard deviations.
-LEAST_SIGMAS = 0.6
-# Time for which the aircraft then moves with one standard deviation of the gust, s: of 64 legs of ArduPlane with 0.4 to
-# 0.7 m/s of spare rate one rose by 93 m.
+MIN_SPARE_RATE_SIGMAS = 0.6
+# Time for which the aircraft then drifts at one standard deviation of the gust, s: of 64 legs of ArduPlane with 0.4 to
+# 0.7 m/s of spare rate one leg rose by 93 m.
 _LOW_RATE_DURATION_S = 60.0
 
 
@@ -46,6 +46,6 @@ def height_in_updrafts(sink_reserve: float, turbulence: Turbulence) -> float:
     (19.1, 92.4)
     """
     deviation = gust_deviation(turbulence)
-    if sink_reserve < LEAST_SIGMAS * deviation:
+    if sink_reserve < MIN_SPARE_RATE_SIGMAS * deviation:
         return _LOW_RATE_DURATION_S * deviation
     return height_in_gusts(sink_reserve, turbulence)

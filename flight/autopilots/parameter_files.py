@@ -19,8 +19,8 @@ from world.files import TextLine, read_small_file, utf8_text
 MAX_BYTES = 4 * 2**20
 # Maximum length of a parameter name (MAVLink, PARAM_VALUE): no autopilot has a longer one.
 LONGEST_NAME = 16
-# Pattern of a name: longer names occur in files that were edited by hand, and ground stations skip them.
-# One name of ArduPlane 4.7 has small letters.
+# Pattern of a name.  Files that were edited by hand contain names that are too long, which ground stations skip.  One
+# name of ArduPlane 4.7 has small letters.
 _NAME_PATTERN = re.compile(r"[A-Z][A-Z0-9_]{0,63}|FOLLP_LkAHD")
 _NUMBER_PATTERN = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 # Number of columns in QGroundControl's format: vehicle, component, name, value, type.
@@ -85,7 +85,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
             continue
         entry = _parse_entry(line, TextLine(source, number))
         if entry.name in entries and entries[entry.name].component != entry.component:
-            # Two devices of one vehicle: the autopilot's value is the one that flies.
+            # Two components of one vehicle: only the autopilot's value affects the flight.
             if entry.component == AUTOPILOT:
                 entries[entry.name] = entry
             continue
@@ -106,6 +106,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
 
 
 def _parse_entry(line: str, where: TextLine) -> Entry:
+    """Return the parameter in a line without comment.  Raises ParameterError.  where: position of the line."""
     fields, component = line.split("\t"), AUTOPILOT
     if len(fields) == _QGC_COLUMN_COUNT and _INTEGER_PATTERN.fullmatch(fields[0].strip()):
         name, text = fields[2].strip(), fields[3].strip()

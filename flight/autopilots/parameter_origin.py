@@ -14,15 +14,15 @@ from flight.autopilots.parameter_files import MAX_BYTES, Entry, parse_parameters
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
 
-# Autopilots by the name in a scenario, with the option that chooses each.
+# Names of the autopilots in a scenario, and with `--autopilot`.
 ARDUPILOT = "ardupilot"
 PX4 = "px4"
 TITLES: Mapping[str, str] = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 _MODELS: Mapping[str, str] = {ARDUPILOT: "ArduPlane", PX4: "PX4", "planfly": "planfly's own guidance"}
 
-# Weight of a header, in names: a file may be edited below its header.
+# A header counts as this many parameter names: the parameters below it may have been replaced.
 _HEADER_WEIGHT = 3
-# A file belongs to the autopilot that has this many times the names of the other one, otherwise to both.
+# A file belongs to an autopilot if the file has this many times as many names of it as of the other autopilot.
 _CLEAR_MAJORITY = 4
 # Number of names that are shown as evidence.
 _SHOWN_NAMES = 3
@@ -242,7 +242,7 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
 
 
 def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]) -> None:
-    """Raise ParameterError if an autopilot knows no name in a file whose origin is unclear."""
+    """Raise ParameterError if an autopilot knows no name in a file, unless the names show that they belong to it."""
     if known or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])

@@ -26,14 +26,14 @@ Stated = tuple[Origin, Mapping[str, float]]
 
 
 class Definition(NamedTuple):
-    """One parameter.
+    """Name, default, accepted range and unit of one parameter.
 
     name: the autopilot's name for the parameter.
     default: the autopilot's default, in its unit.
     low, high: range of accepted values, in that unit.
     to_si: factor to SI and radians.
-    old: an older name, and the factor from its unit to the unit of the present name.
-    documented: range of the autopilot's reference, if that is narrower.
+    old: an older name, and the factor from the older parameter's unit to the present unit.
+    documented: range in the autopilot's parameter reference, if narrower than the accepted range.
     """
 
     name: str
@@ -48,7 +48,8 @@ class Definition(NamedTuple):
 class ParameterTable:
     """The parameters that an autopilot's law reads.
 
-    autopilot: the autopilot's name in a scenario.  title: its name in texts.
+    autopilot: name of the autopilot in a scenario.
+    title: name of the autopilot in texts.
     definitions: definitions by the field of the control law's record, in the order of the values.
     when_stated: definitions of parameters that have no part in the control law, by name; a set holds them only if a
         file states them.
@@ -182,7 +183,9 @@ class ParameterSet:
 
     @classmethod
     def restore(cls, stored: StoredParameters, *fields: Any) -> Self:
-        """Return recorded parameters, under present or older names; one that was not yet recorded has its default.
+        """Return the parameters that a recording contains, under present or older names.
+
+        A parameter that the recording lacks has its default.
 
         Raises ParameterError if a value is not allowed.
         """
@@ -201,8 +204,10 @@ class ParameterSet:
     def of_log(cls, logged: Mapping[str, float], source: str, *fields: Any) -> tuple[Self, tuple[str, ...]]:
         """Return the parameters of a flight log, and a sentence for each value that could not be used.
 
-        A log without parameters has the autopilot's defaults, and a sentence says so.  logged: by the names of any
-        release.  source: the log's file.
+        For a log without parameters, returns the autopilot's defaults and a sentence on it.
+
+        logged: values by the names of any release.
+        source: file of the log.
         """
         values, notes = cls.table.read_log(logged)
         try:
@@ -222,12 +227,15 @@ class ParameterSet:
 
     @classmethod
     def _known_in_release(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Return the sources without parameters that the release does not have, and the names of those in the file."""
+        """Return the sources without parameters that the release lacks, and the file's names of such parameters."""
         return sources, ()
 
     @classmethod
     def _build(cls, sources: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
-        """Take each parameter from the first source that states it, and check each minimum against its maximum."""
+        """Return a set that takes each parameter from the first source that states it.
+
+        Raises ParameterError if a minimum is not below its maximum.
+        """
         known_sources, unknown_names = cls._known_in_release(sources, *fields)
         unused = (*unused, *unknown_names)
 
@@ -252,12 +260,15 @@ class ParameterSet:
         return parameter_set
 
     def __getitem__(self, name: str) -> float:
-        """Return a parameter's value by the autopilot's name, in SI and radians; its default if it is not held."""
+        """Return a parameter's value in SI and radians, by the autopilot's name; its default if the set lacks it."""
         definition = self.table.by_name[name]
         return definition.to_si * next((value for known, value, _ in self.values if known == name), definition.default)
 
     def changed(self, **values: float) -> Self:
-        """Return the same parameters with other values, by the autopilot's names and in its units."""
+        """Return a copy with other values for some parameters, by the autopilot's names and in its units.
+
+        Raises ValueError if the table has no parameter of a name.
+        """
         if unknown := sorted(set(values) - self.table.by_name.keys()):
             raise ValueError(f"{unknown[0]}: not a parameter of the simulated autopilot")
         by_name = {parameter.name: parameter for parameter in self.values}
@@ -270,7 +281,7 @@ class ParameterSet:
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """Values of the file outside their documented ranges, which are flown all the same, with the ranges."""
+        """Texts on values of the file outside their documented ranges; the autopilot flies with these values."""
         texts = []
         for name, value in self.by_origin("file").items():
             minimum, maximum = self.table.by_name[name].documented or (-math.inf, math.inf)
@@ -280,7 +291,7 @@ class ParameterSet:
 
     @property
     def misfits(self) -> tuple[str, ...]:
-        """Values of the file that contradict another parameter, in words; the autopilot flies with them."""
+        """Texts on values of the file that contradict another parameter; the autopilot flies with these values."""
         return find_misfits(self.values, self.table.orders)
 
 

@@ -1,7 +1,7 @@
-"""Define the parts of which an autopilot is composed; the defaults of a part mean that the autopilot has no such thing.
+"""Define the parts of which an autopilot is composed; the defaults of a part describe an autopilot without it.
 
 An autopilot returns its parts from the properties of `flight.autopilots.autopilot.Autopilot`. A part contains values
-and functions, so that an autopilot states only what it has: `TurnRules(acceptance_radius=90.0)`.
+and functions; an autopilot states only the fields that differ from the defaults: `TurnRules(acceptance_radius=90.0)`.
 
 `flight.mission` defines two further parts, because they also lay out the route: `ReturnRules` and `LoiterRules`.
 """
@@ -19,7 +19,7 @@ from aircraft.tracking import TrackingError
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.ground_ways import GroundPhases
-from flight.mission.return_path import USUAL_RULES, ReturnRules
+from flight.mission.return_path import DEFAULT_RETURN_RULES, ReturnRules
 from world.arrays import Floats, Heights
 from world.kernels import Record, Records
 from world.scenario_tables import Navigation
@@ -28,8 +28,8 @@ from world.wind import Turbulence
 # ----------------------------------------------------------------------
 # Control law.
 
-# One tick of the compiled loop on the block of a `flight.simulation.tick.Workspace`; returns a key of `ENDS`, or 0 to
-# fly on.
+# One tick of the compiled loop on the block of a `flight.simulation.tick.Workspace`; returns a key of `ENDS` if the
+# flight ends, otherwise 0.
 Tick = Callable[[Floats, Heights], int]
 
 # A number of ticks, each followed by the steps of a compiled model.  The arguments are block, heights, frames, numbers,
@@ -51,13 +51,14 @@ class ControlLaw:
     """Compiled control law of an autopilot.
 
     tick: compiled function for one tick.
-    loop: compiled simulation loop of the control law and the aircraft model; None if only JSBSim flies the autopilot.
+    loop: compiled simulation loop of the control law and the aircraft model; None if the autopilot flies only in
+        JSBSim.
     memory: type of the law's own record, in addition to `flight.guidance.inner_loops.GUIDANCE_MEMORY`, or None.
     initialise: initialises the records before the first tick; the arguments are a `GUIDANCE_MEMORY` record and a record
         of the type ``memory``, or None.
-    transfer_state: starts another route at the aircraft's position, and keeps the state of the control law; the
-        arguments are the record on the previous route, the record for the new route after ``initialise``, and the
-        start (3,) of the route, m.
+    transfer_state: copies the state of the control law to the start of another route in flight; the arguments are the
+        record on the previous route, the record for the new route after ``initialise``, and the start (3,) of the new
+        route, m.
     released_throttle: throttle (0..1) at the end of the rail, at the hand launch, or at rest on the runway, of a law
         that takes off.
     """
@@ -83,13 +84,13 @@ class TurnRules:
     """Rules by which an autopilot turns to the next leg; by default it follows the fly-by path.
 
     acceptance_radius: default distance from a waypoint at which the autopilot turns to the next leg, m; None for an
-        autopilot that follows the fly-by path.  Any other autopilot flies from leg to leg, and has reached a waypoint
-        also if it passes the line across the leg there.
+        autopilot that follows the fly-by path.  An autopilot with a radius also turns when it passes the line through
+        the waypoint perpendicular to the leg.
     distance: returns the maximum distance before a waypoint at which the autopilot turns, m; the arguments are the turn
         at the waypoint, rad, positive (pi at the mission's end), and its altitude, m AMSL.
     reads_acceptance: True if the acceptance radius in a waypoint's item decides where the autopilot turns.
     acceptance_limit: maximum acceptance radius that the autopilot reads from an item, m.
-    keeps_to_arcs: True if the radius of a turn follows from its distance to the waypoint.
+    keeps_to_arcs: True if the autopilot flies each turn as an arc whose radius follows from the turn distance.
     max_bank: maximum bank that the autopilot demands, rad; inf if only the aircraft's limits apply.
     bank_parameter: parameter of that bank; "" without such a parameter.
     """
@@ -111,8 +112,8 @@ class TurnRules:
 class SpeedLimits(NamedTuple):
     """Airspeeds (m/s) that an autopilot accepts from a mission, and the parameters that set them.
 
-    nearest: True if the autopilot flies the nearest limit for a command outside the limits, False if it ignores such a
-        command.
+    nearest: True if the autopilot flies the nearest limit on a command outside the limits; False if it ignores the
+        command, and keeps its airspeed.
     """
 
     min: float
@@ -127,8 +128,7 @@ class SpeedRules:
     """Rules by which an autopilot flies commanded airspeeds; by default they are true airspeeds without limits.
 
     limits: limits of the airspeeds that the autopilot accepts from a mission, or None.
-    equivalent: True if commanded airspeeds are equivalent airspeeds, which at altitude are lower than true airspeeds;
-        the autopilot then takes over in level flight.
+    equivalent: True if commanded airspeeds are equivalent airspeeds, which at altitude are lower than true airspeeds.
     min_ground_speed: minimum ground speed until the mission sets another one, m/s; 0 for none.  The autopilot raises
         its airspeed to keep this ground speed.
     cruise_parameter: parameter of the cruise airspeed; "" without such a parameter.
@@ -144,9 +144,9 @@ class SpeedRules:
         return float(true_by_equivalent(amsl)) if self.equivalent else 1.0
 
     def flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the airspeed that the autopilot flies on each leg, (l,) m/s.
+        """Return the airspeed that the autopilot flies on each leg, (l,) m/s, in the kind of the commands.
 
-        commanded: (l,) m/s.
+        commanded: airspeed commanded for each leg, (l,) m/s.
         cruise: airspeed until the autopilot accepts the first command, m/s.
 
         >>> ignoring = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX"))
@@ -179,7 +179,7 @@ class RtlSettings(NamedTuple):
     altitude: height above home, m; None if not stated.
     autoland: value of ArduPlane's RTL_AUTOLAND; None if not stated.
     lands: True if the scenario's missions end with a landing sequence.
-    field_depth: depth of the landing field below home, m.
+    field_depth: altitude of home minus altitude of the landing field, m.
     """
 
     altitude: float | None = None
@@ -196,11 +196,11 @@ def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
 class ReturnBehaviour:
     """Behaviour of an autopilot in an RTL; by default that of ArduPlane with its default parameters.
 
-    rules: target, altitude, turn and loiter.
-    parameters_of: returns the parameters that a scenario's settings set, by name and in the autopilot's units.
+    rules: rules of the RTL's target, altitude, turn and loiter.
+    parameters_of: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
     """
 
-    rules: ReturnRules = USUAL_RULES
+    rules: ReturnRules = DEFAULT_RETURN_RULES
     parameters_of: Callable[[RtlSettings], Mapping[str, float]] = _no_parameters
 
 
@@ -244,7 +244,7 @@ class GroundRules:
 
     control_law: returns the control law that also flies a take-off and a landing; None for an autopilot that flies
         neither.  The arguments are the take-off and landing, the aircraft, and its contact points.
-    needs_both_ends: True if the autopilot flies them only in a mission that has both.
+    needs_both_ends: True if the autopilot flies a take-off or a landing only in a mission that has both.
     glide: returns the glide from the last waypoint before the landing point.  The arguments are height (m, positive)
         and horizontal distance (m, positive) of that waypoint from the landing point, the tail wind (m/s, negative for
         a head wind), and the altitude of the landing point (m AMSL).
@@ -269,7 +269,7 @@ class GroundRules:
 
 
 class FeasibilityLimits(NamedTuple):
-    """Settings of PX4's feasibility checks; the defaults are those of its fixed wings.
+    """Settings of PX4's feasibility checks; the defaults are PX4's defaults for fixed wings.
 
     landing_angle: FW_LND_ANG, rad.
     requires: MIS_TKO_LAND_REQ: 0 nothing, 1 a takeoff, 2 a landing, 3 both, 4 and 5 both or neither.
@@ -286,10 +286,10 @@ class BatteryFailsafe(NamedTuple):
 
     parameter: name of the parameter of its threshold.
     threshold: value of that parameter, mAh that remain, V, or the fraction that remains.
-    used_charge: used charge at which it leaves the mission, mAh; NaN if it acts by the voltage.
-    shares_charge: True if several batteries are monitored, so that the share of the charge from this one is unknown.
-    remaining_fraction: remaining fraction of the energy, estimated from the voltage, at which it leaves the mission;
-        NaN for a threshold of the charge or of the voltage itself.
+    used_charge: used charge at which the autopilot leaves the mission, mAh; NaN if it acts by the voltage.
+    shares_charge: True if several batteries are monitored: the share of this battery in the used charge is unknown.
+    remaining_fraction: remaining fraction of the energy, estimated from the voltage, at which the autopilot leaves the
+        mission; NaN for a threshold of the charge or of the voltage itself.
     """
 
     parameter: str
@@ -300,7 +300,7 @@ class BatteryFailsafe(NamedTuple):
 
 
 class MissionParts(NamedTuple):
-    """Parts of a mission that decide which of an autopilot's settings change the flight.
+    """Properties of a mission that decide which settings of an autopilot affect the flight.
 
     returns: True if the mission returns to launch.
     has_return_path: True if the mission marks a return path (DO_RETURN_PATH_START).
@@ -331,7 +331,8 @@ class MissionParts(NamedTuple):
 
 PX4_DEFAULT_LIMITS = FeasibilityLimits()
 
-# Autopilot whose reading and refusals of mission items apply; "planfly" reads as ArduPlane and refuses nothing.
+# Autopilot whose rules of reading and refusing mission items apply; "planfly" reads items as ArduPlane does, and
+# refuses none.
 MissionDialect = Literal["planfly", "ardupilot", "px4"]
 
 
@@ -341,17 +342,18 @@ def _all_settings_flown(mission: MissionParts) -> list[str]:
 
 @dataclass(frozen=True)
 class MissionChecks:
-    """Reading and checks of a mission, and settings that decide about it; by default nothing is refused.
+    """Reading and checks of missions, and the settings on which they depend; by default nothing is refused.
 
     dialect: "ardupilot" refuses missions with a command that ArduPlane refuses.  "px4" refuses missions that fail PX4's
-        feasibility checks; it reads only the value of a change of speed, goes back to its own airspeed for any value
-        that is not positive, and reads gates.
+        feasibility checks.  Of a change of speed PX4 reads only the value, and returns to its own airspeed for a value
+        that is not positive; it also reads gates.
     feasibility: settings of PX4's feasibility checks; PX4's defaults for another autopilot.
-    resets_jump_counters: True if an exhausted counter of a jump is reset, so that a later pass takes the jump again.
+    resets_jump_counters: True if the autopilot resets a jump's counter when it is exhausted: a later pass over the jump
+        item jumps again.
     follows_terrain: True if the autopilot follows the ground along a leg to a height above terrain.
     battery_failsafes: failsafes that leave the mission at a state of the battery.
-    settings_not_flown: describes the settings that change the flight path but are not simulated, in sentences without
-        full stop.
+    settings_not_flown: returns a sentence, without full stop, for each setting that changes the flight path of a
+        mission but is not simulated.
     parameter_notes: notes on the parameter file, for the verdict.
     """
 
@@ -386,7 +388,7 @@ class Candidate(NamedTuple):
 
 
 class TrackingErrorFunction(Protocol):
-    """Function that returns the deviations from the legs, for which a plan reserves margins."""
+    """Function that returns an autopilot's deviations from the legs; a plan reserves margins for them."""
 
     def __call__(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
@@ -421,11 +423,12 @@ class Deviations:
     tracking_error: returns the deviations from the legs.
     gust_sink: returns the altitude loss in a downdraft with an exceedance probability of 1 %, m; 0 if the tracking
         error includes it.  The arguments are the unused climb rate, m/s, and the turbulence.
-    gust_rise: returns the altitude gain in an updraft with that probability, m, by the unused sink rate; 0 if the
-        autopilot holds its altitude.
-    altitude_miss_probability: returns the probability that gusts make the autopilot circle at a waypoint, by the unused
-        climb and sink rates, m/s; 0 if it flies on.
-    altitude_parameter: altitude tolerance outside which the autopilot circles at a waypoint; "" if it flies on.
+    gust_rise: returns the altitude gain in an updraft with an exceedance probability of 1 %, m; 0 if the autopilot
+        holds its altitude.  The arguments are the unused sink rate, m/s, and the turbulence.
+    altitude_miss_probability: returns the probability that gusts make the autopilot circle at a waypoint because of its
+        altitude; 0 if it always flies on.  The arguments are the unused climb and sink rates, m/s, and the turbulence.
+    altitude_parameter: name of the parameter of the altitude tolerance, outside which the autopilot circles at a
+        waypoint; "" if it always flies on.
     altitude_candidates, track_candidates: parameters that may cause an altitude or a track to fail.
     """
 

@@ -31,7 +31,7 @@ class TrimRow:
     """Level flight at one airspeed.
 
     trim: controls and attitude.
-    power: W, from the battery or as heat of fuel.
+    power: power from the battery, or heat of the fuel, W.
     endurance: time that 80 % of the battery or of the fuel lasts, s; NaN if no power is used.
     """
 
@@ -162,8 +162,8 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 
     >>> from aircraft.catalog import load_aircraft
     >>> for step in step_responses(load_aircraft("aerosonde")):
-    ...     most = abs(step.change[:, 0]).max()
-    ...     print(f"{step.control} {step.size:+.3f}: {step.quantities[0]} by up to {most:.2f} rad")
+    ...     maximum = abs(step.change[:, 0]).max()
+    ...     print(f"{step.control} {step.size:+.3f}: {step.quantities[0]} by up to {maximum:.2f} rad")
     elevator -0.052: pitch by up to 0.15 rad
     throttle +0.100: pitch by up to 0.13 rad
     aileron +0.052: roll by up to 0.87 rad
@@ -190,6 +190,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 def _step_response(
     aircraft: Aircraft, control: str, size: float, hold_time: float, duration: float, quantities: tuple[str, ...]
 ) -> StepResponse:
+    """Return the response to a control that moves by ``size`` for ``hold_time`` s, over ``duration`` s."""
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
     commands = fdm.start(*_POSITION_DEG, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
     moved_commands = commands._replace(**{control: getattr(commands, control) + size})
@@ -205,5 +206,6 @@ def _step_response(
 
 
 def _unwrap_states(states: NDArray[np.record], name: str) -> Floats:
+    """Return a quantity of states (t,), with a yaw that does not jump by 2 pi."""
     values: Floats = states[name]
     return np.unwrap(values) if name == "yaw" else values

@@ -184,7 +184,7 @@ def step(frame: Record, numbers: Floats, code: Code, contacts: Records, friction
     frame: the record of `FRAME` at the start of the numbers.
     numbers: registers of the model.
     code: header and sections as described above.
-    contacts, frictions: of `flight.dynamics.ground_contact`; there may be no contacts.
+    contacts, frictions: records of `flight.dynamics.ground_contact`, possibly none.
     """
     _integrate(frame)
     _update_position(frame)
@@ -262,7 +262,7 @@ def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) 
 
 @inner
 def _update_motion(frame: Record) -> None:
-    """Compute the axes of the body, and its motion relative to the earth."""
+    """Compute the body's axes, and the body's motion relative to the earth."""
     inertial_to_earth = rotation(frame.earth_cos, frame.earth_sin)
     quaternion = (frame.attitude_real, vector_of(frame.attitude))
     inertial_to_body = matrix_of_quaternion(quaternion)
@@ -278,7 +278,7 @@ def _update_motion(frame: Record) -> None:
     rate = quaternion_rate(quaternion, inertial_rates)
     frame.attitude_rate_real = rate[0]
     set_vector(frame.attitude_rate, rate[1])
-    # JSBSim's angles are those of the quaternion of this matrix.
+    # JSBSim computes the Euler angles from the quaternion of this matrix.
     angles = euler_angles(matrix_of_quaternion(quaternion_of_matrix(local_to_body)))
     frame.roll, frame.pitch, frame.yaw = angles[0], angles[1], angles[2]
     set_vector(frame.ground_velocity, transform_back(local_to_body, body_velocity))
@@ -355,7 +355,7 @@ def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
 
 @inlined
 def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
-    """Return the sums of the external forces along the body's axes and of their moments."""
+    """Return the sum of the external forces along the body's axes, and the sum of their moments."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
         magnitude, first_axis = numbers[code[k]], int(code[k + 1])

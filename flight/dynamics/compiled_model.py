@@ -46,7 +46,7 @@ _CONTACT_FIELDS = {"compression": "compression-ft", "compression_speed": "compre
 # Feet in an inch, JSBSim's value.
 _INCH = 1.0 / 12.0
 
-# JSBSim's properties for the frame's fields of several numbers.
+# JSBSim's properties for the vector fields of the frame.
 _VECTOR_PROPERTIES = {
     "position": tuple(f"position/eci-{axis}-ft" for axis in "xyz"),
     "velocity": tuple(f"velocities/eci-{axis}-fps" for axis in "xyz"),
@@ -57,7 +57,7 @@ _VECTOR_PROPERTIES = {
     "wind": WIND,
     "gust": GUST,
 }
-# JSBSim's properties for the frame's fields of one number.
+# JSBSim's properties for the scalar fields of the frame.
 _NUMBER_PROPERTIES = {
     "time": "simulation/sim-time-sec",
     "earth_angle": "position/epa-rad",
@@ -116,9 +116,9 @@ class CompiledModel:
         self._copy_state()
 
     def find_differences(self) -> list[str]:
-        """Step both engines and return the properties that differ in any bit; restore the compiled state.
+        """Step both engines, and return the properties that differ in any bit; then restore the compiled state.
 
-        JSBSim's state is not restored: it cannot fly on if there is a difference.
+        JSBSim's state is not restored, so that a flight with JSBSim must start again.
         """
         initial_numbers, initial_contacts = self.numbers.copy(), self.contacts.copy()
         differing = self.differing_properties()
@@ -140,6 +140,7 @@ class CompiledModel:
     # ----------------------------------------------------------------------
 
     def _register(self, name: str) -> int:
+        """Return the register of a property. Raises UnsupportedModel if it has none."""
         if name not in self.properties:
             raise UnsupportedModel(f"property {name}")
         return self.properties[name]
@@ -152,7 +153,7 @@ class CompiledModel:
         return self._register(name) if name else zero_register
 
     def _copy_state(self) -> None:
-        """Copy the state of JSBSim."""
+        """Copy the state of JSBSim to the registers."""
         read, numbers = self._fdm.properties.read, self.numbers
         for register, getter in self._getters.values():
             numbers[register] = getter()
@@ -181,7 +182,7 @@ class CompiledModel:
         initialise_attitude(self.frames, self._fdm.attitudes())
 
     def _copy_contacts(self, centre: Sequence[float]) -> None:
-        """Copy the contacts, which must be above the ground: the memory of their friction cannot be read."""
+        """Copy the contacts. Raises UnsupportedModel if one is on the ground, where its friction cannot be read."""
         read, frame = self._fdm.properties.read, self.frames[0]
         frame.centre, frame.terrain = centre, self._fdm.terrain_amsl / FOOT
         for contact, data in zip(self.contacts, self._program.contacts, strict=True):
@@ -227,6 +228,7 @@ class CompiledModel:
 
 
 def _is_equal(a: float, b: float) -> bool:
+    """Return True if two numbers are equal, or if both are NaN."""
     return a == b or (math.isnan(a) and math.isnan(b))
 
 

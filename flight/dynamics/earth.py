@@ -23,7 +23,7 @@ _FOCUS = SEMI_MAJOR * ECCENTRICITY_2
 def geodetic(position: Vector) -> tuple[float, float, float, float]:
     """Return geodetic latitude (rad), altitude (ft), and sine and cosine of the latitude of a position.
 
-    One iteration of Fukushima's method (Journal of Geodesy 79, 2006).
+    Computed by one iteration of Fukushima's method (Journal of Geodesy 79, 2006), whose variable names are used.
     """
     x, y, z = position
     axis_distance = math.sqrt(x * x + y * y)

@@ -33,7 +33,7 @@ _SCHEMA_VERSION = 7
 _AIRSPEED_COUNT = 11
 # Altitudes of the grid, m AMSL.
 _GRID_AMSL_M = np.arange(0.0, 9001.0, 1000.0)
-# Smallest change of an acceleration for which a command moves something, m/s^2 or rad/s^2; an engine settles to 1e-8.
+# Smallest change of an acceleration by a command that has an effect, m/s^2 or rad/s^2; an engine settles to 1e-8.
 _MIN_RESPONSE = 1e-5
 # Names of all tables in the file.
 _TABLE_NAMES = (*TABLES, *POWERS)
@@ -149,9 +149,9 @@ def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tu
 
     level_trims: level flights at airspeeds of the grid, the fastest first.
 
-    A search may fail, or end at an airspeed below level flights of the grid, far from the fastest flight; it is then
-    repeated from the nearest level flight. If the wing stalls before the elevator reaches its stop, no search finds the
-    slowest flight, which is the slowest one of the grid.
+    A search that fails, or that ends at an airspeed below the fastest level flight of the grid, is repeated from the
+    nearest level flight of the grid. If the wing stalls before the elevator reaches its stop, no search finds the
+    slowest flight; the result is then the slowest level flight of the grid.
     """
     slowest_trim, fastest_trim = slowest_level_flight(fdm, amsl), fastest_level_flight(fdm, amsl)
     if level_trims:
@@ -164,7 +164,7 @@ def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tu
 
 
 def _power(fdm: Fdm, trim: Trim) -> float:
-    """Return the power of a trim, W."""
+    """Return the battery power, or the heat of the fuel, in a trim, W."""
     fdm.balance(trim.vector())
     return float(fdm.read().power)
 
@@ -175,6 +175,7 @@ def _grid_airspeeds(aircraft: Aircraft) -> Floats:
 
 
 def _cache_key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
+    """Return the values on which the tables depend, and which a cache file must match."""
     return {
         "schema": _SCHEMA_VERSION,
         "aircraft": aircraft.name,

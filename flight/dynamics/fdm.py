@@ -122,17 +122,18 @@ def load_model(
     printed: Callable[[], str],
     *,
     flat_earth: bool,
-    tried: bool,
+    is_tested: bool,
     gear: Gear | None = None,
 ) -> None:
     """Check a model, copy it into an empty folder, and load it from there.
 
     The model is copied because some models write into their own folder.
 
-    instance: a JSBSim instance without a model, created for this folder.
+    instance: a JSBSim instance without a model, created for the folder ``copy``.
+    copy: the empty folder.
     dt: time step, s.
     printed: function that returns JSBSim's output so far.
-    flat_earth, tried, gear: see `Fdm`.
+    flat_earth, is_tested, gear: see `Fdm`.
 
     Raises FlightError for a model that is missing, refused or not loadable.
     """
@@ -143,7 +144,7 @@ def load_model(
         aircraft.model_folders,
         shipped=bool(aircraft.model.shipped),
     )
-    if not tried:
+    if not is_tested:
         try_model(aircraft)
     folder = copy / aircraft.name
     folder.mkdir()
@@ -206,7 +207,7 @@ _PACK_STATE: Callable[..., None] = struct.Struct(f"{len(_STATE_FIELDS)}d").pack_
 
 @dataclass(frozen=True, slots=True)
 class Variation:
-    """Changes to the published model for validation and robustness tests, as factors and as a parasite drag.
+    """Changes to an aircraft's model, for validation and robustness tests.
 
     mass, drag: factors on the mass and drag of the whole aircraft.
     control: factor on the moments of the control surfaces.
@@ -246,10 +247,10 @@ class Fdm:
 
     rate_hz: steps per second.
     motor_braking: True if the motor may brake the propeller (current below zero).
-    flat_earth: True for the textbook's world, for validation: a plane without rotation, with constant density 1.2682
-        kg/m^3 and gravity 9.81 m/s^2; degrees of latitude are then 157 times longer. False for WGS 84 and the standard
+    flat_earth: True for a plane without rotation, with constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2, for
+        comparison with a textbook; degrees of latitude are then 157 times longer. False for WGS 84 and the standard
         atmosphere.
-    tried: True if a user's model is known not to abort JSBSim; otherwise `flight.dynamics.model_check` tests it.
+    is_tested: True if a user's model is known not to abort JSBSim; otherwise `flight.dynamics.model_check` tests it.
     gear: gear to add for ground contact if the model has none; None for a flight without ground contact.
 
     properties: JSBSim's own properties by name, in its units.
@@ -267,7 +268,7 @@ class Fdm:
         motor_braking: bool = False,
         flat_earth: bool = False,
         variation: Variation | None = None,
-        tried: bool = False,
+        is_tested: bool = False,
         gear: Gear | None = None,
     ) -> None:
         if not 0.0 < rate_hz < math.inf:
@@ -278,7 +279,7 @@ class Fdm:
         self._gear = gear
         # Roll, pitch and yaw of all evaluations, one after the other.
         self._attitudes = array("d")
-        self._exec = _new_instance(aircraft, self.dt, flat_earth, tried or aircraft.is_embedded, gear)
+        self._exec = _new_instance(aircraft, self.dt, flat_earth, is_tested or aircraft.is_embedded, gear)
         access = PropertyAccess(self._exec.get_property_manager(), aircraft.model_file)
         self.properties = access
         if flat_earth:
@@ -379,7 +380,7 @@ class Fdm:
 
     def release(
         self,
-        place: Sequence[float],
+        position: Sequence[float],
         attitude: Sequence[float],
         velocity: Sequence[float],
         *,
@@ -387,22 +388,21 @@ class Fdm:
         terrain_amsl: float = 0.0,
         commands: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     ) -> None:
-        """Start a flight anywhere, also on the ground, at rest or thrown.
+        """Start a flight without a trim, for example at rest on the ground, or thrown.
 
-        Surfaces and motor start at these commands.
-
-        place: lat_deg, lon_deg (geodetic) and amsl (m).
+        position: lat_deg, lon_deg (geodetic) and amsl (m).
         attitude: roll, pitch, yaw (true), rad.
         velocity: north, east, down over the ground, m/s.
         wind: (3,) m/s, direction of air motion; it stays as the steady wind.
         terrain_amsl: m.
+        commands: (4,) commands at which surfaces and motor start.
 
-        Raises FlightError for values that are not finite, and for an invalid place.
+        Raises FlightError for values that are not finite, and for an invalid position.
         """
-        numbers = (*place, *attitude, *velocity, *wind, terrain_amsl, *commands)
+        numbers = (*position, *attitude, *velocity, *wind, terrain_amsl, *commands)
         if len(numbers) != 17 or not all(math.isfinite(number) for number in numbers):
             raise FlightError(f"a release takes 17 finite numbers and has {numbers}", field="start", value=numbers)
-        lat_deg, lon_deg, amsl = place
+        lat_deg, lon_deg, amsl = position
         # On the ground the aircraft's reference point may be at ground level: its contacts reach below it.
         check_start_position(lat_deg, lon_deg, amsl, min(terrain_amsl, amsl - 1.0))
         self._start_position = (lat_deg, lon_deg, terrain_amsl)
@@ -530,6 +530,14 @@ class Fdm:
         commands: Iterable[float],
         settle: bool = False,
     ) -> Floats:
+        """Set JSBSim's initial conditions, and return the eight rates of `RATES` there, SI and radians.
+
+        angles: roll, pitch, yaw, rad.
+        velocity: (3,) north, east, down over the ground, m/s.
+        rotation_rates: p, q, r, rad/s.
+        commands: the four commands; actuators take these values without lag.
+        settle: True to let an engine's speed settle, False to keep it.
+        """
         self._attitudes.extend(angles)
         # Trim status bypasses the lag of the actuators.
         self.write(commands)
@@ -543,6 +551,7 @@ class Fdm:
 
 
 def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) -> None:
+    """Set the properties of a model according to a variation. Raises FlightError for an undefined property."""
     if variation.mass != 1.0:
         extra_mass = (variation.mass - 1.0) * aircraft.mass
         point_mass = properties.getter("inertia/pointmass-weight-lbs")()
@@ -557,8 +566,11 @@ def _apply_variation(properties: PropertyAccess, aircraft: Aircraft, variation: 
         properties.set(name, value)
 
 
-def _new_instance(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool, gear: Gear | None) -> jsbsim.FGFDMExec:
+def _new_instance(
+    aircraft: Aircraft, dt: float, flat_earth: bool, is_tested: bool, gear: Gear | None
+) -> jsbsim.FGFDMExec:
+    """Return a JSBSim instance with an aircraft's model; arguments as for `Fdm`."""
     with silence() as read_output, temporary_folder("planfly-model-") as folder:
         instance = jsbsim.FGFDMExec(str(folder))
-        load_model(instance, folder, aircraft, dt, read_output, flat_earth=flat_earth, tried=tried, gear=gear)
+        load_model(instance, folder, aircraft, dt, read_output, flat_earth=flat_earth, is_tested=is_tested, gear=gear)
     return instance

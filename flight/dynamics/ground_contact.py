@@ -77,7 +77,10 @@ _DEGREES = 180.0 / math.pi
 
 @inner
 def contact_forces(frame: Record, contacts: Records, frictions: Records) -> tuple[Vector, Vector, int]:
-    """Return the force of all contacts along the body's axes, its moment, and the number of frictions to solve for."""
+    """Return the force of all contacts along the body's axes, its moment, and the number of friction records to solve.
+
+    The friction records of contacts below the ground are filled.
+    """
     force, moment, count = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0
     if frame.geodetic_altitude - frame.terrain > frame.contact_reach:
         for k in range(contacts.size):
@@ -118,7 +121,7 @@ def _contact_force(
     contact_index: int,
     friction_count: int,
 ) -> tuple[Vector, Vector, int]:
-    """Return the force of a contact below the ground, its moment, and the number of frictions including those added.
+    """Return the force of a contact below the ground, its moment, and the new number of friction records.
 
     height_above_ground: ft, negative.
     normal: normal of the ground, in axes fixed to the earth.
@@ -184,7 +187,10 @@ def _add_frictions(
     contact_index: int,
     friction_count: int,
 ) -> int:
-    """Append the frictions of a contact, and return the new number of frictions.
+    """Append the friction records of a contact, and return the new number of friction records.
+
+    A sliding contact of the structure has friction against its motion; any other contact has friction along and across
+    its longitudinal direction.
 
     ground_velocity: velocity along the axes of the ground, ft/s.
     """
@@ -241,6 +247,7 @@ def _set_friction(
 
 @inlined
 def _limit(lower: float, value: float, upper: float) -> float:
+    """Return a value within limits."""
     if value < lower:
         return lower
     return upper if value > upper else value

@@ -63,6 +63,7 @@ class _Reader:
         self._parser.StartDoctypeDeclHandler = self._check_doctype
 
     def read(self) -> None:
+        """Read and parse the file. Raises FlightError if it is unreadable, not well formed, or refused."""
         try:
             self.data = read_at_most(self.file, MAX_MODEL_BYTES, "model")
             self._parser.Parse(self.data, True)
@@ -83,6 +84,7 @@ class _Reader:
         return bytes(data)
 
     def _refuse_model(self, reason: str) -> None:
+        """Raise FlightError with the current line of the file and a reason."""
         location = f"{self.file}:{self._parser.CurrentLineNumber}"
         raise FlightError(f"{location}: {reason}; the model is refused", file=self.file)
 
@@ -178,6 +180,7 @@ def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
 
 
 def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
+    """Return the reader of a file, after it has read the file."""
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader
@@ -194,6 +197,7 @@ def _find_file(name: str, folders: Sequence[Path]) -> Path | None:
 
 
 def _check_property_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) -> None:
+    """Raise FlightError if a model reads a property that neither JSBSim nor the model creates."""
     created_names = set().union(*(reader.created_names for reader in readers))
     has_parts = any(reader.has_parts for reader in readers)
     for reader in readers:
@@ -221,7 +225,7 @@ from flight.dynamics import fdm as loading
 from world.errors import FlightError
 loading.silence = lambda: contextlib.nullcontext(str)
 try:
-    fdm = loading.Fdm(read_aircraft(Path(sys.argv[1])), tried=True)
+    fdm = loading.Fdm(read_aircraft(Path(sys.argv[1])), is_tested=True)
     fdm.move_to(500.0)
     fdm.balance(fdm.first_guess())
     fdm.step(10)

@@ -115,7 +115,7 @@ class ContactData(NamedTuple):
 class ModelProgram:
     """Registers and instructions of a model.
 
-    numbers: initial values of all registers, those of the frame first; properties are 0.
+    numbers: initial values of all registers, the registers of the frame first; properties are 0.
     fcs, aero, external: instructions of the flight controls, the aerodynamics and the external reactions.
     properties: register of each property.
     """
@@ -174,7 +174,7 @@ _SECTIONS = ("flight_control", "aerodynamics", "external_reactions")
 
 @dataclass(slots=True)
 class _Translator:
-    """Collects the registers and instructions of a model.
+    """Collector of the registers and instructions of a model.
 
     sections: flight controls, aerodynamics and external reactions.
     """
@@ -189,6 +189,7 @@ class _Translator:
     _code: list[int] = field(default_factory=list)
 
     def program(self) -> ModelProgram:
+        """Translate all sections, and return the program."""
         self.properties = {
             name: frame_register(*field_and_element) for name, field_and_element in FRAME_PROPERTIES.items()
         }
@@ -220,6 +221,7 @@ class _Translator:
                     self._property(element.attrib["name"])
 
     def _property(self, name: str) -> int:
+        """Return the register of a property, a new one for a new property."""
         if name not in self.properties:
             self.properties[name] = self._new_register(0.0)
         return self.properties[name]
@@ -230,6 +232,7 @@ class _Translator:
         return len(self.numbers) - len(values)
 
     def _constant(self, value: float) -> int:
+        """Return the register of a constant; equal constants share a register."""
         key = value.hex()
         if key not in self._constants:
             self._constants[key] = self._new_register(value)
@@ -274,6 +277,7 @@ class _Translator:
         return self.properties[name]
 
     def _translate_table(self, element: Element, target: int | None) -> int:
+        """Translate a table of one variable, and return the register of its value."""
         _check_element(element, children={"independentVar", "tableData"})
         variables, data = element.findall("independentVar"), element.findall("tableData")
         if len(variables) != 1 or len(data) != 1:
@@ -394,7 +398,7 @@ _CONTACT_NUMBERS = {
     "dynamic_friction": (None, 1.0),
     "rolling_friction": (None, 1.0),
 }
-# Values that a contact must state, if any: it neither steers, nor brakes, nor retracts.
+# Required values of elements that a contact may have: no contact steers, brakes or retracts.
 _REQUIRED_CONTACT_VALUES = {"max_steer": "0", "brake_group": "NONE", "retractable": "0"}
 
 
@@ -441,13 +445,13 @@ def _element_text(element: Element) -> str:
 
 
 def _element_number(element: Element, *, attributes: Iterable[str] = ()) -> float:
-    """Return the number in an element. Raises UnsupportedModel for a property or anything else."""
+    """Return the number in an element. Raises UnsupportedModel for anything but a number."""
     _check_element(element, attributes=attributes)
     return _parse_number(element, _element_text(element))
 
 
 def _parse_number(element: Element, text: str) -> float:
-    """Parse a number in an element. Raises UnsupportedModel for anything else."""
+    """Parse the text of an element as a number. Raises UnsupportedModel for anything but a number."""
     try:
         return float(text)
     except ValueError:

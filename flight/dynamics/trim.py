@@ -18,15 +18,15 @@ from world.errors import FlightError
 from world.least_squares import least_squares
 
 # ----------------------------------------------------------------------
-# Running engine in a JSBSim model: its speed is a state of the model, which must settle before a measurement.
+# The running engine of a JSBSim model: its speed is a state of the model, which must settle before a measurement.
 
 # First time step while the engine speed settles, s.
 _SETTLE_STEP_S = 0.2
-# Number of such steps before the step follows the engine's time constant.
+# Number of steps of this length, before the step length follows the engine's time constant.
 _FIRST_SETTLE_STEPS = 25
 # Maximum number of steps.
 _MAX_SETTLE_STEPS = 300
-# Range of the following steps, s.
+# Range of the step length after that, s.
 _SETTLE_STEP_RANGE_S = (1e-4, 60.0)
 # Maximum ratio between successive steps.
 _MAX_STEP_CHANGE = 4.0
@@ -167,7 +167,7 @@ class Trim:
     throttle: float
 
     def commands(self) -> Commands:
-        """Return the commands of this flight."""
+        """Return elevator, aileron, rudder and throttle of this flight."""
         return Commands(self.elevator, self.aileron, self.rudder, self.throttle)
 
     def vector(self) -> Floats:
@@ -204,8 +204,8 @@ def solve_trim(
 
     balance: function from a trim vector to its accelerations, (6,).
     fixed_values: values of the fixed quantities.
-    limits: elevator, aileron and rudder limits.
-    start: first guess, (8,).
+    limits: elevator, aileron and rudder limits, rad.
+    start: first guess, (8,); None for level flight at 25 m/s.
 
     Use Newton's method with one-sided differences. Limit each step to `_MAX_NEWTON_STEP`, and halve it while it does
     not reduce the residual.
@@ -252,6 +252,10 @@ def solve_trim(
 
 
 def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
+    """Return the lower and upper bounds of a trim vector, (8,) each.
+
+    limits: elevator, aileron and rudder limits, rad.
+    """
     elevator, aileron, rudder = limits
     lower_bounds = np.array([5.0, -1.2, -0.4, -0.5, -elevator, -aileron, -rudder, 0.0])
     upper_bounds = np.array([80.0, 1.2, 0.4, 0.5, elevator, aileron, rudder, 1.0])
@@ -312,18 +316,12 @@ def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim 
 
 
 def fastest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return level flight at full throttle, or None if there is no trim.
-
-    amsl: altitude, m.
-    """
+    """Return level flight at full throttle at an altitude (m), or None if no trim is found."""
     return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, near)
 
 
 def slowest_level_flight(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return level flight with the elevator at its upper stop, or None if there is no trim.
-
-    amsl: altitude, m.
-    """
+    """Return level flight with the elevator at its upper stop at an altitude (m), or None if no trim is found."""
     return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, near)
 
 
@@ -361,7 +359,7 @@ def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
 
 
 def attitude(trim_point: Trim) -> tuple[float, float]:
-    """Return roll and pitch of a trim, rad."""
+    """Return the roll and pitch angles of a trim, rad."""
     roll, pitch, _ = euler(body_axes(0.0, trim_point.climb, trim_point.bank, trim_point.alpha))
     return roll, pitch
 

@@ -23,31 +23,31 @@ class Gains:
     reference_airspeed: airspeed at which surface gains apply; they are scaled with dynamic pressure.
     height_frequency, height_damping, height_integral: second-order altitude law.
     slope_lead: lead time of the path's slope in the feedforward.
-    load_lead: lead time of the lift for the bank.
-    alpha_per_g: angle of attack for the weight.
+    load_lead: lead time of the predicted bank for which the elevator provides lift.
+    alpha_per_g: angle of attack that carries the aircraft's weight.
     elevator_per_alpha, elevator_per_pitch_rate: elevator that holds an angle of attack and a pitch rate.
     pitch_rate_gain: pitch damping.
 
     Airspeed:
 
-    speed_gain, speed_integral: throttle per m/s.
+    speed_gain, speed_integral: throttle per m/s of airspeed error, and per m of its integral.
     throttle_per_slope: throttle per rad of climb.
     throttle_idle: throttle at which the motor starts to give thrust at the reference airspeed; lower limit of the
         integrator.
-    slow_margin: airspeed error below the command at which altitude yields to airspeed.
+    slow_margin: airspeed below the command at which guidance gives up altitude to regain airspeed.
     arc_slowing_time, arc_slowing_max: time before an arc at which the airspeed is reduced to a ground speed at which
         the arc can be flown, and maximum reduction.
 
     Cross-track:
 
     cross_track_frequency, cross_track_damping, cross_track_integral: second-order cross-track law.
-    intercept: maximum angle between course and path when far from the path.
+    intercept: maximum angle between course and path, far from the path.
     turn_lead, turn_smoothing: lead time of the path's curvature in the feedforward, and averaging time about that
         point.
-    aside_frequency: frequency of the return to the path after the offset from rolling into an arc.
-    side_gain, side_lag: gain on the lateral acceleration that bank and ailerons do not explain, and its lag.
-    push_lead, push_smoothing: lead time of a correction to compensate the bank's lag, from its rate of change, and the
-        smoothing time of that rate.
+    aside_frequency: frequency of the return to the path from the offset that rolling into an arc causes.
+    side_gain, side_lag: gain and lag of the compensation of lateral acceleration that bank and ailerons do not explain.
+    push_lead, push_smoothing: lead time of the lateral correction, which compensates the lag of the bank, and smoothing
+        time of the correction's rate of change.
     side_per_sideslip, side_per_aileron: lateral acceleration, m/s^2 per rad.
     sideslip_max: skid at the bank limit.
 
@@ -65,9 +65,9 @@ class Gains:
     Reference laws; their gains have defaults, like other gains that an aircraft may omit:
 
     l1_period, l1_damping, l1_integral: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
-    field_approach: angle of approach to the path when far from it.
+    field_approach: angle of approach to the path from far away.
     field_path, field_orbit: convergence of the vector field on a line and on an orbit.
-    field_course, field_course_integral: bank per course error.
+    field_course, field_course_integral: bank per course error, and per integral of the course error.
     """
 
     reference_airspeed: float

@@ -59,20 +59,23 @@ def waypoint_column(count: int) -> Records:
 
 
 # ArduPlane's WP_RADIUS, for a mission without an acceptance radius, m.
-WAYPOINT_RADIUS = 90.0
+DEFAULT_ACCEPTANCE_RADIUS_M = 90.0
 # Maximum angle to the line at which L1 integrates, rad.
 _INTEGRATION_LIMIT_RAD = math.radians(5.0)
 # Maximum magnitude of the L1 integrator, rad.
 _MAX_INTEGRATOR_RAD = 0.1
 # Sine of the steepest intercept angle of L1, 45 degrees.
 _CAPTURE_SINE = math.sqrt(0.5)
-# Time after passing a waypoint at which L1 turns back to it, s.
+# Time after which L1 turns back to a waypoint that it has passed, s.
 _PASSED_TIME_S = 3.0
 
 
 @inner
 def l1_length(speed: float, period: float, damping: float) -> float:
-    """Return the L1 distance, m, at a ground speed (m/s)."""
+    """Return the L1 distance (`_L1_dist` of AP_L1_Control), m, at a ground speed (m/s).
+
+    period, damping: NAVL1_PERIOD, s, and NAVL1_DAMPING.
+    """
     return period * damping * speed / math.pi
 
 
@@ -80,13 +83,14 @@ def l1_length(speed: float, period: float, damping: float) -> float:
 def l1_angles(
     motion: Record, a_east: float, a_north: float, b_east: float, b_north: float, l1_distance: float
 ) -> tuple[float, float]:
-    """Return the angle from the ground velocity to the leg or waypoint, and from the leg to the aim point, rad.
+    """Return the angles Nu2 and Nu1 of AP_L1_Control, rad, each with the opposite sign.
 
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    The first is the angle from the leg, or from the direction to a waypoint, to the ground velocity. The second is the
+    angle between the leg and the direction to the L1 point, without the integrator. It is NaN while L1 aims straight at
+    a waypoint: far before the leg's start, or past the leg's end.
+
+    motion: a record of `flight.guidance.navigation_error.MOTION`.
     a_east, a_north, b_east, b_north: the leg's ends, m.
-
-    The second angle is NaN while L1 aims straight at a waypoint. Both angles are positive if the aircraft must turn
-    left.
     """
     leg_east, leg_north = b_east - a_east, b_north - a_north
     leg_length = max(1e-6, math.hypot(leg_east, leg_north))
@@ -106,7 +110,12 @@ def l1_angles(
 
 @inner
 def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) -> float:
-    """Return the cross-track integrator after a tick, rad."""
+    """Return the cross-track integrator (`_L1_xtrack_i` of AP_L1_Control) after a tick, rad.
+
+    aim_angle: angle between the leg and the direction to the L1 point, rad, NaN without a leg; the integrator changes
+        only while it is below 5 degrees.
+    gain: NAVL1_XTRACK_I.
+    """
     if math.isnan(aim_angle) or abs(aim_angle) >= _INTEGRATION_LIMIT_RAD:
         return integrator
     return min(_MAX_INTEGRATOR_RAD, max(-_MAX_INTEGRATOR_RAD, integrator + aim_angle * gain * dt))
@@ -114,9 +123,9 @@ def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) ->
 
 @inner
 def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: float) -> float:
-    """Return the acceleration to the right that L1 demands, m/s^2.
+    """Return the acceleration to the right that L1 demands (`_latAccDem` of AP_L1_Control), m/s^2.
 
-    angle: angle from the aim direction to the velocity, rad, positive to the right.
+    angle: angle from the direction to the L1 point to the ground velocity, rad, positive to the right.
     """
     angle = min(0.5 * math.pi, max(-0.5 * math.pi, angle))
     return -4.0 * damping * damping * speed * speed / l1_distance * math.sin(angle)
@@ -126,7 +135,7 @@ def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: flo
 def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
     """Return True if the aircraft is within the turn distance of waypoint b, or past the line across the leg there.
 
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    motion: a record of `flight.guidance.navigation_error.MOTION`.
     a, b: the leg's ends, of `WAYPOINT`.
     radius: turn distance for a turn of 90 degrees, m; smaller turns start later.
     """
@@ -146,11 +155,13 @@ def field_course(
 
     course: course of the path here, rad.
     cross_track: distance to the right of the path, m.
-    curvature: 1/m, positive to the right.
+    curvature: curvature of the path, 1/m, positive to the right; 0 for a line.
+    approach: angle of approach to a line from far away, rad.
+    path_gain, orbit_gain: convergence to a line and to an arc.
     """
     if curvature == 0.0:
         return course - approach * 2.0 / math.pi * math.atan(path_gain * cross_track)
-    # Outside a right turn is left of it: cross_track is then negative, and -cross_track * curvature is distance over
-    # radius.
+    # The outside of a right turn is on its left, where cross_track is negative: -cross_track * curvature is the
+    # distance outside the arc as a ratio to the radius.
     turn_sign = math.copysign(1.0, curvature)
     return course + turn_sign * math.atan(-orbit_gain * cross_track * curvature)

@@ -62,7 +62,7 @@ _AIRSPEED_POWERS = {
 _SERVO_PHASE_RAD = 0.4
 # Damping ratio of the roll and pitch loops.
 _DAMPING_RATIO = 0.8
-# Throttle step in the search for the start of motor current.
+# Throttle step in the search for the throttle at which the motor starts to draw current.
 _THROTTLE_STEP = 0.02
 # Limits that do not depend on the model.
 _FIXED_GAINS = {
@@ -97,6 +97,7 @@ def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, floa
 
 
 def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
+    """Return the trim of level flight at cruise. Raises FlightError if there is none."""
     level = steady_flight(fdm, aircraft.airspeed, AMSL)
     if level is None:
         message = f"{aircraft.name} cannot hold level flight at {aircraft.airspeed:g} m/s and {AMSL:g} m"
@@ -105,6 +106,7 @@ def _level_cruise(aircraft: Aircraft, fdm: Fdm) -> Trim:
 
 
 def _gains_from_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, float]:
+    """Return the gains of the airframe from the matrices A and B of `flight.dynamics.trim.linearise`."""
     speed = aircraft.airspeed
     _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
@@ -125,9 +127,9 @@ def _gains_from_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, 
 
 
 def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
-    """Return the throttle (0..1) below which an electric motor has no current, and thus no thrust, in level flight.
+    """Return the throttle (0..1) below which an electric motor draws no current, and gives no thrust, in level flight.
 
-    The resolution is 0.02. The result is 0 for an aircraft without an electric motor.
+    The throttle is found in steps of 0.02. The result is 0 for an aircraft without an electric motor.
     """
     fdm.move_to(level.amsl)
     for throttle in np.arange(0.0, level.throttle, _THROTTLE_STEP).tolist():
@@ -221,7 +223,7 @@ _UNIT_SUFFIXES = {
 
 
 def gains_text(gains: Gains) -> str:
-    """Return the text of a ``gains.toml`` without default values."""
+    """Return the text of a ``gains.toml``, without gains at their default values."""
     defaults = {gain.name: gain.default for gain in fields(Gains)}
     lines = [
         "# Gains of the guidance and inner loops; flight/guidance/gains.py says what each means.",

@@ -30,7 +30,7 @@ def start_navigation(noise: Floats, lags: Record) -> None:
 
 
 @inner
-def navigate(
+def estimate_motion(
     true_motion: Record,
     estimated_motion: Record,
     lags: Record,
@@ -39,11 +39,13 @@ def navigate(
     time_constant: float,
     dt: float,
 ) -> None:
-    """Set the estimated state to the true state plus the error, and advance the error.
+    """Set the estimated motion to the true motion plus the navigation error, and advance the error by a tick.
 
     true_motion, estimated_motion: records of `MOTION`.
     lags: a record of `NAVIGATION_LAGS`.
     noise: (3,) unit normals.
+    sigma: standard deviation of the position error on each axis, m; 0 for no error.
+    time_constant: correlation time of the error, s.
     """
     if sigma == 0.0:
         for name in literal_unroll(_MOTION_FIELDS):

@@ -84,7 +84,7 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
     """Update the position along the path in the memory, and return the path's course at that position, rad.
 
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    motion: a record of `flight.guidance.navigation_error.MOTION`.
     pieces: records of `PIECE`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
@@ -148,8 +148,12 @@ def max_curvature(pieces: Records, first_piece: int, start: float, end: float) -
 
 
 @compiled
-def profile(nodes: Records, distance: float) -> tuple[float, float, float]:
-    """Return altitude (m), slope (tangent) and slope change per meter of the altitude profile at ``distance``."""
+def profile_at(nodes: Records, distance: float) -> tuple[float, float, float]:
+    """Return altitude (m), slope (tangent) and slope change per meter of an altitude profile.
+
+    nodes: records of `NODE`.
+    distance: distance along the path, m.
+    """
     index = 0
     while index + 1 < nodes.shape[0] and nodes[index + 1].distance <= distance:
         index += 1
@@ -194,25 +198,27 @@ class FlyByPath:
         self.nodes.setflags(write=False)
 
 
-# Turns after a fly-over waypoint.
-Swing = Literal["none", "short", "long"]
-# Tolerance within which a turn of 180 degrees may go to either side, rad: a navigation error of 5 m over ArduPlane's L1
-# distance of 60 m at 25 m/s.
+# Turn after a fly-over waypoint; see `fly_by_path`.
+FlyOverTurn = Literal["none", "short", "long"]
+# Difference from 180 degrees up to which a turn may go to either side, rad: the angle of a navigation error of 5 m at
+# ArduPlane's L1 distance of 60 m at 25 m/s.
 REVERSAL_SIDE_TOLERANCE_RAD = math.radians(5.0)
 
 # Distance between corners of the altitude profile along a leg that follows the ground, m: ArduPlane's TERRAIN_SPACING.
 GROUND_STEP_M = 100.0
 
 
-def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, swing: Swing = "short") -> FlyByPath:
+def fly_by_path(
+    route: Route, limits: Limits, terrain: Terrain | None = None, fly_over_turn: FlyOverTurn = "short"
+) -> FlyByPath:
     """Join the legs of a route to a fly-by path.
 
     The route has at least one leg, and only its first leg may have no length. An arc passes each waypoint; after a
     fly-over waypoint, arcs lead back to the next leg.
 
     terrain: ground that legs at a height above ground follow; with None these legs are straight.
-    swing: "none" keeps the corners at fly-over waypoints sharp, for an autopilot with its own turns; "long" takes the
-        longer turn at `reversals`.
+    fly_over_turn: "none" keeps the corners at fly-over waypoints sharp, for an autopilot with its own turns; "long"
+        takes the longer turn at `reversals`; "short" takes the shorter turn at all waypoints.
 
     A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
 
@@ -228,9 +234,9 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
-    courses, leg_lengths, turns = leg_courses(points), leg_runs(points), _turn_angles(route, swing)
+    courses, leg_lengths, turns = leg_courses(points), leg_runs(points), _turn_angles(route, fly_over_turn)
     tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, leg_lengths, turns)
-    return_lengths *= swing != "none"
+    return_lengths *= fly_over_turn != "none"
     pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
     # A loiter at the start of the flight may end where it starts.
@@ -263,17 +269,8 @@ def fly_by_path(route: Route, limits: Limits, terrain: Terrain | None = None, sw
         if tangents[leg + 1] == 0.0:
             continue
         length = radii[leg + 1] * abs(turn)
-        pieces.append(
-            (
-                distance,
-                length,
-                *piece_start,
-                course,
-                math.copysign(1.0 / radii[leg + 1], turn),
-                leg,
-                distance + length / 2,
-            )
-        )
+        curvature = math.copysign(1.0 / radii[leg + 1], turn)
+        pieces.append((distance, length, *piece_start, course, curvature, leg, distance + length / 2))
         distance += length
         piece_start = corner[:2] + tangents[leg + 1] * np.array([math.sin(next_course), math.cos(next_course)])
         nodes.append((distance, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
@@ -294,10 +291,10 @@ def reversals(route: Route) -> NDArray[np.int64]:
     return np.flatnonzero(route.fly_over & (turns > math.pi - REVERSAL_SIDE_TOLERANCE_RAD))
 
 
-def _turn_angles(route: Route, swing: Swing) -> Floats:
+def _turn_angles(route: Route, fly_over_turn: FlyOverTurn) -> Floats:
     """Return the turn at each inner waypoint, (w - 2,) rad, positive to the right; see `fly_by_path`."""
     turns = signed_turns(route.waypoints)
-    if swing == "long":
+    if fly_over_turn == "long":
         corners = reversals(route) - 1
         turns[corners] -= np.copysign(2.0 * math.pi, turns[corners])
     return turns
@@ -344,7 +341,8 @@ def _arcs_at_waypoints(
     """Return tangent lengths, radii and return lengths of the arcs at each waypoint, (w,) m each.
 
     The tangent lengths of fly-by arcs are shortened if a leg is too short for them. The return length of a fly-over
-    waypoint is the part of the next leg until the path is back on that leg; it is 0 if the leg is too short.
+    waypoint is the length of the next leg up to the point where the path joins that leg; it is 0 if the leg is too
+    short.
     """
     count = len(route.waypoints)
     tangents, radii, return_lengths = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -455,15 +453,15 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
     gates = [seq for seq, item in items.items() if item.command == Command.CONDITION_GATE]
     waypoints["is_gate"] = np.isin(route.items, gates)
     waypoints["is_mission_end"][-1] = mission is not None and ends_at_plain_waypoint(route, mission)
-    if route.straight_to >= 0:
-        waypoints["without_crosstrack"][route.straight_to] = True
-    if route.return_to is not None:
-        return_waypoints = waypoints[route.return_from + 1 : route.return_until]
+    if route.direct_landing_start >= 0:
+        waypoints["without_crosstrack"][route.direct_landing_start] = True
+    if route.rtl_loiter is not None:
+        return_waypoints = waypoints[route.rtl_start + 1 : route.rtl_end]
         return_waypoints["is_rtl"] = True
         names = ("centre_east", "centre_north", "up", "loiter_radius", "slope_base")
-        for name, value in zip(names, route.return_to, strict=True):
+        for name, value in zip(names, route.rtl_loiter, strict=True):
             return_waypoints[name] = value
-    last_before_return = route.return_from if route.return_to is not None else route.straight_to - 1
+    last_before_return = route.rtl_start if route.rtl_loiter is not None else route.direct_landing_start - 1
     if last_before_return >= 0:
         waypoints["turn"][last_before_return] = _turn_before_return(route, last_before_return, items)
         _set_exit_bearing(waypoints, last_before_return, items)
@@ -489,7 +487,9 @@ def _bearing_to_origin(item: MissionItem) -> float:
 
 
 def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionItem]) -> None:
-    """Set the bearing to which ArduPlane exits a loiter before an RTL, whose item has no position: that of 0 N, 0 E.
+    """Set the bearing to which ArduPlane exits a loiter before an RTL: the bearing of 0 N, 0 E.
+
+    ArduPlane reads the position of the RTL item, which has none, as 0 N, 0 E.
 
     last: index of the last waypoint before the RTL.
     """
@@ -500,7 +500,7 @@ def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionIte
 
 
 def _set_landing(waypoints: Records, mission: Mission | None) -> None:
-    """Mark the waypoint before a landing, and those of a mission's landing (`MissionBase::isLanding` of PX4)."""
+    """Mark the waypoint before a landing, and the waypoints of a landing sequence (`MissionBase::isLanding` of PX4)."""
     if mission is None:
         return
     flown = [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
@@ -536,15 +536,16 @@ def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
         loiter = None if item is None else loiter_of(item)
         if loiter is None:
             continue
-        waypoints["exits_on_tangent"][k] = loiter.on_tangent
+        waypoints["exits_on_tangent"][k] = loiter.exits_on_tangent
         waypoints["loiter_turns"][k] = loiter.turns
         if not loiter.turns:
             waypoints["loiter_time"][k] = math.inf if loiter.endless else loiter.seconds
-            waypoints["loiters_to_altitude"][k] = loiter.to_height
-            waypoints["exits_on_course"][k] = loiter.on_course
+            waypoints["loiters_to_altitude"][k] = loiter.to_altitude
+            waypoints["exits_on_course"][k] = loiter.exits_on_course
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
+    """Return the index of the piece at each distance (n,) along the path, m."""
     return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
 
 
@@ -560,7 +561,7 @@ def _path_points(path: FlyByPath, distances: Floats) -> Floats:
     north = np.where(
         is_straight, distances_along * np.cos(course), (np.sin(end_course) - np.sin(course)) / nonzero_curvature
     )
-    up = [profile(path.nodes, float(s))[0] for s in distances]
+    up = [profile_at(path.nodes, float(s))[0] for s in distances]
     return np.column_stack([pieces["east"] + east, pieces["north"] + north, up])
 
 

@@ -46,9 +46,9 @@ class ArmingState:
     mode: ArduPlane's number.
     is_judging: True while a verdict on the mission is awaited.
     last_verdict: last verdict on the mission; None without a mission.
-    force: PFLY_FORCE.
+    force: True if the parameter PFLY_FORCE allows a flight against the verdict.
     end_requested: True if the flight must end.
-    loiter_center: loiter center of a requested diversion in its new mode; None without a request.
+    loiter_center: loiter center of a requested diversion; None if no diversion is requested.
     mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
@@ -80,6 +80,8 @@ class ArmingState:
 
     def arm(self, should_arm: bool, param2: float) -> CommandResult:
         """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).
+
+        param2: second parameter of the command; MAVLink's and MAVProxy's values force it.
 
         The result is IN_PROGRESS if the command must be repeated after the verdict.
         """
@@ -151,7 +153,7 @@ class ArmingState:
         self.mission_state = ACTIVE if mode == AUTO else PAUSED
 
     def _change_flight_mode(self, mode: int) -> CommandResult:
-        """Continue the flight in another mode; the current mode changes nothing."""
+        """Continue the flight in another mode; do nothing for the current mode."""
         if mode == MANUAL:
             return CommandResult(DENIED, "MANUAL denied: no pilot has the sticks; a forced disarm ends the flight")
         if mode != self.mode:
@@ -191,6 +193,7 @@ class ArmingState:
         self.mode, self.loiter_center = MANUAL, None
 
     def _arming_refusal(self, is_forced: bool) -> str:
+        """Return the reason why arming is refused, or ""."""
         if self.last_verdict is None:
             return ""
         if not self.last_verdict.possible:

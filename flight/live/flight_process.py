@@ -14,7 +14,7 @@ belong to planfly; nothing from a station is ever unpickled.
 |---|---|
 | `ProcessReady` | once, before the first request is read |
 | `MissionJudged` | for each `JudgeMission` |
-| `flight.live.telemetry.Snapshot` | in flight, `SNAPSHOT_RATE` times a second |
+| `flight.live.telemetry.Snapshot` | in flight, `SNAPSHOT_RATE_HZ` times a second |
 | `FlightDiverted` | for each `DivertFlight` in flight |
 | `FlightEnded` | when the aircraft stops |
 | `FlightJudged` | for each log that is closed: one, and one more for each diversion |
@@ -36,16 +36,16 @@ from flight.live.telemetry import AUTO, CRITICAL, GUIDED, LOITER, MODE_NAMES, Sn
 from flight.mission.items import Frame, Home, Mission
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import TICK, Flight
+from flight.simulation.simulate import TICK_S, Flight
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.arrays import Floats
 from world.errors import PlanflyError
 
 # Rate of the snapshots, 1/s.
-SNAPSHOT_RATE = 60.0
+SNAPSHOT_RATE_HZ = 60.0
 # Interval at which the log is passed to the operating system, s.
-FLUSH_PERIOD = 0.2
-# Maximum delay behind the clock that the flight makes up, s; beyond it the flight runs late.
+FLUSH_PERIOD_S = 0.2
+# Maximum delay of the flight behind the clock that is made up, s; a longer delay remains.
 _MAX_DELAY_S = 0.5
 # First byte of a packed snapshot.
 _PACKED_MARK = b"S"
@@ -55,11 +55,11 @@ _PICKLED_MARK = b"E"
 STOPPED = "stopped by the ground station"
 # End reason of a flight at the shutdown of the vehicle.
 SHUT_DOWN = "stopped: the vehicle was shut down"
-# End reason of a route that a diversion left; the new mode follows.
+# Beginning of the end reason of a route that a diversion left; the name of the new mode follows.
 DIVERTED_TEXT = "left at a ground station's request for "
-# End reason of one log of a loiter that continues.
+# End reason of a log that ends while the loiter continues.
 STILL_LOITERING_TEXT = "log ends here; the aircraft keeps circling"
-# Maximum number of logs of a loiter without end.
+# Maximum number of logs of one loiter.
 _MAX_LOITER_LOGS = 16
 
 
@@ -147,7 +147,7 @@ class MissionJudged:
 
 @dataclass(frozen=True, slots=True)
 class FlightDiverted:
-    """Event: the aircraft is on another route, or stays on its route because it cannot be diverted.
+    """Event: the aircraft flies another route, or continues on its route because it cannot be diverted.
 
     mode: current mode of the flight.
     problem: reason why the flight cannot be diverted, or "".
@@ -209,7 +209,7 @@ class PreparedFlight:
 
 
 class FlightFactory(Protocol):
-    """The application's part of the flight process.
+    """Interface of the application for the flight process: judge missions, find routes, open logs.
 
     speed: speed of the flight relative to real time.
     """
@@ -258,7 +258,7 @@ def serve_flights(connection: Connection, factory: FlightFactory) -> None:
             elif isinstance(request, EndFlight) and request.quit:
                 return
     except (EOFError, BrokenPipeError, ConnectionResetError):
-        # The link is gone, and the stations with it; the log is already closed.
+        # The link process has ended; the log is already closed.
         return
 
 
@@ -347,7 +347,7 @@ def _run_flight(
 
 
 class _LoggedFlight:
-    """An aircraft in the air, and the log of each of its routes."""
+    """A flight in progress, and the log of each route that it has flown."""
 
     def __init__(
         self, connection: Connection, requests: _RequestQueue, factory: FlightFactory, flight: Flight, log: LogSink
@@ -355,7 +355,7 @@ class _LoggedFlight:
         self._connection, self._requests, self._factory = connection, requests, factory
         self._flight, self._mode = flight, AUTO
         self._snapshots = SnapshotMaker(flight.setup, flight.map)
-        # The last log is written; the others are judged after the flight, with their ends in `_end_reasons`.
+        # Rows go to the last log; the earlier logs are judged after the flight, with the reasons in `_end_reasons`.
         self._logs, self._end_reasons = [log], list[str]()
         self._unwritten_rows: list[Rows] = []
         # The current loiter, or None, and the number of its logs.
@@ -370,10 +370,10 @@ class _LoggedFlight:
         end_reason, should_continue = "", True
         while not end_reason:
             now = clock()
-            due_ticks = int((now - time_origin) * speed / TICK) - ticks
-            max_due_ticks = max(1, int(_MAX_DELAY_S * speed / TICK))
+            due_ticks = int((now - time_origin) * speed / TICK_S) - ticks
+            max_due_ticks = max(1, int(_MAX_DELAY_S * speed / TICK_S))
             if due_ticks > max_due_ticks:
-                time_origin += (due_ticks - max_due_ticks) * TICK / speed
+                time_origin += (due_ticks - max_due_ticks) * TICK_S / speed
                 due_ticks = max_due_ticks
             if due_ticks > 0:
                 rows, end_reason = self._flight.fly_block(due_ticks)
@@ -390,13 +390,13 @@ class _LoggedFlight:
                 should_continue = not request.quit
             elif isinstance(request, DivertFlight) and not end_reason:
                 self._divert(request)
-            if self._unwritten_rows and (end_reason or now - last_flush >= FLUSH_PERIOD):
+            if self._unwritten_rows and (end_reason or now - last_flush >= FLUSH_PERIOD_S):
                 self._write()
                 last_flush = now
             if not end_reason:
                 snapshot_count += 1
-                time.sleep(max(0.0, start_time + snapshot_count / SNAPSHOT_RATE - clock()))
-                snapshot_count = max(snapshot_count, int((clock() - start_time) * SNAPSHOT_RATE))
+                time.sleep(max(0.0, start_time + snapshot_count / SNAPSHOT_RATE_HZ - clock()))
+                snapshot_count = max(snapshot_count, int((clock() - start_time) * SNAPSHOT_RATE_HZ))
         return end_reason, should_continue
 
     def finish(self, end_reason: str, should_abort: Callable[[], bool]) -> list[FlightJudged]:
@@ -413,10 +413,12 @@ class _LoggedFlight:
             log.abandon()
 
     def _write(self) -> None:
+        """Write the waiting rows to the last log."""
         self._logs[-1].write(as_track(join_rows(self._unwritten_rows)))
         self._unwritten_rows.clear()
 
     def _divert(self, request: DivertFlight) -> None:
+        """Divert the flight if possible, and send an event about the new route."""
         if not self._start_route(request, DIVERTED_TEXT + MODE_NAMES[request.mode]):
             return
         route = self._flight.setup.route

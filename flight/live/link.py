@@ -59,13 +59,13 @@ class MavlinkFrame:
 
 
 class Decoder:
-    """Decoder of the dialect's frames, which ignores damaged frames and bytes outside frames."""
+    """Decoder of the frames of MAVLink's ardupilotmega dialect."""
 
     def __init__(self) -> None:
         self._mav = mavlink.MAVLink(None)
 
     def message(self, frame: MavlinkFrame) -> Any | None:
-        """Return the message of a frame, or None if it cannot be read."""
+        """Return the message of a frame, or None if pymavlink cannot decode the frame."""
         try:
             return self._mav.decode(bytearray(frame.raw))
         except (mavlink.MAVError, struct.error, ValueError, IndexError, TypeError, OverflowError):
@@ -123,7 +123,7 @@ def _parse_frame(data: bytes, offset: int) -> MavlinkFrame | None:
 # packet from the future then locks the real station out.
 
 # Unix time of 2015-01-01, from which timestamps are measured, s.
-EPOCH = 1_420_070_400.0
+SIGNING_EPOCH_S = 1_420_070_400.0
 # Timestamp units per second: 10 us each.
 _UNITS_PER_S = 100_000
 # Maximum timestamp: six bytes.
@@ -193,8 +193,8 @@ class Signing:
 
     key: 32 bytes.
     link: link id of this end.
-    newest: maximum timestamp sent or trusted.
-    clock: maximum timestamp of this machine's clock; it does not decrease if the clock is set back.
+    newest: maximum timestamp of all frames sent and all trusted frames.
+    clock: maximum timestamp of this machine's clock, which does not decrease if the clock is set back.
     """
 
     key: bytes
@@ -219,14 +219,14 @@ class Signing:
         timestamp = int.from_bytes(frame.raw[-12:-6], "little")
         stream = (frame.system, frame.component, link)
         last_timestamp = self._streams.get(stream)
-        # Compared with this machine's clock, not with trusted timestamps, so that a series of frames cannot move the
+        # Compare with this machine's clock, not with trusted timestamps, so that a series of frames cannot move the
         # limit into the future.
         self.clock = max(self.clock, _signing_timestamp(wall))
         if timestamp > self.clock + _MAX_LEAD_UNITS:
             return RefusalReason.FUTURE
         if last_timestamp is None:
-            # Compared with this machine's clock, not with others' timestamps: a station whose clock is ahead locks no
-            # other out.
+            # Compare with this machine's clock, not with timestamps of other stations, so that a station whose clock is
+            # ahead does not lock out other stations.
             if timestamp + _MAX_LAG_UNITS < _signing_timestamp(wall):
                 return RefusalReason.OLD
             if len(self._streams) >= _MAX_STREAMS:
@@ -234,7 +234,7 @@ class Signing:
         elif timestamp <= last_timestamp:
             return RefusalReason.REPLAYED
         self._streams[stream] = timestamp
-        # The clock may have been set back before the start: running stations expect timestamps later than their last.
+        # If the clock was set back before the start, running stations still expect later timestamps than before.
         self.newest = max(self.newest, timestamp)
         return None
 
@@ -255,7 +255,8 @@ class Signing:
 
 
 def _signing_timestamp(wall: float) -> int:
-    return min(max(0, int((wall - EPOCH) * _UNITS_PER_S)), _MAX_TIMESTAMP)
+    """Return the timestamp of a time (s since 1970) in units of 10 us since 2015."""
+    return min(max(0, int((wall - SIGNING_EPOCH_S) * _UNITS_PER_S)), _MAX_TIMESTAMP)
 
 
 Address = tuple[str, int]
@@ -267,7 +268,7 @@ COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 # Maximum number of stations.
 MAX_PEERS = 16
 # Time without a heartbeat after which a station is removed, s.
-SILENCE = 15.0
+PEER_TIMEOUT_S = 15.0
 # Maximum number of unknown senders that notices name.
 _MAX_NAMED_STRANGERS = 16
 # Maximum number of datagrams handled before telemetry is sent again.
@@ -276,7 +277,7 @@ _MAX_DATAGRAMS_PER_POLL = 200
 
 @dataclass(slots=True)
 class Peer:
-    """A station that has identified itself.
+    """A station that the vehicle answers.
 
     periods: intervals between messages, s; None for a message that is off.
     due: next time of each message.
@@ -368,20 +369,17 @@ def is_loopback(host: str) -> bool:
 
 
 class Link:
-    """UDP socket with its peers.
+    """UDP socket of the vehicle, and its stations (peers).
 
     clock: function that returns the time for the silence of peers and the times of messages, s, also for users of the
-        link; it never goes back, and stops while the process is stopped.
+        link; the time never decreases, and stops while the process is stopped.
     wall: function that returns the time since 1970, s, for signatures.
     """
 
     def __init__(
         self, access: Access, clock: Callable[[], float] | None = None, wall: Callable[[], float] = time.time
     ) -> None:
-        """Open the socket.
-
-        Raises FlightError if that is not possible.
-        """
+        """Open the socket. Raises FlightError if the access is not protected, or if the socket cannot be bound."""
         check_access(access)
         self.access = access
         self.peers: dict[Address, Peer] = {}
@@ -496,6 +494,7 @@ class Link:
         return notices
 
     def _count_dropped(self, reason: RefusalReason) -> None:
+        """Count a frame that was dropped because of its signature."""
         dropped = self.dropped
         dropped.unsigned += reason is RefusalReason.UNSIGNED
         dropped.forged += reason is RefusalReason.FORGED
@@ -505,13 +504,14 @@ class Link:
         dropped.streams += reason is RefusalReason.STREAMS
 
     def _register_peer(self, source: Address, system: int, component: int) -> Peer | None:
+        """Return the station at an address, a new one if necessary; None if the table of stations is full."""
         now = self.clock()
-        self.peers = {key: peer for key, peer in self.peers.items() if now - peer.last_heard_time < SILENCE}
+        self.peers = {key: peer for key, peer in self.peers.items() if now - peer.last_heard_time < PEER_TIMEOUT_S}
         peer = self.peers.get(source)
         if peer is None:
             if len(self.peers) >= MAX_PEERS:
                 return None
-            # Each station gets one sequence of frames: it would take a second sequence for lost packets.
+            # Each station gets one sequence of frames: it would treat gaps between two sequences as lost packets.
             peer = Peer(source, system, component, now, self._frame_sequence(source))
             # Spread over the first tenth of a second, so that not everything is sent at once.
             peer.due = {name: now + 0.1 * index / len(PERIODS) for index, name in enumerate(PERIODS)}
@@ -520,18 +520,20 @@ class Link:
         return peer
 
     def _frame_sequence(self, address: Address) -> Any:
+        """Return the encoder of an address, which numbers the frames."""
         return self._expected_stations.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod
     def _is_for_vehicle(message: Any) -> bool:
+        """Return True if a message is addressed to the vehicle or to every vehicle."""
         system = getattr(message, "target_system", 0)
         component = getattr(message, "target_component", 0)
         return system in (0, SYSTEM) and component in (0, COMPONENT)
 
     def remove_silent_peers(self) -> None:
-        """Remove the peers that have been silent for `SILENCE`."""
+        """Remove the peers that have been silent for `PEER_TIMEOUT_S`."""
         now = self.clock()
-        for key in [key for key, peer in self.peers.items() if now - peer.last_heard_time >= SILENCE]:
+        for key in [key for key, peer in self.peers.items() if now - peer.last_heard_time >= PEER_TIMEOUT_S]:
             del self.peers[key]
 
     def send(self, message: Any, peer: Peer) -> None:
@@ -547,6 +549,7 @@ class Link:
             self.send(message, peer)
 
     def _send_frame(self, packed: bytes, mav: Any, address: Address) -> None:
+        """Sign a frame if there is a key, and send it; ignore network errors."""
         mav.seq = (mav.seq + 1) % 256
         if self._signing is not None:
             packed = self._signing.sign(packed, self._wall())

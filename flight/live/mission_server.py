@@ -2,8 +2,8 @@
 
 A mission, a fence and rally points are each accepted whole or not at all: an upload is collected next to the current
 list and replaces it only when its last item has arrived and every item is valid. One station uploads at a time;
-another is denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)  pymavlink has
-the messages and a station's lists (`mavwp`), but not the vehicle's side.
+another station is denied until the first has been silent for `LOCK_TIMEOUT_S` (mavlink.io, "Mission Protocol").
+pymavlink has the messages and a station's lists (`mavwp`), but not the vehicle's side.
 """
 
 import math
@@ -25,8 +25,8 @@ from flight.mission.items import (
     MissionItem,
     is_located,
     item_problem,
-    on_grid,
     renumber_items,
+    round_to_grid,
 )
 from world.errors import MissionError
 
@@ -101,7 +101,7 @@ def from_message(message: Any, source: str) -> MissionItem:
     command, frame = int(message.command), int(message.frame)
     has_coordinates = is_located(command, frame)
     if message.get_type() == "MISSION_ITEM":
-        lat, lon = (on_grid(value) if has_coordinates else value + 0.0 for value in (message.x, message.y))
+        lat, lon = (round_to_grid(value) if has_coordinates else value + 0.0 for value in (message.x, message.y))
     else:
         scale = 1e7 if has_coordinates else 1.0
         lat, lon = (math.nan if value == _INT32_MAX else value / scale for value in (message.x, message.y))
@@ -129,6 +129,7 @@ def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home
 
     Item 0 is home, as in ArduPilot, if it is a waypoint above mean sea level, or one without parameters: MAVSDK's
     `mission` plugin sends no home, and its waypoints are relative and have a radius.
+
     own_home: the vehicle's home, for a mission without home.
     """
     items = lists[MissionType.MISSION]
@@ -151,6 +152,7 @@ def uploaded_mission(lists: dict[MissionType, tuple[MissionItem, ...]], own_home
 
 
 def _is_home(item: MissionItem) -> bool:
+    """Return True if item 0 of an upload is home; see `uploaded_mission`."""
     if item.command != Command.NAV_WAYPOINT or not is_located(item.command, item.frame):
         return False
     return item.frame in AMSL or not any(item.params)
@@ -219,39 +221,36 @@ def mission_from_item(mission: Mission, first_seq: int) -> Mission:
     return replace(mission, items=(*speed_items, *(item for item in mission.items if item.seq >= first_seq)))
 
 
-# Maximum number of items of an upload: bounds the memory that a station can use (some 2 MB a list).
-MAX_UPLOADED = 5_000
-# Minimum time before a request is repeated, s.  The first repetition comes after 1.5 times the time that the last item
-# took, the next after twice as long each time, up to `MAX_RETRY`.  Not sooner, as a slow station may give up:
-# MAVSDK does at the sixth request for an item.
-RETRY = 0.05
+# Maximum number of items of an upload: limits the memory that a station can use to about 2 MB per list.
+MAX_UPLOADED_ITEMS = 5_000
+# Minimum time before a request is repeated, s. The first repetition comes after 1.5 times the time that the last item
+# took, and each further one after twice the previous time, up to `MAX_RETRY_PERIOD_S`. Faster repetition could make a
+# slow station give up: MAVSDK gives up at the sixth request for an item.
+MIN_RETRY_PERIOD_S = 0.05
 # Maximum time before a request is repeated, s.
-MAX_RETRY = 0.4
-# Number of extra requests for an upload's last item.  The last ACK may be lost, while the station waits for it in
-# silence, as MAVSDK does for five times 0.5 s.  If other messages of the upload were lost, its last item is requested
-# again, until the station sends something else.  Not on a good link: a station with the ACK does not need it, and
-# MAVSDK takes it for the ACK of its next upload.
-CONFIRMATIONS = 4
+MAX_RETRY_PERIOD_S = 0.4
+# Number of extra requests for an upload's last item. The last ACK may be lost while the station waits for it, as MAVSDK
+# does for five times 0.5 s. If other messages of the upload were lost, the last item is therefore requested again until
+# the station sends another message. On a good link the item is not requested again, because MAVSDK would take the
+# second ACK for the ACK of its next upload.
+CONFIRMATION_COUNT = 4
 # Interval of these requests, s.
-CONFIRM = 0.4
-# Time within which a last item that arrives again is a duplicate and gets no second ACK, s: that ACK would end the next
-# upload.
+CONFIRMATION_PERIOD_S = 0.4
+# Time within which a repeated last item is a duplicate, s: it gets no second ACK, which would end the next upload.
 DUPLICATE_ITEM_TIME_S = 0.3
 # Number of unanswered requests for a first item before MISSION_REQUEST replaces MISSION_REQUEST_INT.
 _INT_REQUEST_ATTEMPTS = 4
 # Silence of a station after which another one may upload, s.
-LOCK = 1.0
+LOCK_TIMEOUT_S = 1.0
 # Silence after which an upload is abandoned, s.
-UPLOAD_TIMEOUT = 8.0
+UPLOAD_TIMEOUT_S = 8.0
 
 # `current` of an item with a position to fly to now.
 _GO_TO_POSITION = 2
 # `current` of an item with an altitude to fly at now.
 _GO_TO_ALTITUDE = 3
 _GO_TO_VALUES = (_GO_TO_POSITION, _GO_TO_ALTITUDE)
-_FLOAT_WARNING = (
-    "the upload came as MISSION_ITEM, whose positions are floats: up to 0.5 m off; MISSION_ITEM_INT is exact"
-)
+_FLOAT_WARNING = "the upload came as MISSION_ITEM, whose float positions are up to 0.5 m off; MISSION_ITEM_INT is exact"
 _FENCE_RETURN = 5000
 _ALLOWED_COMMANDS = {
     MissionType.FENCE: FENCES | {_FENCE_RETURN},
@@ -295,7 +294,7 @@ class _Upload:
     last_message_time: float
     last_request_time: float
     first_request_time: float
-    wait: float = RETRY
+    wait: float = MIN_RETRY_PERIOD_S
     was_repeated: bool = False
     unanswered_count: int = 0
     has_floats: bool = False
@@ -364,31 +363,30 @@ class MissionServer:
         """Repeat requests for missing items, or for the last item, and abandon uploads of silent stations."""
         replies = []
         for kind, upload in list(self._uploads.items()):
-            if now - upload.last_message_time > UPLOAD_TIMEOUT:
+            if now - upload.last_message_time > UPLOAD_TIMEOUT_S:
                 del self._uploads[kind]
-                text = (
-                    f"{_TITLES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
-                )
+                text = f"{_TITLES[kind]} upload abandoned after item {len(upload.items)} of {upload.count}; no change"
                 replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, text))
             elif now - upload.last_request_time >= upload.wait:
-                upload.wait = min(2.0 * upload.wait, MAX_RETRY)
+                upload.wait = min(2.0 * upload.wait, MAX_RETRY_PERIOD_S)
                 upload.was_repeated = True
                 upload.unanswered_count += not upload.items
                 replies.append(self._request(upload, kind, now))
         for kind, finished in self._finished.items():
-            if finished.remaining_count > 0 and now - finished.last_request_time >= CONFIRM:
+            if finished.remaining_count > 0 and now - finished.last_request_time >= CONFIRMATION_PERIOD_S:
                 finished.remaining_count -= 1
                 finished.last_request_time = now
                 replies.append(_request(finished.station, finished.count - 1, kind))
         return replies
 
     def _start_upload(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+        """Start an upload and request its first item (MISSION_COUNT); a count of 0 clears the list."""
         count = int(message.count)
         refusal = self._upload_refusal(station, kind, now)
         if refusal:
             return [self._ack(station, mavlink.MAV_MISSION_DENIED, kind, refusal)]
-        if count > MAX_UPLOADED:
-            text = f"{count} items: at most {MAX_UPLOADED} are stored"
+        if count > MAX_UPLOADED_ITEMS:
+            text = f"{count} items: at most {MAX_UPLOADED_ITEMS} are stored"
             return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, text)]
         self._drop_other_uploads(station)
         if count == 0:
@@ -400,6 +398,7 @@ class MissionServer:
         return [self._request(upload, kind, now)]
 
     def _answer_go_to(self, message: Any, station: Station, kind: MissionType) -> MissionReply:
+        """Fly to the position or altitude of an item that is not part of a mission."""
         try:
             item = from_message(message, "go-to")
         except MissionError as error:
@@ -411,6 +410,7 @@ class MissionServer:
         return self._ack(station, result, kind, problem)
 
     def _receive_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
+        """Store an item of an upload, and request the next item, or replace the list after the last item."""
         upload = self._uploads.get(kind)
         if message.current in _GO_TO_VALUES and (upload is None or upload.station != station):
             return [self._answer_go_to(message, station, kind)]
@@ -435,7 +435,7 @@ class MissionServer:
             return [self._reject_upload(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, placement_problem)]
         upload.items.append(item)
         upload.has_floats = message.get_type() == "MISSION_ITEM"
-        upload.wait = min(max(RETRY, 1.5 * (now - upload.first_request_time)), MAX_RETRY)
+        upload.wait = min(max(MIN_RETRY_PERIOD_S, 1.5 * (now - upload.first_request_time)), MAX_RETRY_PERIOD_S)
         upload.first_request_time = now
         if len(upload.items) < upload.count:
             return [self._request(upload, kind, now)]
@@ -443,12 +443,13 @@ class MissionServer:
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
         self._finished[kind] = _FinishedUpload(
-            station, upload.count, now, now, CONFIRMATIONS if upload.was_repeated else 0
+            station, upload.count, now, now, CONFIRMATION_COUNT if upload.was_repeated else 0
         )
         is_float = message.get_type() == "MISSION_ITEM"
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if is_float else "")]
 
     def _send_count(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
+        """Return the number of items of a list (MISSION_REQUEST_LIST)."""
         count = len(self.lists[kind])
         return [
             MissionReply(
@@ -457,6 +458,7 @@ class MissionServer:
         ]
 
     def _send_item(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
+        """Return an item of a list (MISSION_REQUEST_INT or MISSION_REQUEST)."""
         items = self.lists[kind]
         if not message.seq < len(items):
             return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
@@ -475,6 +477,7 @@ class MissionServer:
     def _clear(
         self, station: Station, kinds: tuple[MissionType, ...], acknowledged_type: int, now: float
     ) -> list[MissionReply]:
+        """Clear lists, and acknowledge with a MAV_MISSION_TYPE; clear none if one of them must not change."""
         for kind in kinds:
             refusal = self._upload_refusal(station, kind, now)
             if refusal:
@@ -506,10 +509,11 @@ class MissionServer:
                 finished.remaining_count = 0
 
     def _upload_refusal(self, station: Station, kind: MissionType, now: float) -> str:
+        """Return the reason why a station must not change a list now, or ""."""
         if self.locked and kind == MissionType.MISSION:
             return self.locked
         for upload in self._uploads.values():
-            if upload.station != station and now - upload.last_message_time <= LOCK:
+            if upload.station != station and now - upload.last_message_time <= LOCK_TIMEOUT_S:
                 return f"another station (system {upload.station.system}) is uploading"
         return ""
 
@@ -518,12 +522,14 @@ class MissionServer:
         self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
     def _request(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
+        """Return the request for the next item of an upload."""
         upload.last_request_time = now
         if upload.unanswered_count >= _INT_REQUEST_ATTEMPTS or upload.has_floats:
             return _request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
         return _request(upload.station, len(upload.items), kind)
 
     def _reject_upload(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
+        """Discard an upload, and return the ACK with the reason."""
         del self._uploads[kind]
         return self._ack(upload.station, result, kind, f"{text}; nothing changed")
 

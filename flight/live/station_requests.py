@@ -28,6 +28,7 @@ from world.errors import PlanflyError
 # ----------------------------------------------------------------------
 # The vehicle's parameters: readable by ground stations, and partly settable.
 
+# Parameter that allows arming although the mission is judged not flyable.
 FORCE = "PFLY_FORCE"
 # Number of parameters sent per second to a station that requested all.
 PARAMETERS_PER_SECOND = 200.0
@@ -58,7 +59,7 @@ def _empty_parameters(_stated: Mapping[str, float]) -> Mapping[str, float]:
 
 @dataclass(slots=True)
 class Parameters:
-    """Parameters by number and by name, with the autopilot's name if it has the same parameter.
+    """Parameters of the vehicle, by number and by name.
 
     autopilot_values: function that returns the simulated autopilot's parameters by name, with the values that stations
         have set. It raises PlanflyError if a value is not allowed.
@@ -119,7 +120,7 @@ class Parameters:
             if in_flight:
                 return (
                     number,
-                    f"{entry.name} {value:g} refused in flight, which is logged with one set; {unchanged_text}",
+                    f"{entry.name} {value:g} refused in flight: a flight has one set of parameters; {unchanged_text}",
                 )
             return number, self._set_autopilot_parameter(entry, value)
         if entry.max_value is None:
@@ -158,7 +159,7 @@ def vehicle_parameters(
     autopilot_values: Callable[[Mapping[str, float]], Mapping[str, float]] = _empty_parameters,
     not_flown: Iterable[str] = (),
 ) -> Parameters:
-    """Return the parameters of a vehicle and of its simulated autopilot, in alphabetical order.
+    """Return the parameters of a vehicle and of its simulated autopilot, sorted by name.
 
     airspeed, min_airspeed, max_airspeed: m/s.
     max_bank_deg: degrees.
@@ -205,6 +206,7 @@ def vehicle_parameters(
 
 
 def _decode_name(name: bytes | str) -> str:
+    """Return a parameter's name from a MAVLink field of up to 16 characters, which may end with NUL."""
     data = name.encode("latin-1", "replace") if isinstance(name, str) else name
     return data.split(b"\0")[0].decode("ascii", "replace")[:16]
 
@@ -246,7 +248,7 @@ class _WaitingArmCommand:
 
 @dataclass(slots=True)
 class Requests:
-    """Answer requests with messages for the requesting station, and with texts for all stations.
+    """Handler of requests, which answers with messages for the requesting station and texts for all stations.
 
     set_start_item: function that sets the item at which the next flight starts, by the station's number.
     """
@@ -272,6 +274,7 @@ class Requests:
         return replies
 
     def _on_command(self, message: Any, peer: Peer, now: float) -> list[Response]:
+        """Run and acknowledge a command; an arm command may wait for the verdict."""
         system, component = message.get_srcSystem(), message.get_srcComponent()
         number = int(message.command)
         if number == _ARM_COMMAND:
@@ -294,6 +297,7 @@ class Requests:
         ]
 
     def _run_flight_command(self, number: int, message: Any) -> CommandResult:
+        """Run a command about modes or the mission; the result is UNSUPPORTED for any other command."""
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self.arming.set_mode(_to_integer(message.param2))
         if number == mavlink.MAV_CMD_MISSION_START:
@@ -331,6 +335,7 @@ class Requests:
         return (CommandResult(ACCEPTED), [reply]) if reply is not None else (CommandResult(UNSUPPORTED), [])
 
     def _set_interval(self, name: str, interval: float, peer: Peer, now: float) -> CommandResult:
+        """Set the interval of a message, us: negative to switch the message off, 0 for the default interval."""
         if name not in PERIODS:
             return CommandResult(ACCEPTED if name == "HEARTBEAT" and interval in (0.0, 1e6) else UNSUPPORTED)
         if not math.isfinite(interval):
@@ -343,6 +348,7 @@ class Requests:
         return CommandResult(ACCEPTED)
 
     def _set_streams(self, message: Any, peer: Peer, now: float) -> list[Response]:
+        """Set the rate of all messages of a stream (REQUEST_DATA_STREAM)."""
         for name in STREAMS.get(int(message.req_stream_id), ()):
             rate = int(message.req_message_rate)
             period = min(_MAX_PERIOD_S, max(_MIN_PERIOD_S, 1.0 / rate)) if message.start_stop and rate else None
@@ -357,6 +363,7 @@ class Requests:
         return self._acknowledge(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
     def _on_mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
+        """Set the start item; after a refusal send no MISSION_CURRENT for some time."""
         reply = self.set_start_item(int(message.seq))
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
@@ -388,6 +395,7 @@ class Requests:
         return replies
 
     def _on_ping(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+        """Answer a PING request; a PING with a target is an answer and gets no response."""
         if message.target_system or message.target_component:
             return []
         pong = mavlink.MAVLink_ping_message(
@@ -396,6 +404,7 @@ class Requests:
         return [PeerMessage(peer, pong)]
 
     def _on_timesync(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+        """Answer a TIMESYNC request; a TIMESYNC answer (tc1 not 0) gets no response."""
         if message.tc1 != 0:
             return []
         return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
@@ -436,19 +445,19 @@ _MISSION_CURRENT_PAUSE_S = 3.0
 # MAV_CMD_DO_ORBIT, which pymavlink 2.4.41 does not have.
 _DO_ORBIT = 34
 _NO_GUIDED_TARGET_TEXT = (
-    "target refused: MAV_CMD_DO_REPOSITION, or a MISSION_ITEM_INT with current 2, sends it to a place"
+    "target refused: MAV_CMD_DO_REPOSITION, or a MISSION_ITEM_INT with current 2, sends the aircraft to a position"
 )
-_INVALID_POSITION_TEXT = "go-to denied: expected a latitude of -90..90, a longitude of -180..180 and a finite height"
+_INVALID_POSITION_TEXT = "go-to denied: expected a latitude of -90..90, a longitude of -180..180 and a finite altitude"
 # Commands that are equivalent to a mode.
 _MODE_COMMANDS = {mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: RTL, mavlink.MAV_CMD_NAV_LOITER_UNLIM: LOITER}
 # Commands that do not control this aircraft, with an alternative.
 _UNSUPPORTED_COMMAND_TEXTS: dict[int, str] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "speed change refused: put DO_CHANGE_SPEED into the mission",
     _DO_ORBIT: "orbit refused: put a loiter into the mission",
-    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "height change refused: a go-to has a height",
+    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "altitude change refused: a go-to has an altitude",
     mavlink.MAV_CMD_NAV_TAKEOFF: "take-off refused: put NAV_TAKEOFF into the mission and start it",
     mavlink.MAV_CMD_NAV_LAND: "landing refused: put NAV_LAND into the mission and start it",
-    mavlink.MAV_CMD_DO_SET_HOME: "home refused: it is item 0 of the mission",
+    mavlink.MAV_CMD_DO_SET_HOME: "home refused: home is item 0 of the mission",
 }
 _ARM_COMMAND = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 # Commands about messages, with the number of the message if the command implies it.

@@ -153,6 +153,7 @@ def _to_true(vector: Floats, convergence: float) -> tuple[float, float, float]:
 
 
 def _wrap_angle(angle: float) -> float:
+    """Return an angle within -pi..pi, rad."""
     return math.remainder(angle, 2.0 * math.pi)
 
 
@@ -183,8 +184,9 @@ class StatusText(NamedTuple):
 def status_texts(text: str, severity: int, number: int) -> list[Any]:
     """Return the STATUSTEXT messages of a text, in pieces of 50 bytes that stations join again.
 
-    number: 1..65535, new for each text. Ground stations show ASCII: any other character becomes "?", a degree sign
-    " deg", and bytes beyond 400 are omitted.
+    number: 1..65535, new for each text.
+
+    Ground stations show ASCII: a degree sign becomes " deg", and any other character "?". Bytes beyond 400 are omitted.
 
     >>> [message.text for message in status_texts("climb of 9° at leg 3", 4, 1)]
     ['climb of 9 deg at leg 3']
@@ -280,7 +282,7 @@ class Status:
     home: reference of heights above home.
     boot, wall: s since the vehicle started, and since 1970.
     mode: ArduPlane's number.
-    ready: True if arming would be accepted, or has been.
+    ready: True if the vehicle is armed, or if arming would be accepted.
     battery: energy of the full battery, Wh.
     load: busy fraction of the event loop's time.
     current: number of the current mission item.
@@ -343,6 +345,7 @@ def telemetry_message(name: str, status: Status) -> Any:
 
 
 def _boot_ms(status: Status) -> int:
+    """Return the time since the vehicle started, ms, as MAVLink carries it."""
     return int(status.boot * 1e3) & 0xFFFFFFFF
 
 
@@ -477,10 +480,12 @@ def _system_time_message(status: Status) -> Any:
 
 
 def _to_int16(value: float) -> int:
+    """Return a rounded number, limited to the range of an int16."""
     return max(-32767, min(32767, round(value)))
 
 
 def _to_degrees(angle: float) -> float:
+    """Return an angle in rad as 0..360 degrees."""
     return math.degrees(angle) % 360.0
 
 

@@ -70,8 +70,8 @@ ShowText = Callable[[str], None]
 class Downlink:
     """Sender of messages to every station that has sent a heartbeat.
 
-    show: function that also gets each text.
-    pause: maximum sleep of the caller, s.
+    show: function that shows each text at the terminal.
+    pause: maximum time between two calls of `tick`, s, which bounds the number of parameters sent at once.
     """
 
     def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
@@ -123,6 +123,7 @@ class Downlink:
             self._stream_parameters(peer)
 
     def _send_telemetry(self, peer: Peer, now: float) -> None:
+        """Send the telemetry messages that are due to a station; check a message that is off again later."""
         for name, due_time in peer.due.items():
             if now < due_time:
                 continue
@@ -134,6 +135,7 @@ class Downlink:
             peer.due[name] = due_time + period if now - due_time < _MAX_DELAY_S else now + period
 
     def _stream_parameters(self, peer: Peer) -> None:
+        """Send the next parameters to a station that requested all of them."""
         if peer.next_parameter is None:
             return
         first_number, entries = int(peer.next_parameter), self._parameters.entries
@@ -149,7 +151,7 @@ class Downlink:
 
 
 class MissionProgress:
-    """Report the current item and the reached items to stations.
+    """Reporter of the current item and the reached items to stations.
 
     shift: offset from an item's seq to the station's number.
     first: the station's number of the item at which the next flight starts; 0 for the whole mission.
@@ -190,7 +192,10 @@ class MissionProgress:
             self.reset_current_item()
 
     def report_leg(self, leg: int) -> None:
-        """Report the waypoints that were reached since the last snapshot."""
+        """Report the waypoints that were reached since the last call.
+
+        leg: index of the active leg; its start was reached last.
+        """
         if leg == self._leg or leg < 0 or not self._waypoint_items():
             return
         for waypoint in range(max(0, self._leg + 1), leg + 1):
@@ -209,6 +214,7 @@ class MissionProgress:
         self._downlink.send_to_all(message)
 
     def _report_reached(self, waypoint: int) -> None:
+        """Report the item at a waypoint as reached, if the waypoint has an item."""
         items = self._waypoint_items()
         if 0 <= waypoint < len(items) and items[waypoint] >= 0:
             self._downlink.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._station_number(waypoint)))
@@ -339,6 +345,7 @@ class Vehicle:
         self.status.load += 0.01 * (busy_time / max(busy_time, max_wait) - self.status.load)
 
     def _handle_message(self, message: Any, peer: Peer, now: float) -> None:
+        """Handle a message of a station: mission protocol, commands and parameters."""
         self.server.locked = "in flight: the mission cannot change" if self.arming.flying else ""
         station = Station(peer.address, message.get_srcSystem(), message.get_srcComponent())
         for reply in self.server.handle(message, station, now):
@@ -354,6 +361,7 @@ class Vehicle:
         self._apply_state()
 
     def _send_responses(self, responses: list[Response]) -> None:
+        """Send messages to their stations, and texts to all stations."""
         for response in responses:
             if not isinstance(response, StatusText):
                 self.link.send(response.message, response.peer)
@@ -369,6 +377,7 @@ class Vehicle:
             self.downlink.send_text(*text)
 
     def _send_reply(self, station: Station, message: Any, text: str) -> None:
+        """Send a reply of the mission protocol to its station, and its text, if any, to all stations."""
         peer = next((peer for address, peer in self.link.peers.items() if address == station.address), None)
         if peer is not None:
             self.link.send(message, peer)
@@ -376,6 +385,7 @@ class Vehicle:
             self.downlink.send_text(text, WARNING)
 
     def _apply_state(self) -> None:
+        """Pass on requests from the arming state: end, divert or start the flight."""
         if self.arming.end_requested:
             self.arming.end_requested = False
             self._send_request(EndFlight())
@@ -419,7 +429,7 @@ class Vehicle:
         self._refresh_status()
 
     def _divert(self, center: LoiterCenter) -> None:
-        """Divert the aircraft to the mission's current item, to home, or to a loiter."""
+        """Request a diversion according to the mode: to the mission's current item, to home, or to a loiter."""
         mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         mission = replace(mission, home=self.status.home)
         if self.arming.mode == AUTO:
@@ -431,6 +441,7 @@ class Vehicle:
         return self.arming.go_to(LoiterCenter(item.lat_deg, item.lon_deg, item.alt, item.frame)).text
 
     def _handle_diversion(self, event: FlightDiverted) -> None:
+        """Report a diversion to stations, or restore the previous mode if the flight cannot be diverted."""
         if event.problem:
             requested_mode, self.arming.mode = self.arming.mode, event.mode
             self.arming.set_flight_mode(event.mode)
@@ -445,7 +456,7 @@ class Vehicle:
 
         seq: the station's number of the item.
 
-        A mission with a new start is judged from there.
+        A mission with a new start item is judged from that item.
         """
         mission, shift = uploaded_mission(self.server.lists, self._standby.home)
         problem = start_problem(mission, seq - shift, in_flight=self.arming.flying)
@@ -464,12 +475,14 @@ class Vehicle:
         return CommandResult(ACCEPTED)
 
     def _send_request(self, request: FlightRequest) -> None:
+        """Send a request to the flight process; restart the process if it has died."""
         try:
             self._flight.send(request)
         except (BrokenPipeError, ConnectionResetError):
             self._restart_process()
 
     def _receive_events(self) -> None:
+        """Handle all waiting events of the flight process; restart the process if it has died."""
         try:
             while self._flight.poll():
                 self._handle_event(read_event(self._flight.recv_bytes()))
@@ -481,13 +494,13 @@ class Vehicle:
         self._flight.close()
         self._crash_count += 1
         if self._crash_count >= _MAX_CRASHES:
-            raise ChildProcessError(errno.ECHILD, "keeps dying", "the process that flies")
+            raise ChildProcessError(errno.ECHILD, "keeps dying", "the flight process")
         self._flight = self._spawn()
         self._ready = False
         if self.arming.flying:
-            self._handle_flight_end("lost: the process that flew it has died")
+            self._handle_flight_end("lost: the flight process has died")
         if self.server.lists[MissionType.MISSION]:
-            text = StatusText("the process that flies has died; upload the mission again", CRITICAL)
+            text = StatusText("the flight process has died; upload the mission again", CRITICAL)
             self._handle_verdict(MissionJudged(self._mission_number, False, False, (text,)))
 
     def _handle_event(self, event: Snapshot | Event) -> None:
@@ -509,6 +522,7 @@ class Vehicle:
             self._send_texts(event.texts)
 
     def _handle_verdict(self, verdict: MissionJudged) -> None:
+        """Report the verdict on the current mission, and disarm if it forbids flight; ignore an outdated verdict."""
         if verdict.number != self._mission_number:
             return
         self._awaits_verdict = False
@@ -529,6 +543,7 @@ class Vehicle:
         self._apply_state()
 
     def _handle_flight_end(self, end_reason: str) -> None:
+        """Disarm after a flight, and report its end to stations."""
         is_completed = end_reason == "completed"
         if is_completed and self.arming.mode == AUTO:
             self._progress.report_completion()
@@ -542,6 +557,7 @@ class Vehicle:
             self.server.changed.add(MissionType.MISSION)
 
     def _refresh_status(self) -> None:
+        """Copy the arming state to the status, and send a heartbeat at once if mode or arming has changed."""
         arming, status = self.arming, self.status
         if (status.mode, status.armed, status.flying) != (arming.mode, arming.armed, arming.flying):
             # Send a change immediately.

@@ -225,7 +225,7 @@ class Treatment(StrEnum):
     FLOWN = "flown"
     # The autopilot accepts it, and it does not change the flight path.
     NO_EFFECT = "no effect on the path"
-    # The autopilot accepts it, it may change the flight path, and it is not flown: the verdict is open.
+    # The autopilot accepts it and it may change the flight path, but it is not simulated: the verdict is undecided.
     OPEN = "not judged"
     # The autopilot refuses a mission that contains it.
     REFUSED = "refused"
@@ -245,47 +245,47 @@ _NO_EFFECT = Treatment.NO_EFFECT
 _OPEN = Treatment.OPEN
 _REFUSED = Treatment.REFUSED
 
-# Purposes of commands without an effect on the path.
-CAMERA = "for the camera, nothing to fly"
+# Reason for commands of a camera.
+CAMERA_REASON = "for the camera, nothing to fly"
 # Reason for commands that point a gimbal.
-_GIMBAL = "points a camera, not the aircraft"
-# ArduPlane: `Plane::start_command` does not know such a command, `Plane::verify_command` reports it as done.
-PASSED_OVER = "ArduPlane accepts it and skips it"
-# Reason for conditions.
-_HOLDS_BACK = "delays the commands after it; undecided if one of these is flown"
+_GIMBAL_REASON = "points a camera, not the aircraft"
+# Reason for commands that ArduPlane's `Plane::start_command` does not know and `Plane::verify_command` reports as done.
+SKIPPED_REASON = "ArduPlane accepts it and skips it"
+# Reason for conditions, which delay other commands.
+_DELAY_REASON = "delays the commands after it; the verdict is undecided if one of these commands is flown"
 
 # Treatment of each command that at least one autopilot accepts; both refuse any other.
 SUPPORT: dict[Command, Support] = {
-    C.NAV_WAYPOINT: Support(_FLOWN, _FLOWN, "a place to fly to"),
-    C.NAV_LOITER_UNLIM: Support(_FLOWN, _FLOWN, "a loiter without end, of which a minute is flown"),
-    C.NAV_LOITER_TURNS: Support(_FLOWN, _REFUSED, "a loiter for some turns"),
-    C.NAV_LOITER_TIME: Support(_FLOWN, _FLOWN, "a loiter for some time"),
+    C.NAV_WAYPOINT: Support(_FLOWN, _FLOWN, "a position to fly to"),
+    C.NAV_LOITER_UNLIM: Support(_FLOWN, _FLOWN, "a loiter without end; one minute of it is flown"),
+    C.NAV_LOITER_TURNS: Support(_FLOWN, _REFUSED, "a loiter for a number of turns"),
+    C.NAV_LOITER_TIME: Support(_FLOWN, _FLOWN, "a loiter for a time"),
     C.NAV_RETURN_TO_LAUNCH: Support(_FLOWN, _FLOWN, "a return to launch"),
-    C.NAV_LAND: Support(_FLOWN, _FLOWN, "a landing; flown to the ground where the scenario has a [landing]"),
-    C.NAV_TAKEOFF: Support(_FLOWN, _FLOWN, "a take-off; flown from the ground where the scenario has a [launch]"),
+    C.NAV_LAND: Support(_FLOWN, _FLOWN, "a landing; flown to the ground if the scenario has a [landing]"),
+    C.NAV_TAKEOFF: Support(_FLOWN, _FLOWN, "a take-off; flown from the ground if the scenario has a [launch]"),
     # `Plane::verify_continue_and_change_alt`: straight on at the aircraft's best climb rate until the altitude is
     # reached.
     C.NAV_CONTINUE_AND_CHANGE_ALT: Support(_OPEN, _REFUSED, "ArduPlane flies straight on to an altitude"),
     C.NAV_LOITER_TO_ALT: Support(_FLOWN, _FLOWN, "a loiter to an altitude"),
     # PX4 writes it as DO_SET_ROI.
-    C.NAV_ROI: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
+    C.NAV_ROI: Support(_REFUSED, _NO_EFFECT, _GIMBAL_REASON),
     # `Plane::do_altitude_wait`: servos at trim and no throttle until an altitude or a sink rate is reached (balloon
     # launch).
     C.NAV_ALTITUDE_WAIT: Support(_OPEN, _REFUSED, "ArduPlane does not steer until an altitude is reached"),
     C.NAV_VTOL_TAKEOFF: Support(_OPEN, _OPEN, "a VTOL aircraft climbs straight up"),
     C.NAV_VTOL_LAND: Support(_OPEN, _OPEN, "a VTOL aircraft lands straight down"),
-    C.NAV_GUIDED_ENABLE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
+    C.NAV_GUIDED_ENABLE: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
     # `ModeAuto::verify_nav_delay` is done at once while the motor is armed; PX4 (NAV_CMD_DELAY) waits in flight.
     C.NAV_DELAY: Support(_NO_EFFECT, _OPEN, "ArduPlane does not wait in the air; PX4 does"),
     C.NAV_PAYLOAD_PLACE: Support(_OPEN, _REFUSED, "a QuadPlane lands to place its payload"),
     # They delay the DO commands after them, see `flight.mission.itinerary`; by themselves they do nothing.
-    C.CONDITION_DELAY: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
-    C.CONDITION_DISTANCE: Support(_FLOWN, _REFUSED, _HOLDS_BACK),
-    C.CONDITION_YAW: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
+    C.CONDITION_DELAY: Support(_FLOWN, _REFUSED, _DELAY_REASON),
+    C.CONDITION_DISTANCE: Support(_FLOWN, _REFUSED, _DELAY_REASON),
+    C.CONDITION_YAW: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
     C.DO_JUMP: Support(_FLOWN, _FLOWN, "a jump to another item"),
-    C.DO_CHANGE_SPEED: Support(_FLOWN, _FLOWN, "another airspeed"),
+    C.DO_CHANGE_SPEED: Support(_FLOWN, _FLOWN, "changes the airspeed"),
     # `Plane::do_set_home`. PX4 accepts coordinates only in frame 2, where they are not coordinates.
-    C.DO_SET_HOME: Support(_FLOWN, _OPEN, "sets another home, for the altitudes and returns after it"),
+    C.DO_SET_HOME: Support(_FLOWN, _OPEN, "sets another home for later altitudes and returns to launch"),
     # It switches only plain relays, not one with another function such as an ignition (AP_Relay).
     C.DO_SET_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
     C.DO_REPEAT_RELAY: Support(_NO_EFFECT, _REFUSED, "switches a plain relay"),
@@ -294,62 +294,64 @@ SUPPORT: dict[Command, Support] = {
     C.DO_SET_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
     C.DO_SET_ACTUATOR: Support(_REFUSED, _NO_EFFECT, "moves a servo that does not steer"),
     C.DO_REPEAT_SERVO: Support(_NO_EFFECT, _REFUSED, "moves a servo that does not steer"),
-    C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "marks where a return may join the mission"),
+    C.DO_RETURN_PATH_START: Support(_NO_EFFECT, _REFUSED, "marks where a return to launch may join the mission"),
     C.DO_LAND_START: Support(_FLOWN, _FLOWN, "marks the start of a landing sequence"),
     C.DO_GO_AROUND: Support(_NO_EFFECT, _REFUSED, "marks where an aborted landing continues"),
-    C.DO_PAUSE_CONTINUE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
-    C.DO_SET_REVERSE: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
-    C.DO_SET_ROI_LOCATION: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
-    C.DO_SET_ROI_WPNEXT_OFFSET: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
-    C.DO_SET_ROI_NONE: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
-    C.DO_CONTROL_VIDEO: Support(_REFUSED, _NO_EFFECT, CAMERA),
-    C.DO_SET_ROI: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
-    C.DO_DIGICAM_CONFIGURE: Support(_NO_EFFECT, _REFUSED, CAMERA),
-    C.DO_DIGICAM_CONTROL: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
-    C.DO_MOUNT_CONFIGURE: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
-    C.DO_MOUNT_CONTROL: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
-    C.DO_SET_CAM_TRIGG_DIST: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.DO_PAUSE_CONTINUE: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
+    C.DO_SET_REVERSE: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
+    C.DO_SET_ROI_LOCATION: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL_REASON),
+    C.DO_SET_ROI_WPNEXT_OFFSET: Support(_REFUSED, _NO_EFFECT, _GIMBAL_REASON),
+    C.DO_SET_ROI_NONE: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL_REASON),
+    C.DO_CONTROL_VIDEO: Support(_REFUSED, _NO_EFFECT, CAMERA_REASON),
+    C.DO_SET_ROI: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL_REASON),
+    C.DO_DIGICAM_CONFIGURE: Support(_NO_EFFECT, _REFUSED, CAMERA_REASON),
+    C.DO_DIGICAM_CONTROL: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
+    C.DO_MOUNT_CONFIGURE: Support(_REFUSED, _NO_EFFECT, _GIMBAL_REASON),
+    C.DO_MOUNT_CONTROL: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL_REASON),
+    C.DO_SET_CAM_TRIGG_DIST: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
     # The mission's fence is judged, enabled or not.
     C.DO_FENCE_ENABLE: Support(_NO_EFFECT, _REFUSED, "switches the fence, which is judged in any case"),
-    C.DO_PARACHUTE: Support(_OPEN, _REFUSED, "may release the parachute, or let it be released"),
-    C.DO_INVERTED_FLIGHT: Support(_OPEN, _REFUSED, "ArduPlane flies on inverted"),
+    C.DO_PARACHUTE: Support(_OPEN, _REFUSED, "releases the parachute, or allows its release"),
+    C.DO_INVERTED_FLIGHT: Support(_OPEN, _REFUSED, "ArduPlane continues in inverted flight"),
     C.DO_GRIPPER: Support(_NO_EFFECT, _NO_EFFECT, "for the payload; its mass is not simulated"),
     # `Plane::autotune_enable`: the roll and pitch gains change in flight.  PX4 1.16 refuses it.
-    C.DO_AUTOTUNE_ENABLE: Support(_OPEN, _OPEN, "the autopilot changes its own gains in flight; PX4 from 1.17 on"),
-    C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
-    C.DO_SET_CAM_TRIGG_INTERVAL: Support(_REFUSED, _NO_EFFECT, CAMERA),
-    C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "for a mission that is interrupted and resumed"),
+    C.DO_AUTOTUNE_ENABLE: Support(
+        _OPEN, _OPEN, "the autopilot changes its own gains in flight; PX4 accepts it from 1.17 on"
+    ),
+    C.NAV_SET_YAW_SPEED: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
+    C.DO_SET_CAM_TRIGG_INTERVAL: Support(_REFUSED, _NO_EFFECT, CAMERA_REASON),
+    C.DO_SET_RESUME_REPEAT_DIST: Support(_NO_EFFECT, _REFUSED, "applies when an interrupted mission is resumed"),
     C.DO_SPRAYER: Support(_NO_EFFECT, _REFUSED, "for the payload, nothing to fly"),
     C.DO_SEND_SCRIPT_MESSAGE: Support(_OPEN, _REFUSED, "a script on board may do anything"),
     # `RC_Channel::run_aux_function`: its functions include modes, motor stop and returns.
     C.DO_AUX_FUNCTION: Support(_OPEN, _REFUSED, "an auxiliary switch, which may change the mode or stop the motor"),
-    C.DO_GUIDED_LIMITS: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
+    C.DO_GUIDED_LIMITS: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
     C.DO_ENGINE_CONTROL: Support(_OPEN, _REFUSED, "starts or stops the engine"),
-    C.OBLIQUE_SURVEY: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    C.OBLIQUE_SURVEY: Support(_REFUSED, _NO_EFFECT, CAMERA_REASON),
     # PX4 1.16 refuses it.
-    C.COMPONENT_ARM_DISARM: Support(_REFUSED, _OPEN, "may stop the motor; PX4 from 1.17 on"),
-    C.SET_CAMERA_MODE: Support(_REFUSED, _NO_EFFECT, CAMERA),
+    C.COMPONENT_ARM_DISARM: Support(_REFUSED, _OPEN, "may stop the motor; PX4 accepts it from 1.17 on"),
+    C.SET_CAMERA_MODE: Support(_REFUSED, _NO_EFFECT, CAMERA_REASON),
     # `parse_mavlink_mission_item` has no case for it.
-    C.SET_CAMERA_ZOOM: Support(_NO_EFFECT, _REFUSED, CAMERA),
-    C.SET_CAMERA_FOCUS: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
-    C.SET_CAMERA_SOURCE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.SET_CAMERA_ZOOM: Support(_NO_EFFECT, _REFUSED, CAMERA_REASON),
+    C.SET_CAMERA_FOCUS: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
+    C.SET_CAMERA_SOURCE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
     C.JUMP_TAG: Support(_FLOWN, _REFUSED, "marks the target of DO_JUMP_TAG"),
-    C.DO_JUMP_TAG: Support(_FLOWN, _REFUSED, "a jump to the first JUMP_TAG of its number"),
-    C.DO_GIMBAL_MANAGER_PITCHYAW: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL),
-    C.DO_GIMBAL_MANAGER_CONFIGURE: Support(_REFUSED, _NO_EFFECT, _GIMBAL),
-    C.IMAGE_START_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
-    C.IMAGE_STOP_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
-    C.DO_TRIGGER_CONTROL: Support(_REFUSED, _NO_EFFECT, CAMERA),
-    C.VIDEO_START_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
-    C.VIDEO_STOP_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA),
+    C.DO_JUMP_TAG: Support(_FLOWN, _REFUSED, "a jump to the first JUMP_TAG with its number"),
+    C.DO_GIMBAL_MANAGER_PITCHYAW: Support(_NO_EFFECT, _NO_EFFECT, _GIMBAL_REASON),
+    C.DO_GIMBAL_MANAGER_CONFIGURE: Support(_REFUSED, _NO_EFFECT, _GIMBAL_REASON),
+    C.IMAGE_START_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
+    C.IMAGE_STOP_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
+    C.DO_TRIGGER_CONTROL: Support(_REFUSED, _NO_EFFECT, CAMERA_REASON),
+    C.VIDEO_START_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
+    C.VIDEO_STOP_CAPTURE: Support(_NO_EFFECT, _NO_EFFECT, CAMERA_REASON),
     C.DO_VTOL_TRANSITION: Support(_OPEN, _OPEN, "a VTOL aircraft changes between rotors and wing"),
-    C.CONDITION_GATE: Support(_REFUSED, _FLOWN, "PX4 applies the speed changes after it once the gate is passed"),
+    C.CONDITION_GATE: Support(_REFUSED, _FLOWN, "PX4 applies later speed changes once the gate is passed"),
     C.DO_WINCH: Support(_NO_EFFECT, _NO_EFFECT, "for the payload, nothing to fly"),
     C.NAV_SCRIPT_TIME: Support(_OPEN, _REFUSED, "a script on board flies"),
-    C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, PASSED_OVER),
+    C.NAV_ATTITUDE_TIME: Support(_NO_EFFECT, _REFUSED, SKIPPED_REASON),
 }
 
-# Commands that do nothing themselves, and that other commands or modes lead to.
+# Commands without an effect of their own; other commands or modes jump to them.
 MARKS = frozenset({C.DO_RETURN_PATH_START, C.DO_LAND_START, C.DO_GO_AROUND, C.JUMP_TAG})
 
 # Treatment of a command that is not in the table.
@@ -362,5 +364,5 @@ def support_of(command: int) -> Support:
     >>> support_of(Command.DO_JUMP).px4, support_of(Command.JUMP_TAG).px4, support_of(50_000).arduplane
     (<Treatment.FLOWN: 'flown'>, <Treatment.REFUSED: 'refused'>, <Treatment.REFUSED: 'refused'>)
     """
-    # A number that is not a member is not found.
+    # An unknown number is not found.
     return SUPPORT.get(command, _UNKNOWN)  # type: ignore[call-overload]

@@ -18,14 +18,14 @@ from flight.mission.items import (
     MissionItem,
     is_navigation,
     item_problem,
-    on_grid,
+    round_to_grid,
 )
 from world.errors import MissionError
 
-# Maximum number of items, so that a drag is judged while the pointer moves, and the page draws all items.
-MAX_EDITED = 2_000
-# Commands that belong to the next waypoint instead of the previous one.
-_COMMANDS_OF_NEXT_PLACE = (Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.JUMP_TAG)
+# Maximum number of items of an edited mission: with more items, the studio cannot judge a drag while the pointer moves.
+MAX_EDITED_ITEMS = 2_000
+# Commands that belong to the next waypoint instead of the previous waypoint.
+_COMMANDS_OF_NEXT_WAYPOINT = (Command.DO_LAND_START, Command.DO_RETURN_PATH_START, Command.JUMP_TAG)
 
 
 def is_movable(item: MissionItem) -> bool:
@@ -44,14 +44,15 @@ def movable_indices(mission: Mission) -> tuple[int, ...]:
 
 
 def movable_item(mission: Mission, index: int) -> MissionItem:
-    """Return the item to edit.  Raises MissionError if there is no such item, or if it cannot be moved."""
+    """Return the item at an index.
+
+    Raises MissionError if there is no such item, or if it cannot be moved.
+    """
     if not 0 <= index < len(mission.items):
         raise MissionError.at(mission.source, "item", index, f"expected 0..{len(mission.items) - 1}")
     item = mission.items[index]
     if not is_movable(item):
-        raise MissionError.at(
-            mission.source, f"item {item.seq}", item.command, "expected a command with a place on the map"
-        )
+        raise MissionError.at(mission.source, f"item {item.seq}", item.command, "expected a command with a position")
     return item
 
 
@@ -63,7 +64,7 @@ def move_item(mission: Mission, index: int, lat_deg: float, lon_deg: float) -> M
     8.0
     """
     item = movable_item(mission, index)
-    return _with_item(mission, index, replace(item, lat_deg=on_grid(lat_deg), lon_deg=on_grid(lon_deg)))
+    return _with_item(mission, index, replace(item, lat_deg=round_to_grid(lat_deg), lon_deg=round_to_grid(lon_deg)))
 
 
 def raise_items(mission: Mission, indices: Iterable[int], height_change: float) -> Mission:
@@ -104,7 +105,7 @@ def insertion_index(mission: Mission, previous_index: int) -> int:
     """
     index = previous_index + 1
     for item in mission.items[index:]:
-        if is_navigation(item.command) or item.command in _COMMANDS_OF_NEXT_PLACE:
+        if is_navigation(item.command) or item.command in _COMMANDS_OF_NEXT_WAYPOINT:
             break
         index += 1
     return index
@@ -115,7 +116,7 @@ def insert_waypoint(
 ) -> Mission:
     """Return the mission with a waypoint inserted after an item, at `insertion_index`, in the frame of that item.
 
-    height: altitude in that frame, m; None for the altitude of the item.
+    height: altitude of the waypoint in that frame, m; None for the altitude of the item.
 
     Raises MissionError if the mission already has the maximum number of items.
 
@@ -125,9 +126,10 @@ def insert_waypoint(
     [(1, 46.0), (2, 46.01), (3, 46.0)]
     """
     previous_item = movable_item(mission, previous_index)
-    if len(mission.items) >= MAX_EDITED:
+    if len(mission.items) >= MAX_EDITED_ITEMS:
         raise MissionError(
-            f"{mission.source}: already has {MAX_EDITED} items, the most that can be edited here", file=mission.source
+            f"{mission.source}: already has {MAX_EDITED_ITEMS} items, the most that can be edited here",
+            file=mission.source,
         )
     radius = previous_item.params[1] if previous_item.command == Command.NAV_WAYPOINT else 0.0
     index = insertion_index(mission, previous_index)
@@ -136,8 +138,8 @@ def insert_waypoint(
         int(Command.NAV_WAYPOINT),
         previous_item.frame,
         (0.0, radius, 0.0, 0.0),
-        on_grid(lat_deg),
-        on_grid(lon_deg),
+        round_to_grid(lat_deg),
+        round_to_grid(lon_deg),
         previous_item.alt if height is None else _round_to_milli(height),
     )
     return _with_inserted_item(mission, index, waypoint)
@@ -150,7 +152,7 @@ def delete_item(mission: Mission, index: int) -> Mission:
     """
     movable_item(mission, index)
     if len(movable_indices(mission)) <= 2:
-        message = f"{mission.source}: a mission needs at least two places"
+        message = f"{mission.source}: a mission needs at least two positions"
         raise MissionError(message, file=mission.source, field="items")
     seq = mission.items[index].seq
     items = [item for k, item in enumerate(mission.items) if k != index]
@@ -160,7 +162,8 @@ def delete_item(mission: Mission, index: int) -> Mission:
 def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: float) -> Mission:
     """Return the mission with another airspeed on the leg to an item, and ``next_airspeed`` after that item.
 
-    A change of speed directly before the item is edited instead of adding an item.
+    A speed change directly before the item is edited; otherwise a speed change is inserted. No speed change is inserted
+    after the last item with a position, or before another speed change.
 
     airspeed, next_airspeed: m/s.
     """
@@ -182,24 +185,32 @@ def set_airspeed(mission: Mission, index: int, airspeed: float, next_airspeed: f
 
 
 def _speed_item(seq: int, airspeed: float) -> MissionItem:
+    """Return an item that changes the airspeed, m/s."""
     params = (0.0, _round_to_milli(airspeed), -1.0, 0.0)
     return MissionItem(seq, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), params, 0.0, 0.0, 0.0)
 
 
 def _with_item(mission: Mission, index: int, item: MissionItem) -> Mission:
-    """Return the mission with an item replaced.  Raises MissionError for an invalid item."""
+    """Return the mission with the item at an index replaced.
+
+    Raises MissionError for an invalid item.
+    """
     _check_item(mission, item)
     return replace(mission, items=(*mission.items[:index], item, *mission.items[index + 1 :]))
 
 
 def _with_inserted_item(mission: Mission, index: int, item: MissionItem) -> Mission:
-    """Return the mission with an item inserted and later items renumbered.  Raises MissionError for an invalid item."""
+    """Return the mission with an item inserted at an index, and with later items renumbered.
+
+    Raises MissionError for an invalid item.
+    """
     _check_item(mission, item)
     renumbered_items = [_renumber(other, item.seq - 1, 1) for other in mission.items]
     return replace(mission, items=(*renumbered_items[:index], item, *renumbered_items[index:]))
 
 
 def _check_item(mission: Mission, item: MissionItem) -> None:
+    """Raise MissionError for an invalid item."""
     problem = item_problem(item)
     if problem is not None:
         raise MissionError(**problem.at(mission.source, f"{mission.source}: item {item.seq}"))
@@ -215,4 +226,5 @@ def _renumber(item: MissionItem, after_seq: int, shift: int) -> MissionItem:
 
 
 def _round_to_milli(value: float) -> float:
+    """Round a number to a multiple of 0.001."""
     return round(value * 1e3) / 1e3

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem, round_to_grid
 from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneKind, is_hole, make_cylinder, make_polygon
 from world.airspace.zones_on_map import add_corner_count, ring_on_map
 from world.arrays import Floats
@@ -40,7 +40,9 @@ def fence_item(origin: GeoOrigin, command: Command, param1: float, position: Seq
     """
     lat, lon = to_geo(origin, float(position[0]), float(position[1]))
     params = (round(param1, 3), 0.0, 0.0, 0.0)
-    return MissionItem(0, int(command), int(Frame.GLOBAL), params, on_grid(float(lat)), on_grid(float(lon)), 0.0)
+    return MissionItem(
+        0, int(command), int(Frame.GLOBAL), params, round_to_grid(float(lat)), round_to_grid(float(lon)), 0.0
+    )
 
 
 def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionItem], list[str]]:
@@ -82,6 +84,7 @@ def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionI
 
 
 def _zone_items(zone: Zone, origin: GeoOrigin) -> Iterator[MissionItem]:
+    """Yield the fence items of one zone; see `zone_fences`."""
     if isinstance(zone.shape, Cylinder):
         yield fence_item(origin, _CIRCLE_COMMANDS[zone.kind], zone.shape.radius, (zone.shape.east, zone.shape.north))
         return
@@ -93,6 +96,7 @@ def _zone_items(zone: Zone, origin: GeoOrigin) -> Iterator[MissionItem]:
 
 
 def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[MissionItem]:
+    """Yield a fence item for each corner of a ring."""
     for corner in ring:
         yield fence_item(origin, command, float(len(ring)), corner)
 
@@ -104,7 +108,7 @@ def _joined_names(names: list[str]) -> str:
 
 
 # ----------------------------------------------------------------------
-# Geofences and rally points: made from a scenario, grouped into shapes, and tested for a position.
+# Shapes of a geofence, tests of positions against them, and the fence and rally points of a scenario.
 
 
 # Commands of a polygon's vertices.
@@ -112,7 +116,7 @@ POLYGONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGO
 # Commands of inclusions.
 INCLUSIONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
 
-# Maximum number of omitted shapes that a note names.
+# Maximum number of omitted zones that a note names.
 _MAX_NAMES = 12
 
 
@@ -196,8 +200,8 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
     fences = [fence_item(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
-    missile_zones, crossed_missiles = _split_by_altitude(_missile_zones(scenario), scenario.origin, passes)
-    zones, passed_zones = _split_by_altitude(scenario.zones, scenario.origin, passes)
+    missile_zones, omitted_missiles = _omit_crossed_exclusions(_missile_zones(scenario), scenario.origin, passes)
+    zones, omitted_zones = _omit_crossed_exclusions(scenario.zones, scenario.origin, passes)
     fences += zone_fences(missile_zones, scenario.origin)[0]
     items, zone_notes = zone_fences(zones, scenario.origin)
     fences += items
@@ -206,15 +210,14 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         count = "1 missile sphere" if len(missile_zones) == 1 else f"{len(missile_zones)} missile spheres"
         change_text = "became an exclusion circle" if len(missile_zones) == 1 else "became exclusion circles"
         notes.append(f"{count} {change_text}: a fence has no height, so that each is a cylinder")
-    omitted_names = [*crossed_missiles, *passed_zones]
+    omitted_names = [*omitted_missiles, *omitted_zones]
     if omitted_names:
         names = ", ".join(omitted_names[:_MAX_NAMES]) + (
             f" and {len(omitted_names) - _MAX_NAMES} more" if len(omitted_names) > _MAX_NAMES else ""
         )
         notes.append(
             f"omitted from the fence, because the mission passes above or below: {names}; a fence "
-            "has no height, and an autopilot with it in its fence refuses the mission or breaks "
-            "it off"
+            "has no height, and an autopilot with such a fence refuses or aborts the mission"
         )
     notes += zone_notes
     if scenario.limits.max_height_m is not None:
@@ -237,18 +240,21 @@ def _missile_zones(scenario: Scenario) -> list[Zone]:
     ]
 
 
-def _split_by_altitude(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> tuple[list[Zone], list[str]]:
-    """Return the zones that stay fences at every altitude, and the names of the others."""
-    remaining, passed_names = [], []
+def _omit_crossed_exclusions(
+    zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest
+) -> tuple[list[Zone], list[str]]:
+    """Return the zones without the exclusions whose outline the mission crosses, and the names of those exclusions."""
+    remaining, crossed_names = [], []
     for zone in zones:
         if zone.kind == "exclusion" and passes(number_items(zone_fences([zone], origin)[0])):
-            passed_names.append(zone.name)
+            crossed_names.append(zone.name)
         else:
             remaining.append(zone)
-    return remaining, passed_names
+    return remaining, crossed_names
 
 
 def _ends_as_rally_points(mission: Mission) -> list[MissionItem]:
+    """Return rally points at the first and last position of a mission; none if the altitude of home is unknown."""
     positions = [item for item in mission.items if item.has_position]
     home = mission.home
     if home is None or not positions or math.isnan(home.alt):
@@ -269,6 +275,7 @@ def _ends_as_rally_points(mission: Mission) -> list[MissionItem]:
 
 
 def _home_offset(item: MissionItem, home: Home) -> float:
+    """Return the altitude to subtract from an item's altitude for its height above home, m."""
     return home.alt if item.frame in (Frame.GLOBAL, Frame.GLOBAL_INT) else 0.0
 
 
@@ -293,7 +300,7 @@ def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north:
 
 
 # ----------------------------------------------------------------------
-# A mission's own fence as airspace zones: the only place where its latitudes and longitudes become meters.
+# Conversion of a mission's own fence to airspace zones on the map.
 
 
 def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str = "fence") -> tuple[Zone, ...]:

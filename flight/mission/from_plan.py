@@ -7,7 +7,7 @@ import numpy as np
 
 from aircraft.envelope import GRAVITY, ground_speed
 from aircraft.tracking import TrackingError, air_density_factor
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from planner.ground_ways import DepartureAndApproach
 from planner.plan import Plan
 from world.arrays import Floats
@@ -16,14 +16,14 @@ from world.geometry import leg_courses, turning_angles, wrap
 from world.scenario import Scenario
 from world.wind import W20
 
-# Margin added to the fly-by offset of a waypoint, m: the tolerance of the verdict's waypoint rule.
-ACCEPTANCE_TOLERANCE = 10.0
+# Margin added to the fly-by offset of a waypoint, m; equal to the tolerance of the verdict's waypoint rule.
+ACCEPTANCE_TOLERANCE_M = 10.0
 # Minimum pitch of a take-off, degrees: the first parameter of NAV_TAKEOFF. With 10 ArduPlane's Aerosonde climbed at 5
 # m/s and 26 m/s from a catapult of 20 m/s; with 15 at 6 m/s and 24 m/s.
-LAUNCH_PITCH = 12.0
-# Sharpest turn whose arc has that margin, rad.
+LAUNCH_PITCH_DEG = 12.0
+# Largest turn for which the fly-by offset at the highest ground speed is computed, rad.
 _MAX_OFFSET_TURN_RAD = math.radians(150.0)
-# Sharpest turn with an arc, rad.
+# Largest turn for which the fly-by offset in a gust is computed, rad: a U-turn has no fly-by arc.
 _MAX_ARC_TURN_RAD = math.radians(179.0)
 
 
@@ -43,10 +43,10 @@ def plan_mission(
     form of the mission has the same numbers; this moves a waypoint by less than 8 mm on the map.
 
     The acceptance radius is the fly-by offset R(1/cos(theta/2) - 1), the distance at which a turn at this speed and
-    bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE`, rounded up to a whole
+    bank passes its waypoint with the scenario's wind from behind, plus `ACCEPTANCE_TOLERANCE_M`, rounded up to a whole
     meter, so that no arc of the flight misses the waypoint. PX4 has its own radius for fixed-wing aircraft. If the
-    tracking error of an autopilot is known, the radius is the one with the smallest error: ArduPlane turns to the next
-    leg at that distance before a waypoint.
+    tracking error of an autopilot is known, the radius is the one with the smallest error, because ArduPlane turns to
+    the next leg at that distance before a waypoint.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -66,7 +66,7 @@ def plan_mission(
     builder = _ItemBuilder(plan.scenario.origin)
     if procedures.climb is not None:
         takeoff_position = np.append(procedures.climb.home[:2], procedures.climb.up)
-        builder.add(Command.NAV_TAKEOFF, (LAUNCH_PITCH, 0.0, 0.0, 0.0), takeoff_position)
+        builder.add(Command.NAV_TAKEOFF, (LAUNCH_PITCH_DEG, 0.0, 0.0, 0.0), takeoff_position)
     builder.add(Command.DO_CHANGE_SPEED, (0.0, _round_to_thousandths(airspeed), -1.0, 0.0))
     first_waypoint = 0 if procedures.climb is None else 1
     end_waypoint = len(points) if procedures.descent is None else len(points) - 3
@@ -103,7 +103,7 @@ class _ItemBuilder:
         frame, lat, lon, up = Frame.MISSION, 0.0, 0.0, 0.0
         if position is not None:
             frame, up = Frame.GLOBAL, _round_to_thousandths(float(position[2]))
-            lat, lon = (on_grid(float(value)) for value in to_geo(self._origin, position[0], position[1]))
+            lat, lon = (round_to_grid(float(value)) for value in to_geo(self._origin, position[0], position[1]))
         self.items.append(MissionItem(len(self.items) + 1, int(command), int(frame), params, lat, lon, up))
 
 
@@ -128,14 +128,14 @@ def _home_position(plan: Plan) -> Home:
     lat, lon = to_geo(scenario.origin, position[:1], position[1:2])
     ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(position[0], position[1]))
     altitude = float(position[2]) if math.isnan(ground) else ground
-    return Home(on_grid(float(lat[0])), on_grid(float(lon[0])), _round_to_thousandths(altitude))
+    return Home(round_to_grid(float(lat[0])), round_to_grid(float(lon[0])), _round_to_thousandths(altitude))
 
 
 def _rally_items(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionItem]:
     """Yield rally points (n, 3) m as items, with heights above home, as ground stations write them."""
     for number, (east, north, up) in enumerate(points.tolist()):
         lat, lon = to_geo(origin, east, north)
-        position = on_grid(float(lat)), on_grid(float(lon)), _round_to_thousandths(up - home.alt)
+        position = round_to_grid(float(lat)), round_to_grid(float(lon)), _round_to_thousandths(up - home.alt)
         yield MissionItem(number, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, *position)
 
 
@@ -147,14 +147,14 @@ def acceptance_radii(
     points: (w, 3) m, in flying order.
     """
     if tracking is not None:
-        return _turn_distances(scenario, points, airspeed, tracking)
+        return _acceptance_for_tracking(scenario, points, airspeed, tracking)
     wind = max(math.hypot(*scenario.wind.velocity_at(float(amsl))) for amsl in points[:, 2])
     turns, lateral_acceleration = turning_angles(points), GRAVITY * math.tan(max_bank)
-    radii = np.full(len(points), ACCEPTANCE_TOLERANCE)
+    radii = np.full(len(points), ACCEPTANCE_TOLERANCE_M)
     radii[1:-1] += _fly_by_offsets(
         np.minimum(turns, _MAX_OFFSET_TURN_RAD), (airspeed + wind) ** 2 / lateral_acceleration
     )
-    # Arcs have a margin for a gust. The limit on the turn keeps the offset finite: a U-turn has no arc.
+    # In a gust the arc is wider. The limit on the turn keeps the offset finite.
     gust = 0.1 * W20[scenario.wind.turbulence]
     arc_offsets = _fly_by_offsets(
         np.minimum(turns, _MAX_ARC_TURN_RAD), (airspeed + wind + gust) ** 2 / lateral_acceleration
@@ -168,8 +168,11 @@ def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
-def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
-    """Return the acceptance radii for the highest ground speed between the two courses of each corner, (w,) whole m."""
+def _acceptance_for_tracking(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
+    """Return the acceptance radii with the autopilot's smallest tracking error, (w,) whole m.
+
+    Each radius applies to the highest ground speed in the turn at its waypoint.
+    """
     radii = np.full(len(points), tracking.corner_acceptance(0.0, airspeed))
     speeds = corner_speeds(scenario, points, airspeed)
     for index, (turn, speed) in enumerate(zip(turning_angles(points), speeds, strict=True), 1):
@@ -180,7 +183,9 @@ def _turn_distances(scenario: Scenario, points: Floats, airspeed: float, trackin
 def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[float]:
     """Return the highest ground speed (m/s) in the turn at each of the w - 2 corners of a path (w, 3).
 
-    airspeed: equivalent, m/s; for a course that cannot be held, the true airspeed is used.
+    airspeed: equivalent, m/s.
+
+    If the wind is too strong for every course of a turn, the result is the true airspeed.
     """
     courses, speeds = leg_courses(points), []
     for i in range(1, len(points) - 1):
@@ -196,11 +201,11 @@ def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[f
             )
             for course in turn_courses.tolist()
         ]
-        # The ground speed is NaN on a course that cannot be held.
+        # The ground speed is NaN on a course on which the wind is too strong.
         speeds.append(max((value for value in ground_speeds if value > 0.0), default=speed))
     return speeds
 
 
 def _round_to_thousandths(value: float) -> float:
-    """Round a number to thousandths."""
+    """Round a number to a multiple of 0.001."""
     return round(value * 1e3) / 1e3

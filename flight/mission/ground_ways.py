@@ -35,7 +35,7 @@ class TakeOff:
     home: (3,) m, on the ground.
     course: launch course, rad on the map.
     end_altitude: altitude at the end of the take-off, m AMSL.
-    home_altitude: altitude of home, m AMSL, the reference of the autopilot's heights.
+    home_altitude: altitude of home, m AMSL, above which the autopilot measures heights.
     pitch: minimum climb pitch, rad.
     waypoint: index of the route's waypoint at which the mission continues.
     speed: ground speed at the end of the launch, m/s.
@@ -102,11 +102,11 @@ class Approach:
     tail_wind: float
     home_altitude: float
 
-    def place(self, position: Floats) -> tuple[Floats, Floats]:
+    def distances_from_landing_point(self, position: Floats) -> tuple[Floats, Floats]:
         """Return the distances of positions (n, 3) past the landing point and right of its course, (n,) m each."""
         return _along_and_right(position, self.point, self.course)
 
-    def on_strip(self, position: Floats) -> tuple[Floats, Floats]:
+    def distances_from_strip_center(self, position: Floats) -> tuple[Floats, Floats]:
         """Return the distances of positions (n, 3) from the strip's center along it and to its right, (n,) m each.
 
         The strip has its stated course, or the landing's course if none is stated. A landing against the stated course
@@ -144,7 +144,7 @@ class GroundPhases:
 def find_ground_phases(scenario: Scenario, mission: Mission, route: Route, min_airspeed: float) -> GroundPhases:
     """Find the take-off and the landing of a mission that a flight in the scenario simulates.
 
-    slowest: minimum level-flight speed, m/s, which sets the launch speed if the scenario states none.
+    min_airspeed: minimum level-flight speed, m/s, which sets the launch speed if the scenario states none.
 
     >>> from world.scenario import load_scenario
     >>> bool(find_ground_phases(load_scenario("tight"), Mission(None, ()), None, 15.0))
@@ -197,14 +197,14 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
     strip, last_leg = scenario.landing, route.legs
     items = {item.seq: item for item in mission.items if item.command == Command.NAV_LAND}
     if strip is None or not items or int(route.items[last_leg]) not in items or last_leg < 2:
-        reason = "the mission does not end with two places and a NAV_LAND at a third"
+        reason = "the mission does not end with two waypoints and a NAV_LAND at a third position"
         return None, f"[landing]: {reason}: its flight ends in the air"
     ground = route.landing_ground
     leg_start, leg_end = route.waypoints[last_leg - 1], route.waypoints[last_leg]
     if math.isnan(ground):
-        return None, "[landing]: the height of the landing point is unknown, so the flight ends in the air"
+        return None, "[landing]: the altitude of the landing point is unknown, so the flight ends in the air"
     if leg_start[2] <= ground:
-        return None, ("[landing]: the approach begins no higher than the landing point, so the flight ends in the air")
+        return None, "[landing]: the approach does not begin above the landing point, so the flight ends in the air"
     final_leg = leg_end[:2] - leg_start[:2]
     course, length = math.atan2(final_leg[0], final_leg[1]), float(np.hypot(*final_leg))
     point = np.array([leg_end[0], leg_end[1], ground])
@@ -219,9 +219,9 @@ def _find_approach(scenario: Scenario, mission: Mission, route: Route) -> tuple[
 
 
 def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: Floats | None) -> Route:
-    """Return the airborne part of a route, to which the usual rules apply.
+    """Return the airborne part of a route, which is judged by the rules for a flight in the air.
 
-    first_leg_start: point where the take-off ends and the first leg starts, (3,) m; None for the start of the route.
+    first_leg_start: point at which the take-off ends and the first leg starts, (3,) m; None to keep the first waypoint.
 
     The leg to the landing point is omitted; the numbers of legs and waypoints do not change.
     """
@@ -254,7 +254,7 @@ def shown_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
 
 
 def flown_notes(route: Route, ground_phases: GroundPhases) -> tuple[str, ...]:
-    """Return a route's notes, without the note on the landing if that is simulated."""
+    """Return a route's notes, without the note on the landing if the landing is simulated."""
     if ground_phases.approach is None:
         return route.notes
     return tuple(note for note in route.notes if LANDING_NOTE not in note)

@@ -9,7 +9,7 @@ import numpy as np
 
 from flight.mission.items import Mission
 from flight.mission.itinerary import Itinerary, Position, RoutePoint, make_itinerary
-from flight.mission.placing import HIGHEST, PlacedMission, on_map, place_stops, rally_stops
+from flight.mission.placing import MAX_ALTITUDE_M, PlacedMission, place_stops, project_stops, rally_stops
 from world.arrays import Floats
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
@@ -19,9 +19,9 @@ from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, 
 from world.terrain import Terrain
 
 # Margin of the area around the mission's positions, and of the ceiling above its highest, m.
-AREA_BUFFER = 2000.0
-# Largest distance between home and the first position, m: a home further away does not belong to the mission, since
-# ground stations write a default position of their own if none was set.
+AREA_MARGIN_M = 2000.0
+# Largest distance between home and the first position, m: ground stations write a default position if no home was set,
+# so that a more distant home does not belong to the mission.
 _MAX_HOME_DISTANCE_M = 100_000.0
 
 
@@ -44,11 +44,11 @@ def implied_scenario(
     flight: the aircraft and how it flies, defaults if None.
     vertical_legs: see `flight.mission.placing.place_stops`.
 
-    The area is the box of the positions flown to and their loiters, with a margin of 2 km, clipped at the tile's edge;
-    for a mission that ends with a return it includes the nearest rally point. Start and destination are the first and
-    last of these positions. If they are not above ground they are raised to 1 m, as a scenario requires, while the
-    route (and its verdict) keeps the mission's altitudes. Raises MissionError, or TerrainError if the mission leaves
-    the tile.
+    The area is the bounding box of the mission's positions and loiters, with a margin of 2 km, clipped at the edge of
+    the terrain; for a mission that ends with an RTL it includes the nearest rally point. Start and destination are the
+    first and last of these positions. If they are not above ground, they are raised to 1 m above it, as a scenario
+    requires; the route and its verdict keep the mission's altitudes. Raises MissionError, or TerrainError if the
+    mission leaves the terrain.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -65,7 +65,7 @@ def implied_scenario(
     area, flown_box = _area_and_flown_box(mission, itinerary, origin)
     terrain, table, area = _load_terrain(terrain_path, origin, area, flown_box)
     placed_mission = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
-    max_altitude = max(placed_stop.place[2] for placed_stop in placed_mission.stops)
+    max_altitude = max(placed_stop.map_position[2] for placed_stop in placed_mission.stops)
     if terrain is not None:
         max_altitude = max(max_altitude, float(np.nanmax(terrain.heights)))
     spec = ScenarioFile(
@@ -74,10 +74,12 @@ def implied_scenario(
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
         area=AreaTable(
-            east_m=area[0].tolist(), north_m=area[1].tolist(), ceiling_amsl_m=min(max_altitude + AREA_BUFFER, HIGHEST)
+            east_m=area[0].tolist(),
+            north_m=area[1].tolist(),
+            ceiling_amsl_m=min(max_altitude + AREA_MARGIN_M, MAX_ALTITUDE_M),
         ),
-        start=_raised_above_ground(placed_mission.stops[0].place, terrain),
-        destination=_raised_above_ground(placed_mission.stops[-1].place, terrain),
+        start=_raised_above_ground(placed_mission.stops[0].map_position, terrain),
+        destination=_raised_above_ground(placed_mission.stops[-1].map_position, terrain),
         flight=flight,
     )
     return ImpliedScenario(from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
@@ -109,13 +111,13 @@ def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin
 def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigin) -> tuple[Floats, Floats]:
     """Return the area, and the bounding box of the mission's positions; both (2, 2) [[e0, e1], [n0, n1]] m."""
     stops = itinerary.stops
-    points = on_map(mission.source, stops, origin)
+    points = project_stops(mission.source, stops, origin)
     flown_box = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
-    margin = AREA_BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
+    margin = AREA_MARGIN_M + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
     area = flown_box
-    if itinerary.returns and (rally := rally_stops(mission)):
-        # Which rally points are in range is unknown here: take the nearest to where the return begins.
-        rally_positions = on_map(mission.source, rally, origin)
+    if itinerary.ends_with_rtl and (rally := rally_stops(mission)):
+        # The rally points in range are unknown here: take the one nearest to the start of the RTL.
+        rally_positions = project_stops(mission.source, rally, origin)
         distances = np.hypot(*(rally_positions - points[max(0, len(points) - 2)]).T)
         if distances.min() <= _MAX_HOME_DISTANCE_M:
             nearest_rally_point = rally_positions[[int(np.argmin(distances))]].T
@@ -152,6 +154,7 @@ def _load_terrain(
 
 
 def _position_text(lats: Floats, lons: Floats) -> str:
+    """Return the ranges of latitudes and longitudes as text, degrees."""
     return f"latitude {lats.min():.4f}..{lats.max():.4f}, longitude {lons.min():.4f}..{lons.max():.4f}"
 
 
@@ -164,5 +167,6 @@ def _raised_above_ground(position: Position, terrain: Terrain | None) -> EndTabl
 
 
 def _scenario_name(source: str) -> str:
+    """Return a scenario's name for the file of a mission: at most 100 printable characters."""
     name = "".join(character if character.isprintable() else "?" for character in re.split(r"[/\\]", source)[-1])
     return name[:100] or "mission"

@@ -154,10 +154,10 @@ def command_name(command: int) -> str:
         return f"command {command}"
 
 
-def on_grid(degrees: float) -> float:
+def round_to_grid(degrees: float) -> float:
     """Round degrees to a multiple of 1e-7, without truncating; NaN stays NaN.
 
-    >>> on_grid(36.50000006), on_grid(-84.19999994)
+    >>> round_to_grid(36.50000006), round_to_grid(-84.19999994)
     (36.5000001, -84.1999999)
     """
     return round(degrees * 1e7) / 1e7 if math.isfinite(degrees) else degrees
@@ -200,6 +200,7 @@ class MissionItem:
         return self._scaled(self.lon_deg)
 
     def _scaled(self, value: float) -> int:
+        """Return a coordinate as an int32; INT32_MAX for NaN."""
         if not math.isfinite(value):
             return _MAX_INT32
         return round(value * 1e7) if is_located(self.command, self.frame) else round(value)
@@ -242,7 +243,8 @@ class Camera:
 class SurveyPlan:
     """Settings of a survey that a ground station stores in addition to its items.
 
-    photo: distance between photos that its items state, m, which identifies it; 0 for none, None for any survey.
+    photo: distance between photos that the survey's items state, m, which identifies the survey; 0 for none, None for
+        any survey.
     turn_around: extension of its lines beyond their photos, m.
     camera: camera, or None if only distances are known.
     """
@@ -256,15 +258,15 @@ class SurveyPlan:
 class Mission:
     """A mission: the content of a .waypoints file, a .plan file or an upload.
 
-    home: None if the file has none, or 0,0.
+    home: None if the file states none, or states 0, 0.
     items: seq strictly increasing.
     fences: items 5001..5004, one per vertex or circle.
-    rally: items 5100. These four fields decide whether two missions are equal.
+    rally: items 5100. Two missions are equal if these four fields are equal.
     cruise_speed: m/s, the speed that a .plan file's author entered for the ground station's estimates; it is never sent
         to an aircraft.
-    warnings: oddities of the file that could still be read.
+    warnings: unusual contents of the file that could still be read.
     source: name of the mission in messages.
-    survey_plans: settings of its surveys, if the file stores more of them than their items.
+    survey_plans: settings of its surveys that a .plan file stores in addition to the items.
     autopilot: autopilot that a .plan file was written for, by its name in scenarios; "" if unknown.
     """
 
@@ -302,11 +304,11 @@ def renumber_items(mission: Mission) -> Mission:
     return replace(mission, items=tuple(items))
 
 
-def shifted(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
+def with_shifted_numbers(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
     """Return items with a number added to each seq, and to the targets of jumps.
 
     >>> jump = MissionItem(3, int(Command.DO_JUMP), 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
-    >>> [(item.seq, item.params[0]) for item in shifted([jump], 1)]
+    >>> [(item.seq, item.params[0]) for item in with_shifted_numbers([jump], 1)]
     [(4, 2.0)]
     """
     shifted_items = []
@@ -335,13 +337,13 @@ class ItemProblem(NamedTuple):
         """Return the arguments for a `MissionError` on this problem.
 
         file: file that holds the item.
-        where: beginning of the message.
+        location: beginning of the message.
         """
         return {"message": f"{location}: {self}", "file": file, **self._asdict()}
 
 
 def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
-    """Return the fault of a latitude and longitude in degrees, or None."""
+    """Return the fault of a latitude and longitude, degrees, or None if both are valid."""
     if abs(lat_deg) > 90.0:
         hint = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
         return ItemProblem("latitude", lat_deg, f"allowed -90..90 degrees{hint}")
@@ -351,7 +353,7 @@ def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
 
 
 def item_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of an item if no autopilot could interpret the item, or None.
+    """Return the fault of an item that no autopilot could interpret, or None for a valid item.
 
     >>> print(item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0)))
     latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)
@@ -372,13 +374,13 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
     if abs(item.alt) > _MAX_FLOAT32:
         return ItemProblem("altitude", item.alt, "beyond what MAVLink carries (3.4e38)")
     if item.command in PLACES | TAKEOFFS | LANDINGS and (item.lat_deg or item.lon_deg):
-        allowed = f"has no coordinates, and {command_name(item.command)} gives some; 2 is for the rest"
+        allowed = f"has no coordinates, but {command_name(item.command)} states a position: expected a global frame"
         return ItemProblem("frame", item.frame, allowed)
     return _count_problem(item)
 
 
 def _count_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of an item's parameters that are counts or sizes, or None."""
+    """Return the fault of an item's parameters that are counts, sizes or jump targets, or None."""
     p1, p2 = item.params[:2]
     if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):

@@ -3,9 +3,8 @@
 ArduPlane and PX4 reach the same stops in the same order, but run the commands between them at different times. PX4
 runs each command at its position in the list (`MissionBase::advance_mission`). ArduPlane runs the first command before
 the leg to the next stop, and the others one after another on that leg, following jumps according to the state of their
-counters at that time
- (`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): commands after a jump that has just been
-taken for the last time run one loop early (ArduPilot #30376).
+counters at that time (`AP_Mission::advance_current_nav_cmd`, `advance_current_do_cmd`): commands after a jump that has
+just been taken for the last time run one loop early (ArduPilot #30376).
 """
 
 import math
@@ -13,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from flight.mission.commands import CAMERA, MARKS, Command, Treatment, support_of
+from flight.mission.commands import CAMERA_REASON, MARKS, Command, Treatment, support_of
 from flight.mission.items import (
     AMSL,
     JUMPS,
@@ -46,7 +45,7 @@ _MAX_COUNTED_JUMPS_SMALL_BOARD = 15
 _MAX_JUMPS_IN_A_ROW = 10
 
 # Simulated duration of a loiter without end, s; the mission ends there.
-UNLIMITED = 60.0
+ENDLESS_LOITER_TIME_S = 60.0
 
 # Note on items after a mission's end.
 NEVER_REACHED = "never reached"
@@ -62,10 +61,11 @@ class Loiter:
     turns, seconds: minimum duration, 0 if it does not apply; the aircraft then leaves the circle on the first tangent
         to the next position.
     timed: True if the item states a time, even 0.
-    to_height: True if the loiter lasts until the item's altitude is reached.
+    to_altitude: True if the loiter lasts until the item's altitude is reached.
     endless: True if the item states a loiter without end, of which ``seconds`` are simulated.
-    on_course: True if the item states an exit on the course to the next stop, for PX4; ArduPlane always leaves so.
-    on_tangent: True if the item states that the line to the next stop starts on the circle (PX4) or at the exit
+    exits_on_course: True if the item states an exit on the course to the next stop. Only PX4 reads it; ArduPlane always
+        exits on that course.
+    exits_on_tangent: True if the item states that the line to the next stop starts on the circle (PX4) or at the exit
         (ArduPlane).
     """
 
@@ -73,12 +73,12 @@ class Loiter:
     turns: float = 0.0
     seconds: float = 0.0
     timed: bool = False
-    to_height: bool = False
+    to_altitude: bool = False
     endless: bool = False
-    on_course: bool = False
-    on_tangent: bool = False
+    exits_on_course: bool = False
+    exits_on_tangent: bool = False
 
-    def sweep(self, airspeed: float, radius: float) -> float:
+    def min_sweep(self, airspeed: float, radius: float) -> float:
         """Return the minimum angle of the loiter around its circle, rad.
 
         In wind a circle over the ground takes longer than its length divided by the airspeed.
@@ -87,9 +87,9 @@ class Loiter:
 
 
 def arduplane_turns(stated_turns: float) -> float:
-    """Return the turns that ArduPlane flies for stated ones: whole turns beyond one, and at most 255.
+    """Return the number of turns that ArduPlane flies for a stated number: rounded down above 1, and at most 255.
 
-    `AP_Mission::mavlink_int_to_mission_cmd` stores them in a byte.
+    `AP_Mission::mavlink_int_to_mission_cmd` stores the number in a byte.
 
     >>> [arduplane_turns(turns) for turns in (0.5, 1.0, 2.5, 300.0)]
     [0.5, 1.0, 2.0, 255.0]
@@ -101,14 +101,14 @@ def loiter_of(item: MissionItem) -> Loiter | None:
     """Return the loiter that an item states, or None for any other command."""
     param1, param2, param3, param4 = (0.0 if math.isnan(value) else value for value in item.params)
     if item.command == Command.NAV_LOITER_UNLIM:
-        return Loiter(param3, seconds=UNLIMITED, endless=True)
+        return Loiter(param3, seconds=ENDLESS_LOITER_TIME_S, endless=True)
     if item.command == Command.NAV_LOITER_TURNS:
-        return Loiter(param3, turns=arduplane_turns(param1), on_tangent=param4 > 0.0)
+        return Loiter(param3, turns=arduplane_turns(param1), exits_on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TIME:
-        return Loiter(param3, seconds=param1, timed=True, on_course=param2 > 0.0, on_tangent=param4 > 0.0)
+        return Loiter(param3, seconds=param1, timed=True, exits_on_course=param2 > 0.0, exits_on_tangent=param4 > 0.0)
     if item.command == Command.NAV_LOITER_TO_ALT:
         # Its radius is the second parameter.
-        return Loiter(param2, to_height=True, on_course=param1 > 0.0, on_tangent=param4 > 0.0)
+        return Loiter(param2, to_altitude=True, exits_on_course=param1 > 0.0, exits_on_tangent=param4 > 0.0)
     return None
 
 
@@ -203,12 +203,12 @@ class RoutePoint:
     arc: float = 0.0
 
     def at(self, position: Position, arc: float = 0.0) -> "RoutePoint":
-        """Return the point at a position on the map, with the radius of the turn there, m."""
+        """Return the point with a position on the map and a turn radius there, m."""
         return replace(self, position=position, arc=arc)
 
     @property
-    def place(self) -> Position:
-        """Position on the map; raises ValueError for a stop that has not been placed."""
+    def map_position(self) -> Position:
+        """Position on the map. Raises ValueError for a stop without a position."""
         if self.position is None:
             raise ValueError(f"item {self.item} is not placed on the map")
         return self.position
@@ -222,7 +222,7 @@ class Itinerary:
     has_home: True if the mission states its home.
     takeoff: take-off item at the start of the flight, or None.
     notes: items that are not flown as written, with their numbers, for ArduPlane.
-    endless: seq of a jump without end, -1 for none.
+    endless_jump: seq of a jump without end, -1 for none.
     landing: landing point, or None; the flight ends above it.
     px4_notes: the same notes for PX4, which reads only the value of a speed change, and gates.
     open_items, px4_open_items: items that leave the verdict undecided for ArduPlane and for PX4.
@@ -236,7 +236,7 @@ class Itinerary:
     has_home: bool
     takeoff: MissionItem | None
     notes: tuple[str, ...]
-    endless: int = -1
+    endless_jump: int = -1
     landing: RoutePoint | None = None
     px4_notes: tuple[str, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
@@ -246,11 +246,8 @@ class Itinerary:
     unreached: tuple[int, ...] = ()
 
     @property
-    def returns(self) -> bool:
-        """True if the mission ends with a return to launch.
-
-        The last stop is then home, at the altitude of the previous stop.
-        """
+    def ends_with_rtl(self) -> bool:
+        """True if the mission ends with an RTL; the last stop is then home, at the altitude of the previous stop."""
         return self.stops[-1].command == Command.NAV_RETURN_TO_LAUNCH
 
 
@@ -266,9 +263,9 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     for step in steps:
         builder.process_step(step)
         if len(builder.stops) > MAX_STOPS:
-            seq = step.to.seq if step.to is not None else mission.items[-1].seq
+            seq = step.target.seq if step.target is not None else mission.items[-1].seq
             raise MissionError(
-                f"{mission.source}: item {seq}: more than {MAX_STOPS:,} places to fly to, jumps unrolled",
+                f"{mission.source}: item {seq}: more than {MAX_STOPS:,} positions to fly to, with all jumps unrolled",
                 file=mission.source,
                 field=f"item {seq}",
             )
@@ -304,7 +301,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
         has_home=builder.has_home,
         takeoff=builder.takeoff,
         notes=builder.notes.arduplane.lines(),
-        endless=steps.endless,
+        endless_jump=steps.endless,
         landing=builder.landing,
         px4_notes=builder.notes.px4.lines(),
         open_items=tuple(builder.open_items),
@@ -319,15 +316,15 @@ class _Step(NamedTuple):
     """The next navigation item, and the commands before it.
 
     between: commands before the item, following jumps, as PX4 runs them.
-    early: command that ArduPlane runs before the leg to the item, or None.
-    late: commands that ArduPlane runs on the leg to the item.
-    to: the navigation item; None at the mission's end.
+    before_leg: command that ArduPlane runs before the leg to the item, or None.
+    on_leg: commands that ArduPlane runs on the leg to the item.
+    target: the navigation item; None at the mission's end.
     """
 
     between: tuple[MissionItem, ...]
-    early: MissionItem | None
-    late: tuple[MissionItem, ...]
-    to: MissionItem | None
+    before_leg: MissionItem | None
+    on_leg: tuple[MissionItem, ...]
+    target: MissionItem | None
 
 
 class _Steps:
@@ -365,30 +362,33 @@ class _Steps:
             while index is not None and not is_navigation(self.items[index].command):
                 passed_indices.append(index)
                 index = self._next_item(index + 1, counting=True)
-            late_commands = self._late_commands(passed_indices[0]) if passed_indices and index is not None else []
-            self.reached |= {self.items[command].seq for command in late_commands}
+            leg_commands = self._commands_on_leg(passed_indices[0]) if passed_indices and index is not None else []
+            self.reached |= {self.items[command].seq for command in leg_commands}
             yield _Step(
                 tuple(self.items[command] for command in passed_indices),
                 self.items[passed_indices[0]] if passed_indices else None,
-                tuple(self.items[command] for command in late_commands),
+                tuple(self.items[command] for command in leg_commands),
                 None if index is None else self.items[index],
             )
             index = None if index is None else index + 1
 
-    def _late_commands(self, early_index: int) -> list[int]:
+    def _commands_on_leg(self, first_index: int) -> list[int]:
         """Return the indices of the commands that ArduPlane runs on the leg to an item.
 
-        early_index: index of the command that ArduPlane has already run before that leg.
+        first_index: index of the command that ArduPlane has already run before that leg.
         """
         commands: list[int] = []
-        index = self._next_item(early_index + 1, counting=False)
+        index = self._next_item(first_index + 1, counting=False)
         while index is not None and index not in commands and not is_navigation(self.items[index].command):
             commands.append(index)
             index = self._next_item(index + 1, counting=False)
         return commands
 
     def _next_item(self, index: int, *, counting: bool) -> int | None:
-        """Return the index of the next item, following jumps, or None at the end (`get_next_cmd`)."""
+        """Return the index of the next item that is no jump, following jumps, or None at the end (`get_next_cmd`).
+
+        counting: True to count jumps, as when a navigation item is reached; False to look ahead.
+        """
         first_jump, chain_length = -1, 0
         while index < len(self.items):
             item = self.items[index]
@@ -419,6 +419,7 @@ class _Steps:
         return None
 
     def _count_item(self, item: MissionItem) -> None:
+        """Note an item as reached. Raises MissionError if jumps lead through too many items."""
         self.reached.add(item.seq)
         self._step_count += 1
         if self._step_count > _MAX_STEPS:
@@ -474,18 +475,18 @@ class _ItineraryBuilder:
         """Process the commands before a navigation item, and the item."""
         for item in step.between:
             self._run_as_px4(item)
-        arduplane_commands = () if step.early is None else (step.early, *step.late)
+        arduplane_commands = () if step.before_leg is None else (step.before_leg, *step.on_leg)
         for index, item in enumerate(arduplane_commands):
             # A home that is set on a leg does not change the altitude of the item at its end.
             if index == 0 or item.command != Command.DO_SET_HOME:
                 self._run_as_arduplane(item, arduplane_commands[index + 1 :])
-        for item in step.late:
+        for item in step.on_leg:
             if item not in step.between:
                 self.notes.arduplane.add(
                     f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq
                 )
-        if step.to is not None:
-            self._fly_item(step.to)
+        if step.target is not None:
+            self._fly_item(step.target)
         else:
             for item in step.between[1:]:
                 text = f"{command_name(item.command)}: not run, as no waypoint follows it"
@@ -550,8 +551,8 @@ class _ItineraryBuilder:
             self.add_open_item(f"{name}: not flown; {support.reason}", item.seq, arduplane=not as_px4, px4=as_px4)
         elif item.command in MARKS:
             notes.add(f"{name}: a mark, nothing to fly", item.seq)
-        elif support.reason == CAMERA:
-            notes.add(f"{name}: {CAMERA}", item.seq)
+        elif support.reason == CAMERA_REASON:
+            notes.add(f"{name}: {CAMERA_REASON}", item.seq)
         else:
             notes.add(f"{name}: not flown", item.seq)
 
@@ -582,6 +583,7 @@ class _ItineraryBuilder:
             self._note_not_flown(item, as_px4=True)
 
     def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> RoutePoint:
+        """Return the stop of an item, with the current speeds, and with the gates since the last stop."""
         lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, loiter_of(item), item.alt, item.frame
         gates, self.gates = tuple(self.gates), []
         if self.home is not self.first_home and frame in OVER_HOME:
@@ -601,6 +603,10 @@ class _ItineraryBuilder:
             self.notes.px4.add(f"{command_name(item.command)}: passed at once", item.seq)
 
     def _add_take_off(self, item: MissionItem) -> None:
+        """Add the stop of a take-off: above home at the start, and at its position if that differs from home.
+
+        Raises MissionError for a take-off at the start without an altitude.
+        """
         name = command_name(item.command)
         is_vertical = item.command == Command.NAV_VTOL_TAKEOFF
         if self.stops:
@@ -629,6 +635,7 @@ class _ItineraryBuilder:
             self.stops.append(over_home)
 
     def _add_stop(self, item: MissionItem) -> None:
+        """Add the stop of a waypoint or loiter, with notes on the parts that are not flown as written."""
         name = command_name(item.command)
         if not item.has_position and loiter_of(item) is not None and self.stops:
             text = f"{name} without a position: flown around the previous position"
@@ -639,7 +646,7 @@ class _ItineraryBuilder:
             item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
             self.add_open_item(
-                f"{name} without a position, which means the place where the aircraft is: not flown", item.seq
+                f"{name} without a position, which means the aircraft's current position: not flown", item.seq
             )
             return
         if item.command == Command.NAV_WAYPOINT:
@@ -660,7 +667,7 @@ class _ItineraryBuilder:
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
             self.add_open_item(f"{name}: flown as a straight waypoint", item.seq)
         elif item.command == Command.NAV_LOITER_UNLIM:
-            self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
+            self.notes.add(f"{name}: flown for {ENDLESS_LOITER_TIME_S:.0f} s; the mission ends there", item.seq)
             self.has_ended = True
         elif item.command == Command.NAV_LOITER_TURNS and (turns := arduplane_turns(item.params[0])) != item.params[0]:
             self.notes.arduplane.add(
@@ -674,6 +681,7 @@ class _ItineraryBuilder:
         self.stops.append(self._make_stop(item, radius if radius > 0.0 else 0.0))
 
     def _add_return(self, item: MissionItem) -> None:
+        """Add an RTL, which ends the mission; without a home or a previous stop it is not flown."""
         if not self.has_home and self.home is self.first_home:
             self.add_open_item("NAV_RETURN_TO_LAUNCH without a home: not flown", item.seq)
         elif not self.stops:
@@ -686,6 +694,7 @@ class _ItineraryBuilder:
             self.has_ended = True
 
     def _add_landing(self, item: MissionItem) -> None:
+        """Add a landing, which ends the mission above the landing point."""
         name = command_name(item.command)
         if not self.stops:
             self.add_open_item(f"{name} before the start: not flown", item.seq)
@@ -707,7 +716,7 @@ class _ItineraryBuilder:
         name = command_name(item.command)
         if item.params[0] == 1.0:
             if self.stops:
-                self.add_open_item(f"{name} to where the aircraft is: not flown", item.seq, px4=False)
+                self.add_open_item(f"{name} to the aircraft's current position: not flown", item.seq, px4=False)
             else:
                 self.notes.arduplane.add(f"{name} before the start: home is where the aircraft stands", item.seq)
             return

@@ -16,40 +16,40 @@ from flight.mission.itinerary import MAX_STOPS, Loiter, RoutePoint
 from world.errors import MissionError
 
 # Maximum course change at a corner of the polygon, rad: the corners are then 8 % of the radius outside the circle.
-CORNER = math.pi / 4.0
+MAX_CORNER_ANGLE_RAD = math.pi / 4.0
 # Minimum loiter radius, m: at a smaller radius the legs of a corner vanish, and no aircraft here turns as tightly.
-TIGHTEST = 10.0
+MIN_LOITER_RADIUS_M = 10.0
 # Maximum loiter radius, m.
-WIDEST = 20_000.0
+MAX_LOITER_RADIUS_M = 20_000.0
 # Minimum distance of a stop from a circle for a tangent between them, m.
 _MIN_TANGENT_CLEARANCE_M = 2.0
-# Maximum distance between two positions that count as one, m.
+# Distance below which two positions are treated as the same, m.
 _SAME_PLACE_M = 1.0
-# Maximum difference between two altitudes that count as one, m.
+# Difference up to which two altitudes are treated as the same, m.
 _SAME_ALTITUDE_M = 10.0
 # Slope (tangent) of a spiral if the aircraft is unknown.
-PLAIN_SLOPE = 0.05
+DEFAULT_SPIRAL_SLOPE = 0.05
 
-# Angle before the tangent at which an autopilot that exits on heading leaves its loiter, rad.
-LINED_UP = math.radians(10.0)
-# Angle by which it has then turned, from its path to the center to the tangent at the start of the loiter in the route,
-# rad.
+# Heading error at which an autopilot that exits on heading leaves its loiter, rad.
+EXIT_HEADING_TOLERANCE_RAD = math.radians(10.0)
+# Angle between the course to the loiter's center and the tangent on which the route joins the loiter, rad: an autopilot
+# that steers to the center has turned by this angle before the loiter of the route starts.
 _TURN_TO_TANGENT_RAD = 0.5 * math.pi
 
 # Function that returns the steepest climb and descent (tangents) in a spiral at an airspeed (m/s) and an altitude (m
 # AMSL).
 SpiralSlopes = Callable[[float, float], tuple[float, float]]
 # Function that returns the default loiter radius (m) at an airspeed (m/s) and an altitude (m AMSL).
-OwnRadius = Callable[[float, float], float]
+DefaultRadius = Callable[[float, float], float]
 
 
 def item_radius(loiter: Loiter) -> float:
-    """Return the radius that a loiter's item states, m; 0 for none."""
+    """Return the radius that a loiter's item states, m; 0 if the item states none."""
     return abs(loiter.radius)
 
 
 def unit_scale(up: float) -> float:
-    """Return 1, as the ratio of a loiter's radius at an altitude (m AMSL) to its radius at sea level."""
+    """Return 1 as the ratio of a loiter's radius at an altitude (m AMSL) to the stated radius."""
     return 1.0
 
 
@@ -64,9 +64,10 @@ class LoiterRules:
     steers_to_center: True if the autopilot steers to the loiter's center until it reaches the circle, and at the end of
         the loiter leaves at once for the line from the center; otherwise it joins and leaves the circle on tangents.
     exits_on_heading: True if the autopilot, after steering to the center, counts turns from its turn away from the
-        center, and after the end of the loiter continues until it heads for the next waypoint within `LINED_UP`.
+        center, and after the end of the loiter continues until it heads for the next waypoint within
+        `EXIT_HEADING_TOLERANCE_RAD`.
     holds_height: True if the autopilot holds its altitude on the leg to a loiter to an altitude.
-    climb, sink: maximum climb and descent rate in a loiter, m/s.
+    max_climb_rate, max_sink_rate: in a loiter, m/s.
     altitude_tolerance: altitude tolerance, m.
     ends_in_circle: True if the autopilot loiters without end about a mission's last waypoint.
     unflown_note: note on parts of loiters that are not simulated; "" for none.
@@ -83,8 +84,8 @@ class LoiterRules:
     steers_to_center: bool = False
     exits_on_heading: bool = False
     holds_height: bool = False
-    climb: float = math.inf
-    sink: float = math.inf
+    max_climb_rate: float = math.inf
+    max_sink_rate: float = math.inf
     altitude_tolerance: float = 0.0
     ends_in_circle: bool = False
     unflown_note: str = ""
@@ -102,7 +103,7 @@ class LoiterRules:
 
 
 # Rules of an autopilot without loiter rules.
-USUAL_LOITERS = LoiterRules()
+DEFAULT_LOITER_RULES = LoiterRules()
 
 
 class UnjoinedStop(NamedTuple):
@@ -122,14 +123,14 @@ class UnjoinedStop(NamedTuple):
 class Node:
     """A stop as a point, or as a circle about that point; east, north, up in m.
 
-    turn: radius of the circle, m, positive to the right, 0 for a point.
+    signed_radius: radius of the circle, m, positive to the right, 0 for a point.
     """
 
     stop: RoutePoint
     east: float
     north: float
     up: float
-    turn: float = 0.0
+    signed_radius: float = 0.0
 
     def distance_to(self, other: "Node") -> float:
         """Return the distance between the centers, m."""
@@ -140,40 +141,44 @@ def lay_out_waypoints(
     source: str,
     stops: list[RoutePoint],
     notes: Notes,
-    own_radius: OwnRadius,
+    default_radius: DefaultRadius,
     slopes: SpiralSlopes,
-    rules: LoiterRules = USUAL_LOITERS,
+    rules: LoiterRules = DEFAULT_LOITER_RULES,
 ) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
     """Lay out the waypoints of a route along straight legs and around loiter circles.
 
     Return the waypoints, and the stops that are not at their stated positions.
 
     source: name of the mission in errors.
-    own_radius: the aircraft's own loiter radius at an airspeed and altitude.
-    slopes: steepest climb and descent of the aircraft in a spiral.
+    default_radius: function that returns the aircraft's default loiter radius.
+    slopes: function that returns the steepest climb and descent of the aircraft in a spiral.
     rules: loiter rules of the autopilot.
 
     Stops inside the previous or next circle are omitted, with a note, because no straight leg joins them. Raises
     MissionError if a loiter is too wide or too long to lay out.
     """
     unjoined: list[UnjoinedStop] = []
-    nodes = _make_nodes(source, stops, notes, own_radius, rules, unjoined)
+    nodes = _make_nodes(source, stops, notes, default_radius, rules, unjoined)
     courses = [tangent_course(a, b) for a, b in pairwise(nodes)]
     points: list[RoutePoint] = []
-    up = stops[0].place[2]
+    up = stops[0].map_position[2]
     for index, node in enumerate(nodes):
-        if node.turn == 0.0:
+        if node.signed_radius == 0.0:
             up = node.up
             points.append(node.stop.at((node.east, node.north, up)))
             continue
         entry_course = courses[index - 1] if index else (courses[index] if index < len(courses) else 0.0)
         exit_course = courses[index] if index < len(courses) else None
-        leg_length = math.hypot(node.east - points[-1].place[0], node.north - points[-1].place[1]) if points else 0.0
-        min_radius = own_radius(node.stop.airspeed, node.up) if rules.exits_on_heading else 0.0
+        leg_length = (
+            math.hypot(node.east - points[-1].map_position[0], node.north - points[-1].map_position[1])
+            if points
+            else 0.0
+        )
+        min_radius = default_radius(node.stop.airspeed, node.up) if rules.exits_on_heading else 0.0
         corners = _corners_around(source, node, entry_course, exit_course, up, leg_length, min_radius, slopes, rules)
         if not index:
-            corners.insert(0, node.stop.at((*on_rim(node, entry_course), corners[0].place[2])))
-        up = corners[-1].place[2]
+            corners.insert(0, node.stop.at((*point_on_circle(node, entry_course), corners[0].map_position[2])))
+        up = corners[-1].map_position[2]
         points += corners
         if len(points) > MAX_STOPS:
             item = f"item {node.stop.item}"
@@ -186,7 +191,7 @@ def _make_nodes(
     source: str,
     stops: list[RoutePoint],
     notes: Notes,
-    own_radius: OwnRadius,
+    default_radius: DefaultRadius,
     rules: LoiterRules,
     unjoined: list[UnjoinedStop],
 ) -> list[Node]:
@@ -198,13 +203,15 @@ def _make_nodes(
     """
     nodes: list[Node] = []
     for stop in stops:
-        node = Node(stop, *stop.place)
+        node = Node(stop, *stop.map_position)
         if stop.loiter is not None:
-            node = replace(node, turn=_signed_radius(source, stop, stop.loiter, node.up, notes, own_radius, rules))
+            node = replace(
+                node, signed_radius=_signed_radius(source, stop, stop.loiter, node.up, notes, default_radius, rules)
+            )
             while (
                 nodes
-                and nodes[-1].turn == 0.0
-                and nodes[-1].distance_to(node) < abs(node.turn) + _MIN_TANGENT_CLEARANCE_M
+                and nodes[-1].signed_radius == 0.0
+                and nodes[-1].distance_to(node) < abs(node.signed_radius) + _MIN_TANGENT_CLEARANCE_M
             ):
                 inner_node = nodes.pop()
                 _note_omitted_stop(inner_node.stop, node.stop, notes)
@@ -215,17 +222,17 @@ def _make_nodes(
                 if inner_node.stop.item >= 0 and inner_node.stop.command not in TAKEOFFS and not is_passed_anyway:
                     unjoined.append(UnjoinedStop(inner_node.stop.item, stop.item, is_circle=False))
         previous = nodes[-1] if nodes else None
-        if previous is not None and previous.turn != 0.0 and not is_joined(previous, node):
-            if node.turn == 0.0:
+        if previous is not None and previous.signed_radius != 0.0 and not is_joined(previous, node):
+            if node.signed_radius == 0.0:
                 _note_omitted_stop(stop, previous.stop, notes)
                 unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=False))
                 continue
             # Two loiters with the same stated radius and center may differ by the radius scale at their altitudes.
             previous_stated_radius, stated_radius = (
-                abs(previous.turn) / rules.radius_scale(previous.up),
-                abs(node.turn) / rules.radius_scale(node.up),
+                abs(previous.signed_radius) / rules.radius_scale(previous.up),
+                abs(node.signed_radius) / rules.radius_scale(node.up),
             )
-            is_same_direction = math.copysign(1.0, previous.turn) == math.copysign(1.0, node.turn)
+            is_same_direction = math.copysign(1.0, previous.signed_radius) == math.copysign(1.0, node.signed_radius)
             if (
                 previous.distance_to(node) >= _SAME_PLACE_M
                 or abs(previous_stated_radius - stated_radius) >= _SAME_PLACE_M
@@ -233,25 +240,36 @@ def _make_nodes(
             ):
                 unjoined.append(UnjoinedStop(stop.item, previous.stop.item, is_circle=True))
             notes.add(
-                f"its circle has no tangent from that of item {previous.stop.item}: flown on that circle", stop.item
+                f"its circle has no tangent from the circle of item {previous.stop.item}: flown on that circle",
+                stop.item,
             )
-            node = replace(node, east=previous.east, north=previous.north, turn=previous.turn)
+            node = replace(node, east=previous.east, north=previous.north, signed_radius=previous.signed_radius)
         nodes.append(node)
     return nodes
 
 
 def _note_omitted_stop(stop: RoutePoint, circle: RoutePoint, notes: Notes) -> None:
+    """Add a note on a stop that is omitted because it lies inside a loiter circle."""
     text = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
     notes.add(text if stop.item >= 0 else f"home {text}", stop.item if stop.item >= 0 else None)
 
 
 def _signed_radius(
-    source: str, stop: RoutePoint, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius, rules: LoiterRules
+    source: str,
+    stop: RoutePoint,
+    loiter: Loiter,
+    up: float,
+    notes: Notes,
+    default_radius: DefaultRadius,
+    rules: LoiterRules,
 ) -> float:
-    """Return the signed radius of a loiter, m."""
+    """Return the radius of a loiter, m, negative to the left; add a note if it is not the stated radius.
+
+    Raises MissionError if the stated radius is too large.
+    """
     radius, stated_radius = rules.radius_of(loiter), abs(loiter.radius)
-    if radius > WIDEST:
-        allowed = f"allowed up to {WIDEST:,.0f}"
+    if radius > MAX_LOITER_RADIUS_M:
+        allowed = f"allowed up to {MAX_LOITER_RADIUS_M:,.0f}"
         message = f"{source}: item {stop.item}: loiter radius {radius:g} m: {allowed}"
         raise MissionError(message, file=source, field="loiter radius", value=radius, allowed=allowed)
     radius_scale = rules.radius_scale(up)
@@ -260,13 +278,13 @@ def _signed_radius(
         direction_text = " to the left" if is_left else ""
         reason = f"its radius of {stated_radius:g} m is not read" if stated_radius > 0.0 else "loiter without a radius"
         notes.add(f"{reason}: flown with {rules.radius_name}, {abs(rules.radius):g} m{direction_text}", stop.item)
-        return math.copysign(max(TIGHTEST, abs(rules.radius) * radius_scale), -1.0 if is_left else 1.0)
+        return math.copysign(max(MIN_LOITER_RADIUS_M, abs(rules.radius) * radius_scale), -1.0 if is_left else 1.0)
     if radius == 0.0:
-        radius = own_radius(stop.airspeed, up)
+        radius = default_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
-    elif radius < TIGHTEST:
-        notes.add(f"loiter radius below {TIGHTEST:.0f} m: flown with {TIGHTEST:.0f} m", stop.item)
-        radius = TIGHTEST
+    elif radius < MIN_LOITER_RADIUS_M:
+        notes.add(f"loiter radius below {MIN_LOITER_RADIUS_M:.0f} m: flown with {MIN_LOITER_RADIUS_M:.0f} m", stop.item)
+        radius = MIN_LOITER_RADIUS_M
     elif round(radius * radius_scale) != round(stated_radius):
         notes.add(
             f"loiter radius {stated_radius:g} m: flown with {radius * radius_scale:.0f} m at this height", stop.item
@@ -277,7 +295,9 @@ def _signed_radius(
 def is_joined(a: Node, b: Node) -> bool:
     """Return True if a tangent joins two circles or points, or if both are the same circle."""
     distance = a.distance_to(b)
-    return distance > abs(b.turn - a.turn) + _MIN_TANGENT_CLEARANCE_M or (distance < 1.0 and abs(a.turn - b.turn) < 1.0)
+    return distance > abs(b.signed_radius - a.signed_radius) + _MIN_TANGENT_CLEARANCE_M or (
+        distance < 1.0 and abs(a.signed_radius - b.signed_radius) < 1.0
+    )
 
 
 def tangent_course(a: Node, b: Node) -> float:
@@ -287,17 +307,17 @@ def tangent_course(a: Node, b: Node) -> float:
         return 0.0
     bearing = math.atan2(b.east - a.east, b.north - a.north)
     # Across the tangent, the centers are b.turn - a.turn apart.
-    return bearing - math.asin(min(1.0, max(-1.0, (b.turn - a.turn) / distance)))
+    return bearing - math.asin(min(1.0, max(-1.0, (b.signed_radius - a.signed_radius) / distance)))
 
 
-def on_rim(node: Node, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
+def point_on_circle(node: Node, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
     """Return the point (east, north, m) of a circle at which the course along it is ``course``.
 
     radius_ratio: distance of the point from the center, as a ratio to the radius.
     """
     return (
-        node.east - node.turn * radius_ratio * math.cos(course),
-        node.north + node.turn * radius_ratio * math.sin(course),
+        node.east - node.signed_radius * radius_ratio * math.cos(course),
+        node.north + node.signed_radius * radius_ratio * math.sin(course),
     )
 
 
@@ -311,10 +331,10 @@ def circle_corners(node: Node, entry_course: float, sweep: float) -> list[tuple[
     >>> [(round(e), round(n)) for e, n in circle_corners(Node(point, 100.0, 0.0, 0.0, 100.0), 0.0, math.pi / 2.0)]
     [(0, 41), (59, 100)]
     """
-    count = max(1, math.ceil(sweep / CORNER - 1e-9))
-    step, turn_sign = sweep / count, math.copysign(1.0, node.turn)
+    count = max(1, math.ceil(sweep / MAX_CORNER_ANGLE_RAD - 1e-9))
+    step, turn_sign = sweep / count, math.copysign(1.0, node.signed_radius)
     return [
-        on_rim(node, entry_course + turn_sign * (index + 0.5) * step, 1.0 / math.cos(0.5 * step))
+        point_on_circle(node, entry_course + turn_sign * (index + 0.5) * step, 1.0 / math.cos(0.5 * step))
         for index in range(count)
     ]
 
@@ -335,47 +355,44 @@ def _corners_around(
     entry_course, exit_course: courses at the tangents, rad; ``exit_course`` is None at the mission's end.
     previous_altitude: altitude at the start of the leg to the circle, m AMSL.
     leg_length: length of that leg, m.
-    min_radius: minimum radius of the aircraft, m, to which it widens a smaller circle; 0 if unknown.
+    min_radius: minimum loiter radius of the aircraft, m, for the duration of a tighter loiter; 0 if unknown.
 
-    For an autopilot that leaves as soon as the loiter's time is over, the circle ends at the last tangent before that.
+    For an autopilot that leaves as soon as the loiter's time is over, the circle ends at the last exit tangent before
+    that time.
     """
-    radius, turn_sign = abs(node.turn), math.copysign(1.0, node.turn)
+    radius, turn_sign = abs(node.signed_radius), math.copysign(1.0, node.signed_radius)
     entry_altitude, required_sweep = node.up, 0.0
     loiter = node.stop.loiter
-    if loiter is not None and loiter.to_height:
+    if loiter is not None and loiter.to_altitude:
         climb_slope, dive_slope = slopes(node.stop.airspeed, max(previous_altitude, node.up))
-        climb_slope = min(climb_slope, rules.climb / node.stop.airspeed)
-        dive_slope = min(dive_slope, rules.sink / node.stop.airspeed)
-        entry_altitude = (
-            previous_altitude
-            if rules.holds_height
-            else min(
-                max(node.up, previous_altitude - dive_slope * leg_length), previous_altitude + climb_slope * leg_length
-            )
-        )
+        climb_slope = min(climb_slope, rules.max_climb_rate / node.stop.airspeed)
+        dive_slope = min(dive_slope, rules.max_sink_rate / node.stop.airspeed)
+        entry_altitude = previous_altitude
+        if not rules.holds_height:
+            max_descent, max_climb = dive_slope * leg_length, climb_slope * leg_length
+            entry_altitude = min(max(node.up, previous_altitude - max_descent), previous_altitude + max_climb)
         altitude_change = max(0.0, abs(node.up - entry_altitude) - rules.altitude_tolerance)
         if altitude_change > 0.0:
             # Altitudes are interpolated between the corners, of which there is one more than intervals.
-            required_sweep = (
-                altitude_change / (climb_slope if node.up > entry_altitude else dive_slope) / radius + CORNER
-            )
+            slope = climb_slope if node.up > entry_altitude else dive_slope
+            required_sweep = altitude_change / slope / radius + MAX_CORNER_ANGLE_RAD
     elif loiter is not None:
-        required_sweep = loiter.sweep(node.stop.airspeed, max(radius, min_radius))
+        required_sweep = loiter.min_sweep(node.stop.airspeed, max(radius, min_radius))
         if rules.exits_on_heading:
             required_sweep = max(0.0, required_sweep - _TURN_TO_TANGENT_RAD)
     sweep = required_sweep
     if exit_course is not None:
         sweep_to_exit = (turn_sign * (exit_course - entry_course)) % (2.0 * math.pi)
-        exit_tolerance = LINED_UP if rules.exits_on_heading else 1e-9
+        exit_tolerance = EXIT_HEADING_TOLERANCE_RAD if rules.exits_on_heading else 1e-9
         extra_turns = (required_sweep - sweep_to_exit - exit_tolerance) / (2.0 * math.pi)
         leaves_at_once = (
-            rules.steers_to_center and not rules.exits_on_heading and loiter is not None and not loiter.to_height
+            rules.steers_to_center and not rules.exits_on_heading and loiter is not None and not loiter.to_altitude
         )
         extra_turns = math.floor(extra_turns) if leaves_at_once else math.ceil(extra_turns)
         sweep = sweep_to_exit + 2.0 * math.pi * max(0, extra_turns)
-    if sweep > MAX_STOPS * CORNER:
-        turns, allowed = sweep / (2.0 * math.pi), f"at most {MAX_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
-        item = f"item {node.stop.item}"
+    if sweep > MAX_STOPS * MAX_CORNER_ANGLE_RAD:
+        turns, max_turns = (angle / (2.0 * math.pi) for angle in (sweep, MAX_STOPS * MAX_CORNER_ANGLE_RAD))
+        item, allowed = f"item {node.stop.item}", f"at most {max_turns:,.0f} are flown"
         raise MissionError.at(source, item, turns, allowed, shown=f"{turns:,.0f} turns to loiter")
     corners = circle_corners(node, entry_course, sweep)
     points = []
@@ -383,5 +400,5 @@ def _corners_around(
         fraction = 1.0 if len(corners) == 1 else index / (len(corners) - 1)
         points.append(node.stop.at((east, north, entry_altitude + fraction * (node.up - entry_altitude)), radius))
     if exit_course is None and sweep > 0.0:
-        points.append(node.stop.at((*on_rim(node, entry_course + turn_sign * sweep), node.up)))
+        points.append(node.stop.at((*point_on_circle(node, entry_course + turn_sign * sweep), node.up)))
     return points

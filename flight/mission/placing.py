@@ -37,14 +37,14 @@ from world.geometry import leg_courses
 from world.scenario_tables import MAP_EXTENT
 from world.terrain import Terrain
 
-# Distance below which two positions are the same, m.
-SAME_PLACE = 1.0
+# Horizontal distance below which two positions are treated as the same, m.
+SAME_POSITION_DISTANCE_M = 1.0
 # Horizontal length of a vertical leg, m: one meter of height on it is a slope of 89.4 degrees.
-VERTICAL_STEP = 0.01
+VERTICAL_LEG_LENGTH_M = 0.01
 # Minimum altitude of a flight, m AMSL.
-LOWEST = -500.0
+MIN_ALTITUDE_M = -500.0
 # Maximum altitude of a flight, m AMSL.
-HIGHEST = 9000.0
+MAX_ALTITUDE_M = 9000.0
 # Maximum difference between home's altitude and the ground there without a note, m.
 _HOME_ALTITUDE_TOLERANCE_M = 30.0
 
@@ -72,8 +72,8 @@ class PlacedMission:
 
     stops: stops in flying order; a stop at the position of the previous stop is merged with it.
     notes: notes on the placing, after the itinerary's notes.
-    takeoff_ground: altitude of the ground at home, m; NaN if unknown or without a take-off.
-    landing_ground: altitude of the landing point, m; NaN if unknown or without a landing.
+    takeoff_ground: altitude of the ground at home, m; NaN if unknown, or if the mission has no take-off.
+    landing_ground: altitude of the landing point, m; NaN if unknown, or if the mission has no landing.
     return_points: home, at the reference altitude of heights above home, and then the rally points; empty if the
         mission does not end with an RTL.
     landings: landing sequences to which an RTL may continue, and that are simulated.
@@ -107,35 +107,37 @@ def place_stops(
 
     terrain: None if unknown; heights above terrain are then an error.
     itinerary: the mission's itinerary; None to make it.
-    vertical_legs: True to turn a position straight above or below the previous one into a leg of `VERTICAL_STEP` m,
-        which then fails the verdict's slope rule; otherwise such a position is an error.
+    vertical_legs: True to turn a position straight above or below the previous one into a leg of
+        `VERTICAL_LEG_LENGTH_M`, which then fails the verdict's slope rule; otherwise such a position is an error.
     resets_jump_counters: see `flight.mission.itinerary.make_itinerary`.
 
-    Successive stops of the result are at least `SAME_PLACE` apart horizontally, or `VERTICAL_STEP` on a vertical leg.
-    Raises MissionError, which names the item, if a stop cannot be placed.
+    Successive stops of the result are at least `SAME_POSITION_DISTANCE_M` apart horizontally, or
+    `VERTICAL_LEG_LENGTH_M` on a vertical leg. Raises MissionError, which names the item, if a stop cannot be placed.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
     >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
     >>> len(placed.stops), placed.notes
-    (1, ('item 2: at the place of item 1: merged with it',))
+    (1, ('item 2: at the position of item 1: merged with it',))
     """
     notes = Notes()
     if itinerary is None:
         itinerary = make_itinerary(mission, resets_jump_counters=resets_jump_counters)
-    heights = _Heights(mission.source, itinerary.home, origin, terrain, notes)
+    heights = _AltitudeConverter(mission.source, itinerary.home, origin, terrain, notes)
     stops = _place_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
-    landing_ground = heights.touchdown(itinerary)
+    landing_ground = heights.landing_altitude(itinerary)
     return_mission, return_heights, home = mission, heights, itinerary.last_home or itinerary.home
     if home is not itinerary.home:
         # An RTL and its landing sequence use the home of the last DO_SET_HOME.
         return_mission, return_heights = (
             replace(mission, home=home),
-            _Heights(mission.source, home, origin, terrain, notes),
+            _AltitudeConverter(mission.source, home, origin, terrain, notes),
         )
-    return_points = _place_return_points(return_mission, home, origin, return_heights) if itinerary.returns else ()
-    numbered_starts = tuple(_landing_starts(return_mission, origin, return_heights)) if itinerary.returns else ()
+    return_points = (
+        _place_return_points(return_mission, home, origin, return_heights) if itinerary.ends_with_rtl else ()
+    )
+    numbered_starts = tuple(_landing_starts(return_mission, origin, return_heights)) if itinerary.ends_with_rtl else ()
     landings = _place_landings(return_mission, origin, return_heights, numbered_starts)
     return PlacedMission(
         mission,
@@ -148,12 +150,12 @@ def place_stops(
         return_points,
         landings,
         tuple(start for _, start in numbered_starts),
-        heights.known_home(),
+        heights.known_home_altitude(),
     )
 
 
 def return_points(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) -> tuple[ReturnPoint, ...]:
-    """Return home and the rally points of a mission on the map, home first; empty without a home.
+    """Return home and the rally points of a mission on the map, home first; return an empty tuple without a home.
 
     Raises MissionError, which names the rally point, if it is beyond the maximum extent of the map.
 
@@ -164,7 +166,7 @@ def return_points(mission: Mission, origin: GeoOrigin, terrain: Terrain | None) 
     """
     if mission.home is None:
         return ()
-    heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
+    heights = _AltitudeConverter(mission.source, mission.home, origin, terrain, Notes())
     return _place_return_points(mission, mission.home, origin, heights)
 
 
@@ -192,11 +194,13 @@ def landing_starts(mission: Mission, origin: GeoOrigin, terrain: Terrain | None)
     """
     if mission.home is None:
         return ()
-    heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
+    heights = _AltitudeConverter(mission.source, mission.home, origin, terrain, Notes())
     return tuple(start for _, start in _landing_starts(mission, origin, heights))
 
 
-def _landing_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") -> Iterator[tuple[int, LandingStart]]:
+def _landing_starts(
+    mission: Mission, origin: GeoOrigin, heights: "_AltitudeConverter"
+) -> Iterator[tuple[int, LandingStart]]:
     """Yield the start of each landing sequence with the list index of its DO_LAND_START.
 
     A DO_LAND_START with nothing to fly to after it is left out.
@@ -207,17 +211,20 @@ def _landing_starts(mission: Mission, origin: GeoOrigin, heights: "_Heights") ->
             continue
         start = _landing_stop(first_item, origin, heights)
         next_stops = _stops_to_landing(mission.items[index + 1 :], origin, heights)[1:]
-        mark_position = _item_position(mark, origin, heights) if mark.has_position else start.place
-        yield index, start._replace(mark=mark_position, next_stops=next_stops)
+        mark_position = _item_position(mark, origin, heights) if mark.has_position else start.position
+        yield index, start._replace(reference_position=mark_position, next_stops=next_stops)
 
 
 def _place_landings(
-    mission: Mission, origin: GeoOrigin, heights: "_Heights", numbered_starts: Sequence[tuple[int, LandingStart]]
+    mission: Mission,
+    origin: GeoOrigin,
+    heights: "_AltitudeConverter",
+    numbered_starts: Sequence[tuple[int, LandingStart]],
 ) -> tuple[PlacedLanding, ...]:
     """Return a mission's landing sequences, without those that start with the landing or cannot be placed."""
     landings = []
     for index, start in numbered_starts:
-        if start.lands:
+        if start.is_landing:
             continue
         try:
             itinerary = make_itinerary(replace(mission, items=mission.items[index:]))
@@ -226,7 +233,9 @@ def _place_landings(
             continue
         if itinerary.landing is not None and len(stops) > 1:
             landings.append(
-                PlacedLanding(start, tuple(stops), heights.touchdown(itinerary), itinerary.notes, itinerary.open_items)
+                PlacedLanding(
+                    start, tuple(stops), heights.landing_altitude(itinerary), itinerary.notes, itinerary.open_items
+                )
             )
     return tuple(landings)
 
@@ -250,11 +259,13 @@ def landing_sequence(
     """
     if mission.home is None:
         return ()
-    heights = _Heights(mission.source, mission.home, origin, terrain, Notes())
+    heights = _AltitudeConverter(mission.source, mission.home, origin, terrain, Notes())
     return _stops_to_landing([item for item in mission.items if item.seq >= first], origin, heights)
 
 
-def _stops_to_landing(items: Sequence[MissionItem], origin: GeoOrigin, heights: "_Heights") -> tuple[LandingStart, ...]:
+def _stops_to_landing(
+    items: Sequence[MissionItem], origin: GeoOrigin, heights: "_AltitudeConverter"
+) -> tuple[LandingStart, ...]:
     """Return the stops of items up to the first landing."""
     stops = []
     for item in items:
@@ -266,23 +277,25 @@ def _stops_to_landing(items: Sequence[MissionItem], origin: GeoOrigin, heights: 
 
 
 def _is_navigation_target(item: MissionItem) -> bool:
+    """Return True if the aircraft flies to the item's position."""
     return item.command in PLACES | LANDINGS and item.has_position
 
 
-def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> tuple[float, float, float]:
+def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> tuple[float, float, float]:
     stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
-    east, north = on_map(heights.source, (stop,), origin)[0].tolist()
+    east, north = project_stops(heights.source, (stop,), origin)[0].tolist()
     return east, north, heights.amsl(stop, east, north, heights.home_amsl())
 
 
-def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_Heights") -> LandingStart:
+def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> LandingStart:
+    """Return a landing sequence that starts at an item, with the item's position as reference and no next stops."""
     position, loiter = _item_position(item, origin, heights), loiter_of(item)
     radius = (loiter or Loiter(0.0)).radius
     return LandingStart(
         *(item.seq, position, position, loiter is not None, radius),
-        lands=item.command in LANDINGS,
+        is_landing=item.command in LANDINGS,
         pass_by=pass_by_distance(item),
-        home_up=heights.known_home(),
+        home_up=heights.known_home_altitude(),
     )
 
 
@@ -298,7 +311,7 @@ def landing_positions(mission: Mission, origin: GeoOrigin) -> tuple[tuple[int, f
     for item in mission.items:
         if item.command in LANDINGS and item.has_position:
             stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
-            east, north = on_map(mission.source, (stop,), origin)[0].tolist()
+            east, north = project_stops(mission.source, (stop,), origin)[0].tolist()
             positions.append((item.seq, float(east), float(north)))
     return tuple(positions)
 
@@ -319,7 +332,7 @@ def rally_stops(mission: Mission) -> tuple[RoutePoint, ...]:
 
 
 def _place_return_points(
-    mission: Mission, home: Home, origin: GeoOrigin, heights: "_Heights"
+    mission: Mission, home: Home, origin: GeoOrigin, heights: "_AltitudeConverter"
 ) -> tuple[ReturnPoint, ...]:
     """Return home and the rally points on the map.
 
@@ -330,7 +343,7 @@ def _place_return_points(
     return_points = [launch]
     stops = rally_stops(mission)
     numbers = [number for number, item in enumerate(mission.rally, 1) if item.has_position]
-    rally_positions = on_map(mission.source, stops, origin).tolist()
+    rally_positions = project_stops(mission.source, stops, origin).tolist()
     for number, stop, (point_east, point_north) in zip(numbers, stops, rally_positions, strict=True):
         # Ground stations always write a rally point's height; a point without height gets home's altitude.
         up = heights.amsl(stop, point_east, point_north, launch.up)
@@ -340,33 +353,33 @@ def _place_return_points(
 
 
 def _place_stops(
-    source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
+    source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_AltitudeConverter", vertical_legs: bool
 ) -> list[RoutePoint]:
     """Return the stops on the map; successive stops at the same position are merged."""
     notes = heights.notes
-    map_positions = on_map(source, itinerary.stops, origin)
+    map_positions = project_stops(source, itinerary.stops, origin)
     placed_stops: list[RoutePoint] = []
     for stop, (east, north) in zip(itinerary.stops, map_positions.tolist(), strict=True):
-        previous_altitude = placed_stops[-1].place[2] if placed_stops else math.nan
+        previous_altitude = placed_stops[-1].map_position[2] if placed_stops else math.nan
         placed_stop = stop.at((east, north, heights.amsl(stop, east, north, previous_altitude)))
         is_loiter_or_return = stop.loiter is not None or bool(placed_stops and placed_stops[-1].loiter is not None)
         is_loiter_or_return = is_loiter_or_return or stop.command == Command.NAV_RETURN_TO_LAUNCH
         if (
             placed_stops
             and not is_loiter_or_return
-            and math.dist(placed_stops[-1].place[:2], placed_stop.place[:2]) < SAME_PLACE
+            and math.dist(placed_stops[-1].map_position[:2], placed_stop.map_position[:2]) < SAME_POSITION_DISTANCE_M
         ):
             if vertical_legs and _is_vertical(placed_stops[-1], placed_stop):
-                placed_stops.append(stop.at(_offset_vertical_leg(placed_stops, placed_stop.place[2])))
+                placed_stops.append(stop.at(_offset_vertical_leg(placed_stops, placed_stop.map_position[2])))
                 continue
             merged_stop = _merge_stops(source, placed_stops[-1], placed_stop, notes)
-            placed_stops[-1] = merged_stop.at(placed_stops[-1].place)
+            placed_stops[-1] = merged_stop.at(placed_stops[-1].map_position)
         else:
             placed_stops.append(placed_stop)
     return placed_stops
 
 
-def on_map(source: str, stops: tuple[RoutePoint, ...], origin: GeoOrigin) -> Floats:
+def project_stops(source: str, stops: tuple[RoutePoint, ...], origin: GeoOrigin) -> Floats:
     """Return east and north of each stop, (n, 2) m.
 
     Raises MissionError, which names the item, if a stop is beyond the maximum extent of the map.
@@ -387,8 +400,8 @@ def on_map(source: str, stops: tuple[RoutePoint, ...], origin: GeoOrigin) -> Flo
     return points
 
 
-class _Heights:
-    """Conversion of heights in any frame to altitudes AMSL."""
+class _AltitudeConverter:
+    """Converter of altitudes and heights in any frame to altitudes AMSL."""
 
     def __init__(self, source: str, home: Home, origin: GeoOrigin, terrain: Terrain | None, notes: Notes) -> None:
         self.source = source
@@ -414,12 +427,13 @@ class _Heights:
             altitude = self.home_amsl() + stop.alt
         else:
             altitude = self._ground_below(stop, east, north) + stop.alt
-        if not LOWEST <= altitude <= HIGHEST:
-            allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
+        if not MIN_ALTITUDE_M <= altitude <= MAX_ALTITUDE_M:
+            allowed = f"allowed {MIN_ALTITUDE_M:.0f}..{MAX_ALTITUDE_M:.0f}"
             raise MissionError.at(self.source, _stop_name(stop), altitude, allowed, shown=f"{altitude:.1f} m AMSL")
         return altitude
 
     def _ground_below(self, stop: RoutePoint, east: float, north: float) -> float:
+        """Return the altitude of the ground below a stop, m. Raises MissionError if it is unknown."""
         terrain = self.terrain
         ground = math.nan if terrain is None else float(terrain.height(east, north))
         if math.isnan(ground):
@@ -434,11 +448,11 @@ class _Heights:
             self._home_amsl = self._find_home_amsl(self.home)
         return self._home_amsl
 
-    def touchdown(self, itinerary: Itinerary) -> float:
+    def landing_altitude(self, itinerary: Itinerary) -> float:
         """Return the altitude of the landing point, m AMSL; NaN if unknown.
 
-        A height above home is known only with terrain, with home's altitude, or if the previous stop also has a height
-        above home.
+        For a landing point with a height above home, the result is known only with terrain, with home's altitude, or
+        if the previous stop also has a height above home.
         """
         stop = itinerary.landing
         if stop is None or math.isnan(stop.alt):
@@ -459,68 +473,77 @@ class _Heights:
                 return float(self.terrain.height(east, north))
         return math.nan
 
-    def known_home(self) -> float:
+    def known_home_altitude(self) -> float:
         """Return the altitude of home, or of the ground there if home has none, m AMSL; NaN if unknown."""
         return self.ground_at_home() if math.isnan(self.home.alt) else self.home.alt
 
     def _find_home_amsl(self, home: Home) -> float:
+        """Return home's stated altitude, or the ground there, or 0; add a note if it is doubtful or not stated."""
         ground = self.ground_at_home()
         if not math.isnan(home.alt):
             if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:
                 hint = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
                     f"home is at {home.alt:.1f} m AMSL, and the ground there at {ground:.1f} m: "
-                    f"heights above home are taken from the former{hint}"
+                    f"heights above home are measured from home's altitude{hint}"
                 )
             return home.alt
         if math.isnan(ground):
             self.notes.add(
-                "no home height, and no terrain to take one from: heights above home are taken from 0 m AMSL"
+                "home has no altitude, and there is no terrain: heights above home are measured from 0 m AMSL"
             )
             return 0.0
         self.notes.add(
-            f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {ground:.1f} m AMSL"
+            f"home has no altitude: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {ground:.1f} m AMSL"
         )
         return ground
 
 
-def _is_vertical(previous: RoutePoint, new: RoutePoint) -> bool:
+def _is_vertical(previous: RoutePoint, stop: RoutePoint) -> bool:
     """Return True if a stop is straight above or below the previous stop, and is not a take-off."""
-    return abs(new.place[2] - previous.place[2]) >= SAME_PLACE and new.command not in TAKEOFFS
+    return (
+        abs(stop.map_position[2] - previous.map_position[2]) >= SAME_POSITION_DISTANCE_M
+        and stop.command not in TAKEOFFS
+    )
 
 
 def _offset_vertical_leg(stops: list[RoutePoint], up: float) -> Position:
-    """Return the last position, moved by `VERTICAL_STEP` m along its course and to the altitude ``up``, m AMSL.
+    """Return the last position, moved by `VERTICAL_LEG_LENGTH_M` m along its course and to the altitude ``up``, m AMSL.
 
     Without a course the last position is moved to the east.
     """
     course = math.pi / 2.0
     if len(stops) > 1:
-        course = float(leg_courses(np.array([stops[-2].place, stops[-1].place]))[0])
-    east, north, _ = stops[-1].place
-    return east + VERTICAL_STEP * math.sin(course), north + VERTICAL_STEP * math.cos(course), up
+        course = float(leg_courses(np.array([stops[-2].map_position, stops[-1].map_position]))[0])
+    east, north, _ = stops[-1].map_position
+    return east + VERTICAL_LEG_LENGTH_M * math.sin(course), north + VERTICAL_LEG_LENGTH_M * math.cos(course), up
 
 
-def _merge_stops(source: str, previous: RoutePoint, new: RoutePoint, notes: Notes) -> RoutePoint:
-    """Merge a stop with the previous stop at the same position, and return the merged stop."""
-    climb = new.place[2] - previous.place[2]
-    if abs(climb) >= SAME_PLACE:
+def _merge_stops(source: str, previous: RoutePoint, stop: RoutePoint, notes: Notes) -> RoutePoint:
+    """Merge a stop with the previous stop at the same position, add a note, and return the merged stop.
+
+    Raises MissionError if the stop is straight above or below the previous stop, except for a take-off.
+    """
+    climb = stop.map_position[2] - previous.map_position[2]
+    if abs(climb) >= SAME_POSITION_DISTANCE_M:
         direction = "above" if climb > 0.0 else "below"
-        if new.command not in TAKEOFFS:
+        if stop.command not in TAKEOFFS:
             raise MissionError(
-                f"{source}: {_stop_name(new)}: {abs(climb):.1f} m straight {direction}"
+                f"{source}: {_stop_name(stop)}: {abs(climb):.1f} m straight {direction}"
                 f" {_stop_name(previous)}:"
-                " no fixed wing flies that; two places must be identical, or at least 1 m apart over the ground",
+                " no fixed-wing aircraft can fly that; two positions must be identical, or at least 1 m apart over the"
+                " ground",
                 file=source,
-                field=_stop_name(new),
+                field=_stop_name(stop),
             )
-        notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", new.item)
+        notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the next leg", stop.item)
     else:
-        notes.add(f"at the place of {_stop_name(previous)}: merged with it", new.item)
-    return previous if previous.item >= 0 else new
+        notes.add(f"at the position of {_stop_name(previous)}: merged with it", stop.item)
+    return previous if previous.item >= 0 else stop
 
 
 def _stop_name(stop: RoutePoint) -> str:
+    """Return the name of a stop in messages."""
     if stop.command == Command.NAV_RALLY_POINT:
         return f"rally point {stop.item + 1}"
     return f"item {stop.item}" if stop.item >= 0 else "home"

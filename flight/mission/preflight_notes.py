@@ -21,12 +21,13 @@ from world.frames import to_map
 from world.geometry import leg_courses
 from world.scenario import Scenario
 
-# Minimum wind component in a note, m/s.
-CALM = 0.05
+# Minimum wind component that a note mentions, m/s.
+MIN_NOTED_WIND_MPS = 0.05
 # Maximum distance of a mission's home from the scenario's home without a note, m.
-HOME_APART = 50.0
-# Minimum radius about home for an RTL, m: with WP_LOITER_RAD 60, loiters of up to 260 m were flown.
-MIN_CIRCLE = 260.0
+MAX_HOME_DISTANCE_M = 50.0
+# Minimum radius about home within which the ground is checked for an RTL, m: with WP_LOITER_RAD 60, ArduPlane flew
+# loiters of up to 260 m.
+MIN_RTL_LOITER_RADIUS_M = 260.0
 # Number of rings about home on which the ground is checked.
 _RING_COUNT = 13
 # Number of directions on each ring.
@@ -45,7 +46,7 @@ def preflight_notes(
     try:
         return_targets = return_points(mission, scenario.origin, scenario.terrain)
     except MissionError as error:
-        # Rally points of another field: only an RTL would fly to them, and such an RTL is refused itself.
+        # The rally points belong to another airfield: only an RTL would fly to them, and that RTL is refused elsewhere.
         return_targets, rally_problems = (), (str(error),)
     return (
         *rally_problems,
@@ -70,7 +71,7 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
         ends.append(("landing", float(courses[-1]), route.landing_ground))
     for name, course, altitude in ends:
         tail_wind = scenario.wind.components_on_course(course, altitude)[0]
-        if tail_wind > CALM:
+        if tail_wind > MIN_NOTED_WIND_MPS:
             yield f"{name}: {tail_wind:.1f} m/s of tailwind on {round(math.degrees(course)) % 360}°"
 
 
@@ -81,10 +82,10 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
         return
     east, north = to_map(scenario.origin, home.lat_deg, home.lon_deg)
     distance = math.dist((float(east), float(north)), scenario_home[:2])
-    if distance > HOME_APART:
+    if distance > MAX_HOME_DISTANCE_M:
         yield (
-            f"the mission's home is {distance:.0f} m from the scenario's: after a launch there, "
-            "heights are relative to it"
+            f"the mission's home is {distance:.0f} m from the scenario's home: after a launch at the scenario's home, "
+            "heights are relative to the scenario's home"
         )
 
 
@@ -98,14 +99,14 @@ def _note_rally_points(
         altitude = point.up + rules.rally_height
         if altitude <= ground:
             yield (
-                f"{name} is {ground - altitude:.0f} m under the ground there:"
-                f" {altitude:.0f} m AMSL, the ground {ground:.0f} m"
+                f"{name} is {ground - altitude:.0f} m below the ground:"
+                f" {altitude:.0f} m AMSL, and the ground there {ground:.0f} m"
             )
         distance = _distance_from_path(route.waypoints, (point.east, point.north))
         if 0.0 < rules.rally_limit < distance:
             limit = f"RALLY_LIMIT_KM {rules.rally_limit / 1000.0:g}"
             yield (
-                f"{name} is {distance / 1000.0:.1f} km from the mission or more, beyond {limit}: no return flies to it"
+                f"{name} is at least {distance / 1000.0:.1f} km from the mission, beyond {limit}: no RTL flies to it"
             )
 
 
@@ -121,7 +122,7 @@ def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: R
     """Note an RTL to home whose altitude is below the ground under its loiter."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
-    radius = max(MIN_CIRCLE, abs(rules.radius))
+    radius = max(MIN_RTL_LOITER_RADIUS_M, abs(rules.radius))
     angles = np.linspace(0.0, 2.0 * math.pi, _DIRECTION_COUNT, endpoint=False)
     distances = np.linspace(0.0, radius, _RING_COUNT)[:, None]
     ground = scenario.terrain.height(
@@ -130,8 +131,8 @@ def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: R
     ground_height = float(np.nanmax(ground, initial=-math.inf)) - home[0].up
     if ground_height >= rules.height:
         yield (
-            f"a return circles home {rules.height:.0f} m over it, and the ground there is {ground_height:.0f} m over it"
-            f" within {radius:.0f} m"
+            f"an RTL loiters {rules.height:.0f} m above home, and within {radius:.0f} m of home the ground rises to"
+            f" {ground_height:.0f} m above home"
         )
 
 
@@ -177,16 +178,19 @@ def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> 
     wind = ""
     if not math.isnan(route.landing_ground):
         tail_wind = scenario.wind.components_on_course(course, route.landing_ground)[0]
-        wind = f", with {tail_wind:.1f} m/s of tailwind" if tail_wind > CALM else wind
-        wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -CALM else wind
+        wind = f", with {tail_wind:.1f} m/s of tailwind" if tail_wind > MIN_NOTED_WIND_MPS else wind
+        wind = f", against {-tail_wind:.1f} m/s of wind" if tail_wind < -MIN_NOTED_WIND_MPS else wind
     ground = "the terrain there is unknown"
     length = LandingStrip(0.0, 0.0).length
     if not any(math.isnan(slope) for slope in slopes):
         along, across = (_slope_text(slope) for slope in slopes)
-        ground = f"over {length:.0f} m around its point the ground {along} along it, and {across} to the right"
+        ground = (
+            f"over {length:.0f} m around the landing point the ground {along} in the landing direction, and {across} to"
+            " the right"
+        )
         if along == across == _LEVEL_TEXT:
-            ground = f"over {length:.0f} m around its point the ground {_LEVEL_TEXT}"
+            ground = f"over {length:.0f} m around the landing point the ground {_LEVEL_TEXT}"
         if max(abs(slope) for slope in slopes) > STEEPEST_STRIP_SLOPE:
             ground += f" ({STEEPEST_STRIP_SLOPE:.0%} is the limit for a plan's landing)"
-    strip_text = "no [landing] states its strip, so touch-down and roll-out are not judged"
+    strip_text = "the scenario has no [landing], so touch-down and roll-out are not judged"
     yield f"item {last_item}: lands on {round(math.degrees(course)) % 360}°{wind}; {ground}; {strip_text}"

@@ -14,8 +14,15 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
-from flight.mission.itinerary import UNLIMITED, Position, RoutePoint
-from flight.mission.loiter_circles import CORNER, Node, circle_corners, is_joined, on_rim, tangent_course
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S, Position, RoutePoint
+from flight.mission.loiter_circles import (
+    MAX_CORNER_ANGLE_RAD,
+    Node,
+    circle_corners,
+    is_joined,
+    point_on_circle,
+    tangent_course,
+)
 from world.geometry import wrap
 
 
@@ -54,43 +61,43 @@ class LandingStart(NamedTuple):
     """Start of a mission's landing sequence: the first navigation item after a DO_LAND_START.
 
     item: number of that mission item.
-    place: east, north, up of the item, m AMSL.
-    mark: east, north, up from which the distance to the sequence is measured: the position of DO_LAND_START, if it
-        states one.
-    circles: True if the item is a loiter.
+    position: east, north, up of the item, m AMSL.
+    reference_position: east, north, up to which the distance of the sequence is measured: the position of
+        DO_LAND_START, or of the item if DO_LAND_START states none.
+    is_loiter: True if the item is a loiter.
     radius: loiter radius, m, negative to the left; 0 if not stated.
-    lands: True if the item is the landing itself.
+    is_landing: True if the item is the landing itself.
     next_stops: the next items up to the landing; their own ``next_stops`` is empty.
     pass_by: distance that ArduPlane flies past the item, m.
     home_up: altitude of home, m AMSL, NaN if unknown.
     """
 
     item: int
-    place: Position
-    mark: Position
-    circles: bool = False
+    position: Position
+    reference_position: Position
+    is_loiter: bool = False
     radius: float = 0.0
-    lands: bool = False
+    is_landing: bool = False
     next_stops: tuple["LandingStart", ...] = ()
     pass_by: float = 0.0
     home_up: float = math.nan
 
 
 def nearest_landing_sequence(position: Position, landings: Sequence[LandingStart]) -> LandingStart | None:
-    """Return the landing sequence that ArduPlane chooses at a position (east, north, up): the nearest in 3D.
+    """Return the landing sequence that ArduPlane chooses at a position (east, north, up), or None without sequences.
 
-    Follows `AP_Mission::get_landing_sequence_start` (libraries/AP_Mission/AP_Mission.cpp). The result is None without
-    sequences.
+    ArduPlane chooses the sequence with the shortest distance in 3D (`AP_Mission::get_landing_sequence_start` in
+    libraries/AP_Mission/AP_Mission.cpp).
 
     >>> far, near = (LandingStart(k, (x, 0.0, 50.0), (x, 0.0, 50.0)) for k, x in ((8, 900.0), (12, -500.0)))
     >>> nearest_landing_sequence((0.0, 0.0, 50.0), [far, near]).item, nearest_landing_sequence((0.0, 0.0, 50.0), [])
     (12, None)
     """
-    return min(landings, key=lambda landing: math.dist(position, landing.mark), default=None)
+    return min(landings, key=lambda landing: math.dist(position, landing.reference_position), default=None)
 
 
-# Note on an RTL that continues to a landing sequence in flight, but not in the route.
-RETURN_NOT_FLOWN_ON = "the return does not continue to it"
+# End of a note on a landing sequence to which the autopilot continues after its RTL, but not the simulated flight.
+RTL_NOT_CONTINUED_TEXT = "the return does not continue to it"
 # Minimum tangent length of a turn, m; a smaller turn is omitted.
 _MIN_TANGENT_M = 1.0
 # Altitude tolerance for leaving the loiter to join the landing sequence, m.
@@ -105,10 +112,10 @@ class ReturnRules:
 
     height: height above home at the end of the RTL, m; NaN to keep the altitude of its start.
     radius: loiter radius at the end, m, negative to the left; 0 for the default radius of the aircraft.
-    climb_first: altitude gain before a turn with the full bank limit, m, even above the target; inf for the whole
+    initial_climb: altitude gain before a turn with the full bank limit, m, even above the target; inf for the whole
         altitude difference, 0 for none.
-    first_bank: bank limit during that climb, rad.
-    sink: maximum descent rate, m/s.
+    initial_climb_bank: bank limit during that climb, rad.
+    max_sink_rate: m/s.
     min_slope_height: altitude difference below which a descent is a step instead of a slope, m.
     rally_limit: maximum distance to the nearest rally point, m, beyond which the RTL goes home; 0 for no limit.
     includes_home: True if home is chosen when it is nearer than any rally point.
@@ -118,8 +125,8 @@ class ReturnRules:
     rally_height: height above a rally point's own altitude at the end of the RTL, m.
     may_use_landing: True if the RTL may go to a mission's landing, which is noted and not simulated.
     deviation_note: note on rules of the autopilot that are simulated differently; "" for none.
-    lands: "circle" if the RTL continues to a landing sequence from a loiter at home or a rally point, "straight" if it
-        flies there directly, "" if it stays in its loiter.
+    landing_join: "circle" if the RTL continues to a landing sequence from a loiter at home or a rally point, "straight"
+        if it flies to the sequence directly, "" if it stays in its loiter.
     holds_height: True if the RTL holds its altitude until it is over its target and descends in circles there, and
         climbs, if necessary, in circles at its start, as PX4 does.
 
@@ -129,9 +136,9 @@ class ReturnRules:
 
     height: float = 100.0
     radius: float = 0.0
-    climb_first: float = 0.0
-    first_bank: float = math.radians(5.0)
-    sink: float = math.inf
+    initial_climb: float = 0.0
+    initial_climb_bank: float = math.radians(5.0)
+    max_sink_rate: float = math.inf
     min_slope_height: float = 15.0
     rally_limit: float = 5000.0
     includes_home: bool = False
@@ -140,13 +147,13 @@ class ReturnRules:
     rally_height: float = 0.0
     may_use_landing: bool = False
     deviation_note: str = ""
-    lands: Literal["", "circle", "straight"] = ""
+    landing_join: Literal["", "circle", "straight"] = ""
 
 
 # Slope base that puts the target of a slope far below the ground, m, so that the slope is level.
 _LEVEL_SLOPE_BASE_M = 1e6
 # Rules for an autopilot without RTL rules: planfly's guidance flies an RTL like ArduPlane with its default parameters.
-USUAL_RULES = ReturnRules()
+DEFAULT_RETURN_RULES = ReturnRules()
 
 
 class ReturnTarget(NamedTuple):
@@ -174,16 +181,16 @@ class ReturnAbility(NamedTuple):
     """Abilities of the aircraft for the path of an RTL.
 
     turn_radius: radius of an arc at the bank limit between two courses (rad) at an altitude (m AMSL), m.
-    circle: minimum loiter radius, m.
-    climb, dive: tangents of slopes that the aircraft can hold in any direction and in turns.
+    min_loiter_radius: m.
+    climb_slope, dive_slope: steepest slopes (tangents) that the aircraft can hold in any direction and in turns.
     max_bank: rad.
     airspeed: m/s.
     """
 
     turn_radius: Callable[[float, float, float], float]
-    circle: float
-    climb: float
-    dive: float
+    min_loiter_radius: float
+    climb_slope: float
+    dive_slope: float
     max_bank: float
     airspeed: float
 
@@ -203,12 +210,13 @@ def choose_target(rules: ReturnRules, start: Position, home: ReturnPoint, rally:
     """
     home_target_altitude = start[2] if math.isnan(rules.height) else home.up + rules.height
     home_distance = _distance(start, home)
+    level_slope_base = _LEVEL_SLOPE_BASE_M if rules.holds_height else 0.0
     home_target = ReturnTarget(
         (home.east, home.north, home_target_altitude),
         "home",
         "",
         home_distance,
-        _LEVEL_SLOPE_BASE_M * rules.holds_height,
+        level_slope_base,
     )
     if not rally:
         return home_target
@@ -228,7 +236,7 @@ def choose_target(rules: ReturnRules, start: Position, home: ReturnPoint, rally:
         )
     rally_text = f"of {len(rally)} rally points" if len(rally) > 1 else "rally point"
     point = rally[index]
-    slope_base = point.base if rules.slope_to_stated_height else _LEVEL_SLOPE_BASE_M * rules.holds_height
+    slope_base = point.base if rules.slope_to_stated_height else level_slope_base
     return ReturnTarget(
         (point.east, point.north, point.up + rules.rally_height),
         name,
@@ -263,18 +271,18 @@ def rtl_note(target: ReturnTarget, rules: ReturnRules, start_altitude: float, co
     if abs(altitude_gain) < 1.0:
         altitude_text = "at"
     climb_text = ""
-    if rules.climb_first > 0.0 and not (math.isinf(rules.climb_first) and altitude_gain < -1.0):
-        bank = math.degrees(rules.first_bank)
-        first_gain = altitude_gain if math.isinf(rules.climb_first) else rules.climb_first
+    if rules.initial_climb > 0.0 and not (math.isinf(rules.initial_climb) and altitude_gain < -1.0):
+        bank = math.degrees(rules.initial_climb_bank)
+        first_gain = altitude_gain if math.isinf(rules.initial_climb) else rules.initial_climb
         climb_text = f"; banks no more than {bank:.0f} degrees before it has climbed {first_gain:.0f} m"
-        if math.isinf(rules.climb_first) and altitude_gain <= 1.0:
+        if math.isinf(rules.initial_climb) and altitude_gain <= 1.0:
             climb_text = f"; banks no more than {bank:.0f} degrees until it is above that height"
         if first_gain > max(0.0, altitude_gain):
             climb_text += ", even above that height"
     end_text = (
-        f"from its circle on to {continuation}"
+        f"then from the loiter to {continuation}"
         if continuation
-        else f"circles for {UNLIMITED:.0f} s; the mission ends there"
+        else f"circles for {ENDLESS_LOITER_TIME_S:.0f} s; the mission ends there"
     )
     return (
         f"NAV_RETURN_TO_LAUNCH: to {target.name}, {_distance_text(target.distance)} away{reason}, {altitude_text}"
@@ -294,22 +302,27 @@ def rtl_waypoints(
 
     previous_points: route points up to the RTL, which starts at the last point on the course of the last leg.
     stop: itinerary stop of the RTL.
-    next_position: position to which the RTL continues once the loiter has reached its altitude; None if it stays.
+    next_position: position to which the RTL continues once the loiter has reached its altitude; None if the RTL stays
+        in the loiter.
 
-    The turn takes the shorter direction. Altitudes of a descent lie on the straight slope from the start of the turn to
-    the target, by the position along that line, no steeper than the aircraft can fly; a climb or a small descent begins
-    at once. The aircraft covers the remaining altitude difference in the loiter,
-    which then lasts `flight.mission.itinerary.UNLIMITED` s.  A climb before the turn does not depend on the altitude of
-    the target.
+    The turn takes the shorter direction. A descent follows the straight slope from the start of the turn to the target,
+    but is no steeper than the aircraft can fly; a climb or a small descent begins at once. The aircraft covers the
+    remaining altitude difference in the loiter, which then lasts
+    `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`. A climb before the turn does not depend on the altitude of the
+    target.
     """
-    start = previous_points[-1].place
-    course = _course(previous_points[-2].place, start) if len(previous_points) > 1 else _course(start, target.position)
-    radius = math.copysign(max(abs(rules.radius), ability.circle), rules.radius)
+    start = previous_points[-1].map_position
+    course = (
+        _course(previous_points[-2].map_position, start)
+        if len(previous_points) > 1
+        else _course(start, target.position)
+    )
+    radius = math.copysign(max(abs(rules.radius), ability.min_loiter_radius), rules.radius)
     circle = Node(stop, *target.position, radius)
-    dive = min(ability.dive, rules.sink / ability.airspeed)
+    dive = min(ability.dive_slope, rules.max_sink_rate / ability.airspeed)
     builder = _ReturnBuilder(circle, target.slope_base, rules.min_slope_height, ability, dive, start, next_position)
     if _distance(start, target.position) <= abs(radius) + _MIN_TANGENT_M:
-        # The return starts inside the loiter: fly straight on to its circle.
+        # The RTL starts inside its loiter: fly straight on to the circle.
         builder.add_loiter(*_rim_point_ahead(start, course, circle))
         return builder.points
     course = builder.add_gentle_turn(course, rules)
@@ -344,28 +357,33 @@ class _ReturnBuilder:
 
     @property
     def _is_step(self) -> bool:
+        """True if the descent is too small for a slope and is flown at once."""
         return abs(self._slope_start[2] - self._circle.up + self._slope_base) < self._min_slope_height
 
     @property
-    def _height_difference(self) -> float:
+    def _altitude_difference(self) -> float:
+        """Altitude of the loiter above the current position, m."""
         return self._circle.up - self._position[2]
 
     def add_gentle_turn(self, course: float, rules: ReturnRules) -> float:
-        """Add the arc at the bank limit of the first climb, and return the course at its end."""
-        first_climb = max(0.0, self._height_difference) if math.isinf(rules.climb_first) else rules.climb_first
+        """Add the turn at the bank limit of the initial climb, and return the course at its end.
+
+        The turn ends where the climb or the turn to the target ends. Without an initial climb nothing is added.
+        """
+        first_climb = max(0.0, self._altitude_difference) if math.isinf(rules.initial_climb) else rules.initial_climb
         if first_climb <= 0.0:
             return course
         radius = self._ability.turn_radius(course, course + math.pi, self._position[2])
-        radius *= math.tan(self._ability.max_bank) / math.tan(max(1e-3, rules.first_bank))
+        radius *= math.tan(self._ability.max_bank) / math.tan(max(1e-3, rules.initial_climb_bank))
         arc_to_tangent = self._turn_to_tangent(course, radius)
         if arc_to_tangent is None:
             return course
         node, full_sweep, tangent = arc_to_tangent
-        sweep = min(full_sweep, first_climb / self._ability.climb / radius)
+        sweep = min(full_sweep, first_climb / self._ability.climb_slope / radius)
         self._first_climb_altitude = self._position[2] + first_climb
         self._add_arc(node, course, sweep)
-        end_course = course + math.copysign(sweep, node.turn)
-        self._add_waypoint(*on_rim(node, end_course), 0.0)
+        end_course = course + math.copysign(sweep, node.signed_radius)
+        self._add_waypoint(*point_on_circle(node, end_course), 0.0)
         if sweep == full_sweep and self._first_climb_altitude > self._circle.up:
             self._add_climb_leg(tangent)
         self._first_climb_altitude, self._slope_start = -math.inf, self._position
@@ -373,8 +391,8 @@ class _ReturnBuilder:
 
     def _add_climb_leg(self, course: float) -> None:
         """Add the straight leg to the end of the first climb, or to the loiter if that is nearer."""
-        east, north = on_rim(self._circle, course)
-        length = (self._first_climb_altitude - self._position[2]) / self._ability.climb
+        east, north = point_on_circle(self._circle, course)
+        length = (self._first_climb_altitude - self._position[2]) / self._ability.climb_slope
         length = min(length, math.hypot(east - self._position[0], north - self._position[1]) - _MIN_TANGENT_M)
         if length > _MIN_TANGENT_M:
             self._add_waypoint(
@@ -391,22 +409,22 @@ class _ReturnBuilder:
             leg_course = tangent_course(point, self._circle)
         else:
             node, sweep, leg_course = arc
-            if abs(node.turn) * math.tan(0.5 * min(sweep, CORNER)) > _MIN_TANGENT_M:
+            if abs(node.signed_radius) * math.tan(0.5 * min(sweep, MAX_CORNER_ANGLE_RAD)) > _MIN_TANGENT_M:
                 self._add_arc(node, course, sweep)
-                self._add_waypoint(*on_rim(node, leg_course), 0.0)
+                self._add_waypoint(*point_on_circle(node, leg_course), 0.0)
             else:
                 leg_course = tangent_course(point, self._circle)
         self._add_slope_break(leg_course)
-        self.add_loiter(*on_rim(self._circle, leg_course), leg_course)
+        self.add_loiter(*point_on_circle(self._circle, leg_course), leg_course)
 
     def _add_slope_break(self, leg_course: float) -> None:
         """Add a waypoint on the straight leg where a climb or step ends, or where the descent starts."""
-        join_point = on_rim(self._circle, leg_course)
+        join_point = point_on_circle(self._circle, leg_course)
         leg_length = math.hypot(join_point[0] - self._position[0], join_point[1] - self._position[1])
-        if self._height_difference > 0.0:
-            break_distance = self._height_difference / self._ability.climb
+        if self._altitude_difference > 0.0:
+            break_distance = self._altitude_difference / self._ability.climb_slope
         elif self._is_step:
-            break_distance = -self._height_difference / self._dive_slope
+            break_distance = -self._altitude_difference / self._dive_slope
         else:
             descent = self._slope_start[2] - self._circle.up
             break_fraction = self._slope_base / max(1e-6, descent + self._slope_base)
@@ -423,22 +441,27 @@ class _ReturnBuilder:
         """Add the leg to a point on the circle, and the loiter until its altitude is reached and its time is over."""
         if math.hypot(east - self._position[0], north - self._position[1]) > _MIN_TANGENT_M:
             self._add_waypoint(east, north, 0.0)
-        radius = abs(self._circle.turn)
-        altitude_change = self._height_difference
+        radius = abs(self._circle.signed_radius)
+        altitude_change = self._altitude_difference
         spiral_angle = (
-            abs(altitude_change) / (self._ability.climb if altitude_change > 0.0 else self._dive_slope) / radius
+            abs(altitude_change) / (self._ability.climb_slope if altitude_change > 0.0 else self._dive_slope) / radius
         )
         if self._next_position is not None:
             self._add_exit(
                 course, spiral_angle if abs(altitude_change) > _LANDING_JOIN_TOLERANCE_M else 0.0, self._next_position
             )
             return
-        sweep = spiral_angle + max(2.0 * math.pi, UNLIMITED * self._ability.airspeed / radius)
+        sweep = spiral_angle + max(2.0 * math.pi, ENDLESS_LOITER_TIME_S * self._ability.airspeed / radius)
         self._add_circle(course, sweep)
 
     def _add_circle(self, course: float, sweep: float) -> None:
+        """Add the loiter from its entry course (rad) through an angle (rad)."""
         self._add_arc(self._circle, course, sweep, on_circle=True)
-        self._add_waypoint(*on_rim(self._circle, course + math.copysign(sweep, self._circle.turn)), 0.0, on_circle=True)
+        self._add_waypoint(
+            *point_on_circle(self._circle, course + math.copysign(sweep, self._circle.signed_radius)),
+            0.0,
+            on_circle=True,
+        )
 
     def _add_exit(self, course: float, spiral_angle: float, next_position: Position) -> None:
         """Add the loiter until its altitude is reached, and the turn towards the next position.
@@ -447,14 +470,14 @@ class _ReturnBuilder:
         """
         if spiral_angle > 0.0:
             self._add_circle(course, spiral_angle)
-            course += math.copysign(spiral_angle, self._circle.turn)
+            course += math.copysign(spiral_angle, self._circle.signed_radius)
         self._circle = Node(self._stop, next_position[0], next_position[1], self._position[2])
         radius = self._ability.turn_radius(course, _course(self._position, next_position), self._position[2])
         arc = self._turn_to_tangent(course, radius)
-        if arc is not None and radius * math.tan(0.5 * min(arc[1], CORNER)) > _MIN_TANGENT_M:
+        if arc is not None and radius * math.tan(0.5 * min(arc[1], MAX_CORNER_ANGLE_RAD)) > _MIN_TANGENT_M:
             node, sweep, exit_course = arc
             self._add_arc(node, course, sweep, on_circle=True)
-            self._add_waypoint(*on_rim(node, exit_course), 0.0, on_circle=True)
+            self._add_waypoint(*point_on_circle(node, exit_course), 0.0, on_circle=True)
 
     def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
         """Return the circle, angle and final course of the arc to a tangent of the target's loiter.
@@ -471,6 +494,7 @@ class _ReturnBuilder:
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
 
     def _turn_on_side(self, course: float, signed_radius: float) -> tuple[Node, float, float] | None:
+        """Return `_turn_to_tangent` for a turn to one side: to the right if the radius is positive."""
         east, north, up = self._position
         node = Node(
             self._stop,
@@ -485,15 +509,16 @@ class _ReturnBuilder:
         return node, (math.copysign(1.0, signed_radius) * (tangent - course)) % (2.0 * math.pi), tangent
 
     def _add_arc(self, node: Node, course: float, sweep: float, *, on_circle: bool = False) -> None:
+        """Add the corners of an arc; ``on_circle`` is True for an arc of the loiter, where no slope applies."""
         for east, north in circle_corners(node, course, sweep):
-            self._add_waypoint(east, north, abs(node.turn), on_circle=on_circle)
+            self._add_waypoint(east, north, abs(node.signed_radius), on_circle=on_circle)
 
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
         """Add a waypoint at the altitude of the RTL at this position."""
         distance = math.hypot(east - self._position[0], north - self._position[1])
         altitude, climb_altitude = self._position[2], max(self._circle.up, self._first_climb_altitude)
         if climb_altitude >= altitude:
-            altitude = min(climb_altitude, altitude + self._ability.climb * distance)
+            altitude = min(climb_altitude, altitude + self._ability.climb_slope * distance)
         else:
             target_altitude = self._circle.up if on_circle else self._slope_altitude(east, north)
             altitude = max(min(altitude, target_altitude), altitude - self._dive_slope * distance)
@@ -527,21 +552,23 @@ def _rim_point_ahead(position: Position, course: float, circle: Node) -> tuple[f
         max(
             0.0,
             distance_past_center * distance_past_center
-            + circle.turn * circle.turn
+            + circle.signed_radius * circle.signed_radius
             - offset_east * offset_east
             - offset_north * offset_north,
         )
     )
     east, north = position[0] + distance * math.sin(course), position[1] + distance * math.cos(course)
     bearing = math.atan2(east - circle.east, north - circle.north)
-    return east, north, bearing + math.copysign(0.5 * math.pi, circle.turn)
+    return east, north, bearing + math.copysign(0.5 * math.pi, circle.signed_radius)
 
 
 def _course(a: Position, b: Position) -> float:
+    """Return the course from a to b, rad."""
     return math.atan2(b[0] - a[0], b[1] - a[1])
 
 
 def _distance(a: Position, b: Position | ReturnPoint) -> float:
+    """Return the horizontal distance, m."""
     return math.hypot(b[0] - a[0], b[1] - a[1])
 
 

@@ -14,18 +14,25 @@ from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, OVER_TERRAIN, PLACES, Command, Mission, Notes, command_name
 from flight.mission.itinerary import NEVER_REACHED, Itinerary, OpenItem, RoutePoint, loiter_of
 from flight.mission.loiter_circles import (
-    PLAIN_SLOPE,
-    USUAL_LOITERS,
+    DEFAULT_LOITER_RULES,
+    DEFAULT_SPIRAL_SLOPE,
+    DefaultRadius,
     LoiterRules,
-    OwnRadius,
     SpiralSlopes,
     UnjoinedStop,
     lay_out_waypoints,
 )
-from flight.mission.placing import HIGHEST, LOWEST, SAME_PLACE, PlacedLanding, PlacedMission, place_stops
+from flight.mission.placing import (
+    MAX_ALTITUDE_M,
+    MIN_ALTITUDE_M,
+    SAME_POSITION_DISTANCE_M,
+    PlacedLanding,
+    PlacedMission,
+    place_stops,
+)
 from flight.mission.return_path import (
-    RETURN_NOT_FLOWN_ON,
-    USUAL_RULES,
+    DEFAULT_RETURN_RULES,
+    RTL_NOT_CONTINUED_TEXT,
     ReturnAbility,
     ReturnCircle,
     ReturnRules,
@@ -55,21 +62,22 @@ class Route:
     fly_over: (w,) bool, True if the path goes through the waypoint and turns behind it, False if it turns on an arc
         that passes the waypoint.
     items: (w,) seq of the mission item, -1 for a point without an item.
-    started: sentence on where and how the flight starts.
+    started: description of the flight's start.
     notes: parts that cannot be flown as written, with item numbers.
-    arcs: (w,) turn radius, m, 0 for the radius at the bank limit; a loiter consists of the corners of a polygon around
-        its circle, all of one item, each with the circle's radius.
-    endless: seq of a jump that repeats the last loop without end, -1 for none.
+    arcs: (w,) turn radius, m, 0 for the radius at the bank limit. A loiter consists of the corners of a polygon around
+        its circle, all of the loiter's item, each with the circle's radius.
+    endless_jump: seq of a jump that repeats the last loop without end, -1 for none.
     takeoff_ground, landing_ground: altitude of the ground at take-off and at the landing point, m, above which the
         flight starts and ends; NaN without such a point or if unknown.
-    return_from: index of the waypoint at which an RTL starts, -1 for none; the waypoints from there to `return_until`
-        stand for the path that the autopilot chooses itself.
-    return_to: loiter in which the RTL ends, or which it leaves for a landing sequence; None without an RTL.
-    straight_to: index of the waypoint at which an RTL joins a landing sequence, -1 for none; the autopilot flies there
-        from its position, along no line.
+    rtl_start: index of the waypoint at which an RTL starts, -1 for none; the waypoints from there to `rtl_end`
+        represent the path that the autopilot chooses.
+    rtl_loiter: loiter at the end of the RTL, which may continue to a landing sequence; None without an RTL.
+    direct_landing_start: index of the waypoint at which an RTL without a loiter joins a landing sequence, -1 for none;
+        the leg to it starts at the aircraft and follows no line.
     stops: (w,) number of the waypoint's stop, never decreasing: a jump back leads to another stop of the same item. By
         default, successive waypoints of one item are one stop.
-    unjoined: stops of the autopilot that the waypoints lack, because no tangent joins them to a circle.
+    unjoined_stops: stops that the autopilot flies to, but that the waypoints lack, because no tangent joins them to a
+        circle.
     open_items: items that change the flight path in a way that is not simulated.
     above_ground: (w,) height above ground held along the leg to the waypoint, m; NaN for a straight leg.
     min_ground_speed: (w,) ground speed for which ArduPlane raises its airspeed on the leg to the waypoint, m/s; 0 or
@@ -85,14 +93,14 @@ class Route:
     started: str
     notes: tuple[str, ...] = ()
     arcs: Floats = field(default_factory=lambda: np.zeros(0))
-    endless: int = -1
+    endless_jump: int = -1
     takeoff_ground: float = math.nan
     landing_ground: float = math.nan
-    return_from: int = -1
-    return_to: ReturnCircle | None = None
-    straight_to: int = -1
+    rtl_start: int = -1
+    rtl_loiter: ReturnCircle | None = None
+    direct_landing_start: int = -1
     stops: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    unjoined: tuple[UnjoinedStop, ...] = ()
+    unjoined_stops: tuple[UnjoinedStop, ...] = ()
     open_items: tuple[OpenItem, ...] = ()
     above_ground: Floats = field(default_factory=lambda: np.zeros(0))
     min_ground_speed: Floats = field(default_factory=lambda: np.zeros(0))
@@ -130,14 +138,12 @@ class Route:
         return np.maximum(self.stops[1:] - 1, 0)
 
     @property
-    def return_until(self) -> int:
-        """Index of the waypoint at which an RTL joins the landing sequence; the number of waypoints otherwise."""
-        if self.return_from < 0:
+    def rtl_end(self) -> int:
+        """Index of the waypoint at which an RTL joins the landing sequence, or the number of waypoints."""
+        if self.rtl_start < 0:
             return len(self.waypoints)
-        is_return_item = self.items[self.return_from + 1 :] == self.items[self.return_from + 1]
-        return (
-            self.return_from + 1 + int(np.argmin(is_return_item)) if not is_return_item.all() else len(self.waypoints)
-        )
+        is_return_item = self.items[self.rtl_start + 1 :] == self.items[self.rtl_start + 1]
+        return self.rtl_start + 1 + int(np.argmin(is_return_item)) if not is_return_item.all() else len(self.waypoints)
 
 
 def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
@@ -152,7 +158,7 @@ def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
         final_item is not None
         and final_item.command in PLACES
         and loiter_of(final_item) is None
-        and route.return_to is None
+        and route.rtl_loiter is None
     )
 
 
@@ -177,12 +183,12 @@ def part_of_route(route: Route, first: int, last: int) -> Route:
         arcs=route.arcs[waypoint_range],
         stops=route.stops[waypoint_range],
         **{name: getattr(route, name)[waypoint_range] for name in ROUTE_COLUMNS_WITH_NAN},
-        endless=-1,
+        endless_jump=-1,
         takeoff_ground=route.takeoff_ground if first == 0 else math.nan,
         landing_ground=route.landing_ground if last == route.legs else math.nan,
-        return_from=max(0, route.return_from - first) if 0 <= route.return_from < last else -1,
-        return_to=route.return_to if route.return_from < last else None,
-        straight_to=route.straight_to - first if first < route.straight_to <= last else -1,
+        rtl_start=max(0, route.rtl_start - first) if 0 <= route.rtl_start < last else -1,
+        rtl_loiter=route.rtl_loiter if route.rtl_start < last else None,
+        direct_landing_start=route.direct_landing_start - first if first < route.direct_landing_start <= last else -1,
     )
 
 
@@ -201,15 +207,15 @@ class RouteRules(NamedTuple):
     acceptance_limit: maximum acceptance radius that the autopilot accepts from an item, m.
     """
 
-    returns: ReturnRules = USUAL_RULES
-    loiters: LoiterRules = USUAL_LOITERS
+    returns: ReturnRules = DEFAULT_RETURN_RULES
+    loiters: LoiterRules = DEFAULT_LOITER_RULES
     reads_as_px4: bool = False
     turn_distance: Callable[[float, float], float] | None = None
     acceptance_limit: float = math.inf
 
 
 # Rules of guidance on the fly-by path.
-USUAL_ROUTE_RULES = RouteRules()
+DEFAULT_ROUTE_RULES = RouteRules()
 # Sharpest turn that guidance on the fly-by path does not fly over, rad: at 150 degrees the fly-by arc starts 3.7 radii
 # before the waypoint and passes 2.9 radii from it, and at 180 degrees it never comes near.
 SHARPEST_FLY_BY_RAD = math.radians(150.0)
@@ -274,7 +280,7 @@ def fly_over_waypoints(
 # Straight lead-in and lead-out legs that give a route the start and end courses of its scenario.
 
 # Length of these legs beyond the turn's tangent, m, on which the aircraft becomes level and steady on course.
-END_LEG_LENGTH = 100.0
+END_LEG_LENGTH_M = 100.0
 # Tolerance within which an end of the route is at the scenario's start or destination, m.
 _SAME_END_M = 1.0
 # Course difference below which no turn is needed, rad.
@@ -285,7 +291,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     """Return a route that starts on the scenario's start course and ends on its destination course.
 
     A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent plus
-    `END_LEG_LENGTH`. The turn onto the first leg, or off the last, is therefore flown and judged like any other. A
+    `END_LEG_LENGTH_M`. The turn onto the first leg, or off the last, is therefore flown and judged like any other. A
     route that ends elsewhere, or whose scenario states no course, is unchanged.
 
     >>> from types import SimpleNamespace
@@ -314,7 +320,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     if lead_in is not None:
         length = math.dist(lead_in[:2], points[0][:2])
         started += f"; on the scenario's start course, from a lead-in leg of {length:.0f} m"
-    # Acceptance radii at the ends of the mission do not apply to turns that it does not have.
+    # The mission's acceptance radii at its ends do not apply to the turns that the lead legs add there.
     acceptance = np.array(route.acceptance)
     acceptance[:lead_in_count], acceptance[len(acceptance) - lead_out_count :] = 0.0, 0.0
     all_points = [point for point in (lead_in, *points, lead_out) if point is not None]
@@ -339,39 +345,40 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
             ]
         ),
         started=started,
-        return_from=route.return_from + (lead_in_count if route.return_from >= 0 else 0),
-        straight_to=route.straight_to + (lead_in_count if route.straight_to >= 0 else 0),
+        rtl_start=route.rtl_start + (lead_in_count if route.rtl_start >= 0 else 0),
+        direct_landing_start=route.direct_landing_start + (lead_in_count if route.direct_landing_start >= 0 else 0),
     )
 
 
 def _lead_point(
     point: np.ndarray, course: float, leg_course: float, limits: Limits, end_sign: float
 ) -> np.ndarray | None:
-    """Return the outer end of the lead-in (end_sign -1) or lead-out leg (end_sign 1), or None if no turn is needed.
+    """Return the outer end of a lead-in or lead-out leg, or None if no turn is needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course there, rad.
     leg_course: course of the route's first or last leg, rad.
+    end_sign: -1 for a lead-in, 1 for a lead-out.
     """
     turn = abs(float(wrap(course - leg_course)))
     if turn < _MIN_COURSE_CHANGE_RAD:
         return None
     radius = limits.turn_radius(*((course, leg_course) if end_sign < 0.0 else (leg_course, course)), float(point[2]))
-    # A reversal has no tangent; twice the radius shows it as a sharp corner.
+    # A reversal has an infinite tangent length; with twice the radius it becomes a sharp corner.
     tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
-    step = end_sign * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
+    step = end_sign * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH_M)
     return point + step * np.array([math.sin(course), math.cos(course), 0.0])
 
 
 # ----------------------------------------------------------------------
-# From the stops of a mission to its route, with loiters and spirals that the aircraft can fly.
+# The route through the stops of a mission, with loiters and spirals that the aircraft can fly.
 
-# Default loiter radius, if the aircraft can turn more tightly by the margin below, m: PX4's default.
-DEFAULT_RADIUS = 80.0
-# Minimum ratio of the default loiter radius to the radius of the tightest turn.
+# Default loiter radius, m: PX4's default; an aircraft that cannot turn tightly enough has a larger one.
+DEFAULT_LOITER_RADIUS_M = 80.0
+# Minimum ratio of the default loiter radius to the radius of the aircraft's tightest turn.
 LOITER_RADIUS_MARGIN = 1.1
 # Fraction of the aircraft's slope limits in straight flight at which a spiral climbs and descends.
-SPIRAL_SHARE = 0.6
+SPIRAL_SLOPE_FRACTION = 0.6
 
 
 def make_route(
@@ -381,7 +388,7 @@ def make_route(
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
-    rules: RouteRules = USUAL_ROUTE_RULES,
+    rules: RouteRules = DEFAULT_ROUTE_RULES,
 ) -> Route:
     """Return the route of a mission on the map about ``origin``: `place_stops`, then `route_through_stops`.
 
@@ -394,8 +401,9 @@ def make_route(
     rules: rules by which the autopilot flies a route.
 
     Without a take-off item the route starts at the first position item; with a take-off item, over home at the altitude
-    of that item. Every leg has a horizontal length of at least `flight.mission.placing.SAME_PLACE`. Raises
-    MissionError, which names the item, if a stop cannot be placed, or if the mission has fewer than two positions.
+    of that item. Every leg has a horizontal length of at least `flight.mission.placing.SAME_POSITION_DISTANCE_M`.
+    Raises MissionError, which names the item, if a stop cannot be placed, or if the mission has fewer than two
+    positions.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
@@ -416,7 +424,7 @@ def route_through_stops(
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
-    rules: RouteRules = USUAL_ROUTE_RULES,
+    rules: RouteRules = DEFAULT_ROUTE_RULES,
 ) -> Route:
     """Return the route through the placed stops of a mission; arguments as for `make_route`.
 
@@ -433,20 +441,20 @@ def route_through_stops(
     all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else placed_mission.stops
     read = partial(_read_stops, default_airspeed, reads_as_px4)
     placed_stops = read(all_stops, 0)
-    return_stop = placed_stops.pop() if placed_mission.itinerary.returns else None
+    return_stop = placed_stops.pop() if placed_mission.itinerary.ends_with_rtl else None
     direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
     if direct_landing is not None:
         placed_stops += read(direct_landing.stops, len(all_stops))
     lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
     points, unjoined = lay_out(placed_stops)
-    _note_circles(placed_mission.itinerary, placed_stops, loiter_rules, notes)
+    _note_unsimulated_loiters(placed_mission.itinerary, placed_stops, loiter_rules, notes)
     landing, return_fields = direct_landing, dict[str, Any]()
     if return_stop is not None and direct_landing is None:
         return_fields, landing = _append_return(placed_mission, return_stop, points, return_rules, limits, notes)
         if landing is not None:
             points += lay_out(read(landing.stops, len(all_stops)))[0]
     _check_point_count(mission.source, len(points))
-    waypoints, arcs = np.array([point.place for point in points]), np.array([point.arc for point in points])
+    waypoints, arcs = np.array([point.map_position for point in points]), np.array([point.arc for point in points])
     airspeed = np.array([point.airspeed for point in points[1:]])
     acceptance = np.minimum([point.acceptance for point in points], acceptance_limit)
     is_missed = fly_over_waypoints(waypoints, airspeed, acceptance, limits, turn_distance)
@@ -461,12 +469,13 @@ def route_through_stops(
         notes=_route_notes(placed_mission.itinerary, landing, reads_as_px4) + placed_mission.notes + notes.lines(),
         arcs=arcs,
         stops=np.cumsum([False, *(a.stop != b.stop for a, b in pairwise(points))]),
-        straight_to=-1 if landing is None else [point.item for point in points].index(landing.stops[0].item),
-        endless=placed_mission.itinerary.endless,
+        direct_landing_start=-1 if landing is None else [point.item for point in points].index(landing.stops[0].item),
+        endless_jump=placed_mission.itinerary.endless_jump,
         takeoff_ground=placed_mission.takeoff_ground,
         landing_ground=placed_mission.landing_ground if landing is None else landing.ground,
         **_columns_with_nan(points, placed_mission.home_up),
-        unjoined=unjoined if loiter_rules.steers_to_center else (),  # An autopilot that flies on tangents omits these.
+        # An autopilot that flies on tangents omits these stops.
+        unjoined_stops=unjoined if loiter_rules.steers_to_center else (),
         open_items=_open_items(placed_mission.itinerary, landing, reads_as_px4),
         **return_fields,
     )
@@ -492,7 +501,7 @@ def _height_above_ground(stop: RoutePoint) -> float:
 def _check_point_count(source: str, point_count: int) -> None:
     """Raise MissionError if a route has fewer than two points."""
     if point_count < 2:
-        message = f"{source}: {point_count} place to fly to: expected at least two different ones"
+        message = f"{source}: {point_count} position to fly to: expected at least two different positions"
         raise MissionError(message, file=source)
 
 
@@ -514,7 +523,9 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
 def _lay_out_waypoints(
     source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[RoutePoint]
 ) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
-    return lay_out_waypoints(source, stops, notes, _make_own_radius(limits), _make_spiral_slopes(limits), loiters)
+    return lay_out_waypoints(
+        source, stops, notes, _default_radius_function(limits), _spiral_slope_function(limits), loiters
+    )
 
 
 def _find_direct_landing(
@@ -524,13 +535,13 @@ def _find_direct_landing(
 
     stops: stops before the RTL.
     """
-    if not placed_mission.itinerary.returns or rules.lands != "straight" or not stops:
+    if not placed_mission.itinerary.ends_with_rtl or rules.landing_join != "straight" or not stops:
         return None
-    east, north, up = stops[-1].place
+    east, north, up = stops[-1].map_position
     landing = _find_landing(placed_mission, (east, north, up), notes)
     if landing is None:
         return None
-    distance, seq = math.dist((east, north), landing.start.place[:2]), placed_mission.itinerary.stops[-1].item
+    distance, seq = math.dist((east, north), landing.start.position[:2]), placed_mission.itinerary.stops[-1].item
     text = f"at once to the landing sequence at item {landing.start.item}, {distance / 1000.0:.1f} km away"
     notes.add(f"{Command.NAV_RETURN_TO_LAUNCH.name}: {text}{_landing_choice_text(placed_mission)}", seq)
     return landing
@@ -539,37 +550,45 @@ def _find_direct_landing(
 def _find_landing(
     placed_mission: PlacedMission, position: tuple[float, float, float], notes: Notes
 ) -> PlacedLanding | None:
-    """Return the landing sequence that an RTL chooses at a position (m).
+    """Return the landing sequence that an RTL chooses at a position (m), or None.
 
-    Return None and add a note if the simulated RTL does not continue to that sequence.
+    If the simulated RTL does not continue to that sequence, return None and add a note.
     """
     start = nearest_landing_sequence(position, placed_mission.landing_starts)
     landing = next((landing for landing in placed_mission.landings if landing.start == start), None)
     if start is not None and landing is None:
-        reason = "begins with the landing itself" if start.lands else "does not lead to a landing"
-        text = f"the landing sequence at item {start.item} {reason}: {RETURN_NOT_FLOWN_ON}"
+        reason = "begins with the landing itself" if start.is_landing else "does not lead to a landing"
+        text = f"the landing sequence at item {start.item} {reason}: {RTL_NOT_CONTINUED_TEXT}"
         notes.add(text, placed_mission.itinerary.stops[-1].item)
     return landing
 
 
 def _landing_choice_text(placed_mission: PlacedMission) -> str:
+    """Return the number of landing sequences among which the nearest was chosen, as text; "" for a single one."""
     count = len(placed_mission.landing_starts)
     return f" (the nearest of {count}, with height differences)" if count > 1 else ""
 
 
-def _note_circles(itinerary: Itinerary, placed_stops: list[RoutePoint], loiters: LoiterRules, notes: Notes) -> None:
-    """Note the parts of the autopilot's loiters that are not simulated.
+def _note_unsimulated_loiters(
+    itinerary: Itinerary, placed_stops: list[RoutePoint], loiters: LoiterRules, notes: Notes
+) -> None:
+    """Add notes on the parts of the autopilot's loiters that are not simulated.
 
     placed_stops: stops of the mission, without an RTL.
     """
     final_stop = placed_stops[-1]
     if loiters.unflown_note and (
-        itinerary.returns or any(placed_stop.loiter is not None for placed_stop in placed_stops)
+        itinerary.ends_with_rtl or any(placed_stop.loiter is not None for placed_stop in placed_stops)
     ):
         notes.add(loiters.unflown_note)
-    if loiters.ends_in_circle and not itinerary.returns and itinerary.landing is None and final_stop.loiter is None:
+    if (
+        loiters.ends_in_circle
+        and not itinerary.ends_with_rtl
+        and itinerary.landing is None
+        and final_stop.loiter is None
+    ):
         notes.add(loiters.end_note(), final_stop.item)
-    if loiters.rtl_exit_note and itinerary.returns and final_stop.loiter is not None:
+    if loiters.rtl_exit_note and itinerary.ends_with_rtl and final_stop.loiter is not None:
         notes.add(loiters.rtl_exit_note, final_stop.item)
 
 
@@ -586,26 +605,26 @@ def _append_return(
     The landing sequence is None if the RTL stays in its loiter. Raises MissionError if the RTL's altitude is outside
     the allowed range.
     """
-    source, start = placed_mission.mission.source, points[-1].place
+    source, start = placed_mission.mission.source, points[-1].map_position
     home, *rally = placed_mission.return_points
     target = choose_target(rules, start, home, rally)
     target_altitude = target.position[2]
-    if not LOWEST <= target_altitude <= HIGHEST:
-        allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
+    if not MIN_ALTITUDE_M <= target_altitude <= MAX_ALTITUDE_M:
+        allowed = f"allowed {MIN_ALTITUDE_M:.0f}..{MAX_ALTITUDE_M:.0f}"
         location = f"item {stop.item}: return to {target.name}"
         raise MissionError.at(source, location, target_altitude, allowed, shown=f"{target_altitude:.1f} m AMSL")
-    climb_slope, dive_slope = _make_spiral_slopes(limits)(stop.airspeed, max(start[2], target_altitude))
+    climb_slope, dive_slope = _spiral_slope_function(limits)(stop.airspeed, max(start[2], target_altitude))
     ability = ReturnAbility(
         turn_radius=lambda a, b, amsl: (
-            DEFAULT_RADIUS if limits is None else limits.turn_radius(a, b, amsl, stop.airspeed)
+            DEFAULT_LOITER_RADIUS_M if limits is None else limits.turn_radius(a, b, amsl, stop.airspeed)
         ),
-        circle=_make_own_radius(limits)(stop.airspeed, target_altitude),
-        climb=climb_slope,
-        dive=dive_slope,
+        min_loiter_radius=_default_radius_function(limits)(stop.airspeed, target_altitude),
+        climb_slope=climb_slope,
+        dive_slope=dive_slope,
         max_bank=math.radians(30.0) if limits is None else limits.max_bank,
         airspeed=stop.airspeed,
     )
-    landing = _find_landing(placed_mission, target.position, notes) if rules.lands == "circle" else None
+    landing = _find_landing(placed_mission, target.position, notes) if rules.landing_join == "circle" else None
     next_text = (
         ""
         if landing is None
@@ -614,17 +633,17 @@ def _append_return(
     notes.add(rtl_note(target, rules, start[2], next_text), stop.item)
     if rules.may_use_landing and any(item.command in LANDINGS for item in placed_mission.mission.items):
         notes.add(
-            "the mission's landing is also a place to return to, which is not simulated: the "
-            f"return is to {target.name}",
+            "the autopilot may also return to the mission's landing, which is not simulated: the "
+            f"RTL goes to {target.name}",
             stop.item,
         )
     if rules.deviation_note:
         notes.add(rules.deviation_note, stop.item)
     start_index = len(points) - 1
-    next_position = None if landing is None else landing.start.place
+    next_position = None if landing is None else landing.start.position
     points += rtl_waypoints(points, stop, target, rules, ability, next_position)
-    circle = ReturnCircle(*target.position, rules.radius or ability.circle, target.slope_base)
-    return {"return_from": start_index, "return_to": circle}, landing
+    circle = ReturnCircle(*target.position, rules.radius or ability.min_loiter_radius, target.slope_base)
+    return {"rtl_start": start_index, "rtl_loiter": circle}, landing
 
 
 def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoint]:
@@ -644,12 +663,12 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
                 text = "CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"
                 notes.add(text, gate.item)
                 continue
-            start, end = np.array(previous.place), np.array(next_stop.place)
+            start, end = np.array(previous.map_position), np.array(next_stop.map_position)
             fraction = _gate_fraction(start, end, to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg))
             east, north, up = (start + fraction * (end - start)).tolist()
             is_apart = (
-                min(math.dist((east, north), leg_end.place[:2]) for leg_end in (placed_stops[-1], next_stop))
-                >= SAME_PLACE
+                min(math.dist((east, north), leg_end.map_position[:2]) for leg_end in (placed_stops[-1], next_stop))
+                >= SAME_POSITION_DISTANCE_M
             )
             if last_fraction < fraction < 1.0 and is_apart:
                 last_fraction = fraction
@@ -686,60 +705,66 @@ def _read_stops(
     ]
 
 
-# Relative difference beyond which a ground station's speed estimate is probably for another aircraft.
-FAR_SPEED = 0.2
+# Difference between a ground station's cruiseSpeed and the airspeed, as a fraction of the airspeed, beyond which
+# cruiseSpeed is probably for another aircraft.
+MAX_CRUISE_SPEED_DIFFERENCE = 0.2
 
 
 def _note_cruise_speed(mission: Mission, airspeed: float, first_stop: RoutePoint, notes: Notes) -> None:
-    """Note a cruiseSpeed other than the airspeed (m/s), if that is the airspeed to the first stop."""
+    """Add a note if a mission's cruiseSpeed differs from the default airspeed, and its first leg has that airspeed.
+
+    airspeed: default airspeed, m/s.
+    """
     if mission.cruise_speed is not None and mission.cruise_speed != airspeed and first_stop.airspeed == airspeed:
         text = (
             f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and not a "
             f"command: started at {airspeed:g} m/s"
         )
-        if abs(mission.cruise_speed - airspeed) > FAR_SPEED * airspeed:
-            text += f" (--aircraft names yours, --airspeed {mission.cruise_speed:g} flies it so)"
+        if abs(mission.cruise_speed - airspeed) > MAX_CRUISE_SPEED_DIFFERENCE * airspeed:
+            text += f" (--aircraft selects your aircraft, --airspeed {mission.cruise_speed:g} flies at that airspeed)"
         notes.add(text)
 
 
-def _make_own_radius(limits: Limits | None) -> OwnRadius:
-    """Return a function for the default loiter radius.
+def _default_radius_function(limits: Limits | None) -> DefaultRadius:
+    """Return a function that computes the default loiter radius, m.
 
-    That radius is 10 % larger than the tightest turn in the wind, rounded up to a multiple of 10 m.
+    The radius is 10 % larger than the tightest turn in the wind, rounded up to a multiple of 10 m, and at least
+    `DEFAULT_LOITER_RADIUS_M`, which applies to an unknown aircraft.
     """
 
     def radius(airspeed: float, up: float) -> float:
         if limits is None:
-            return DEFAULT_RADIUS
+            return DEFAULT_LOITER_RADIUS_M
         min_radius = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
         if not math.isfinite(min_radius):
-            return DEFAULT_RADIUS
-        return max(DEFAULT_RADIUS, math.ceil(LOITER_RADIUS_MARGIN * min_radius / 10.0) * 10.0)
+            return DEFAULT_LOITER_RADIUS_M
+        return max(DEFAULT_LOITER_RADIUS_M, math.ceil(LOITER_RADIUS_MARGIN * min_radius / 10.0) * 10.0)
 
     return radius
 
 
-def _make_spiral_slopes(limits: Limits | None) -> SpiralSlopes:
-    """Return a function for the climb and dive slopes of a spiral.
+def _spiral_slope_function(limits: Limits | None) -> SpiralSlopes:
+    """Return a function that computes the climb and dive slopes (tangents) of a spiral.
 
-    Both are a fraction of the aircraft's slope limits on the worst course of the spiral.
+    Both slopes are a fraction of the aircraft's slope limits on the worst course of the spiral.
     """
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:
         if limits is None:
-            return PLAIN_SLOPE, PLAIN_SLOPE
+            return DEFAULT_SPIRAL_SLOPE, DEFAULT_SPIRAL_SLOPE
         spiral_slopes = []
         for index, stated_limit in enumerate((limits.max_climb, limits.max_dive)):
             limit = min(limits.slopes(course, up, airspeed)[index] for course in np.arange(8) * (math.pi / 4.0))
             slope = min(limit, math.inf if stated_limit is None else stated_limit)
             # An aircraft that cannot climb gets a plain spiral, and the slope rule reports it.
-            spiral_slopes.append(SPIRAL_SHARE * math.tan(slope) if 0.0 < slope < 1.5 else PLAIN_SLOPE)
+            spiral_slopes.append(SPIRAL_SLOPE_FRACTION * math.tan(slope) if 0.0 < slope < 1.5 else DEFAULT_SPIRAL_SLOPE)
         return spiral_slopes[0], spiral_slopes[1]
 
     return slopes
 
 
 def _start_text(itinerary: Itinerary, first_stop: RoutePoint, origin: GeoOrigin, waypoints: Floats) -> str:
+    """Return a description of the flight's start: its item, position, altitude and course."""
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
     lat, lon = first_stop.lat_deg, first_stop.lon_deg
     if first_stop.loiter is not None:

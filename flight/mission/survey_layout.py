@@ -10,7 +10,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.mission.items import Command, Mission, MissionItem, command_name, is_navigation, on_grid, renumber_items
+from flight.mission.items import (
+    Command,
+    Mission,
+    MissionItem,
+    command_name,
+    is_navigation,
+    renumber_items,
+    round_to_grid,
+)
 from flight.mission.route import Route
 from flight.mission.surveys import Survey
 from world.arrays import Floats
@@ -53,15 +61,15 @@ class _Line(NamedTuple):
 class _SurveyItems(NamedTuple):
     """Indices of a survey's items in the mission's list of items.
 
-    lines: index of each line's first item, and of the item after its last one; if another item stands at the start of
-        the line, the first item is the one after it.
-    behind: index of the first item after the survey's last run.
-    before: index of the first item of the survey's first run.
+    lines: for each line, the index of its first item and the index after its last item. If the item at the line's start
+        is no NAV_WAYPOINT, the first item is the next one.
+    begin: index of the first item of the survey, with the lead-in to its first line.
+    end: index of the first item after the survey and the lead-out of its last line.
     """
 
     lines: tuple[tuple[int, int], ...]
-    before: int
-    behind: int
+    begin: int
+    end: int
 
 
 def min_turn_around(route: Route, survey: Survey) -> float:
@@ -79,10 +87,10 @@ def _lead_lengths(route: Route, survey: Survey) -> list[float]:
 def layout_obstacle(mission: Mission, route: Route, survey: Survey) -> str:
     """Return the reason why a survey's layout cannot be changed, or "" if it can be changed."""
     if any(item.command in (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG) for item in mission.items):
-        return "the mission jumps"
+        return "the mission contains jumps"
     index_by_seq = {item.seq: index for index, item in enumerate(mission.items)}
     if any(int(route.items[i]) not in index_by_seq for line in survey.lines for i in range(line.first, line.last + 1)):
-        return "a line begins or ends where no item is"
+        return "a line begins or ends at a waypoint without an item"
     items = _survey_items(mission, route, survey)
     for first, end in items.lines:
         for item in mission.items[first:end]:
@@ -119,17 +127,15 @@ def with_layout(
         lines = turned_lines
     max_lead_length = max(_lead_lengths(route, survey)) + _LEAD_LENGTH_TOLERANCE_M
     (first, _), (_, end) = items.lines[0], items.lines[-1]
-    new_items = [*mission.items[: items.before]]
+    new_items = [*mission.items[: items.begin]]
     new_items += _without_leads(
-        mission, route, mission.items[items.before : first], survey.lines[0].first, max_lead_length
+        mission, route, mission.items[items.begin : first], survey.lines[0].first, max_lead_length
     )
     for number, line in enumerate(_order_lines(lines, layout)):
         new_items += _items_with_turn_arounds(line, layout.turn_around, layout.lead_in if number == 0 else 0.0, origin)
-    new_items += _without_leads(
-        mission, route, mission.items[end : items.behind], survey.lines[-1].last, max_lead_length
-    )
+    new_items += _without_leads(mission, route, mission.items[end : items.end], survey.lines[-1].last, max_lead_length)
     # Renumber all items: two items with one number would be ambiguous.
-    numbered = [replace(item, seq=seq) for seq, item in enumerate([*new_items, *mission.items[items.behind :]], 1)]
+    numbered = [replace(item, seq=seq) for seq, item in enumerate([*new_items, *mission.items[items.end :]], 1)]
     return renumber_items(replace(mission, items=tuple(numbered)))
 
 
@@ -149,7 +155,7 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
     lines = []
     for line in survey.lines:
-        # An item merged with the line's first waypoint has the same position, such as a take-off before a waypoint.
+        # An item at the same position, such as a take-off, may have been merged with the line's first waypoint.
         first = max(
             item_index
             for item_index in range(index(line.first), index(line.first + 1))
@@ -182,11 +188,11 @@ def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
 def _without_leads(
     mission: Mission, route: Route, items: Sequence[MissionItem], end: int, max_lead_length: float
 ) -> list[MissionItem]:
-    """Return the items beyond an end of a survey, without its lead waypoints, which the new layout replaces.
+    """Return items before or after a survey, without its lead waypoints, which the new layout replaces.
 
-    end: waypoint at that end.
-
-    Waypoints beyond the length of the turn-arounds belong to the transit to the survey and are kept.
+    end: index of the waypoint at that end of the survey.
+    max_lead_length: distance from that waypoint within which a waypoint is a lead, m; more distant waypoints belong to
+        the transit and are kept.
     """
     points, waypoint_of = route.waypoints[:, :2], _waypoint_of_item(mission, route)
 
@@ -251,7 +257,7 @@ def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, or
 
 def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin) -> MissionItem:
     """Return a plain waypoint at the altitude of another item."""
-    lat, lon = (on_grid(float(value)) for value in to_geo(origin, float(position[0]), float(position[1])))
+    lat, lon = (round_to_grid(float(value)) for value in to_geo(origin, float(position[0]), float(position[1])))
     params = (0.0, 0.0, 0.0, model_item.params[3] if math.isnan(model_item.params[3]) else 0.0)
     return replace(model_item, command=int(Command.NAV_WAYPOINT), params=params, lat_deg=lat, lon_deg=lon)
 
@@ -339,7 +345,7 @@ def _move_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -
     for index, item in enumerate(items):
         if index in (waypoint_indices[0], waypoint_indices[-1]):
             lat, lon = (
-                on_grid(float(value))
+                round_to_grid(float(value))
                 for value in to_geo(origin, *ends[0 if index == waypoint_indices[0] else 1].tolist())
             )
             item = replace(item, lat_deg=lat, lon_deg=lon)

@@ -254,7 +254,7 @@ def _straight_runs(route: Route) -> list[tuple[int, int]]:
     Corners of a loiter, take-off, landing and return to launch are not runs.
     """
     courses, arcs, end = leg_courses(route.waypoints), route.arcs, len(route.waypoints) - 1
-    last = route.return_from if route.return_from >= 0 else end
+    last = route.rtl_start if route.rtl_start >= 0 else end
     has_landing, has_takeoff = math.isfinite(route.landing_ground), math.isfinite(route.takeoff_ground)
     runs, first = [], 0
     for index in range(1, last + 1):

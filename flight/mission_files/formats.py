@@ -41,7 +41,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> FileKind:
-    """Return the form that a file's suffix names. Raises MissionError for any other suffix.
+    """Return the form of a mission file by its suffix. Raises MissionError for an unknown suffix.
 
     >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
     ('plan', 'waypoints')
@@ -81,7 +81,9 @@ def read_mission(path: Path) -> Mission:
 
 
 def parse_mission(text: str, source: str) -> Mission:
-    """Read the text of a mission in either form; a `.plan` starts with a brace or bracket.
+    """Read the text of a mission as WPL 110, or as a `.plan` if it starts with a brace or bracket.
+
+    source: name of the mission in messages; a name that ends with ``.plan`` also selects a `.plan`.
 
     >>> parse_mission('{"fileType": "Plan"}', "a mission")
     Traceback (most recent call last):
@@ -96,7 +98,7 @@ def parse_mission(text: str, source: str) -> Mission:
 
 
 def read_fence(path: Path) -> tuple[MissionItem, ...]:
-    r"""Read the fence of a file: of a mission in either form, or of a list of points from older tools.
+    r"""Read the fence of a mission file in any form, or of a list of points from older tools.
 
     Other contents of the file are ignored. Raises MissionError as `read_mission` does, and if the file has no fence.
 
@@ -128,6 +130,7 @@ def mission_text(mission: Mission, kind: FileKind) -> str:
 
 
 def _read_text(path: Path) -> str:
+    """Return the text of a mission file. Raises MissionError if the file is empty or not UTF-8 text."""
     data = read_small_file(path, MAX_BYTES, "mission", MissionError)
     if not data.strip():
         raise MissionError(f"{path}: empty; expected a mission", file=path)

@@ -27,9 +27,9 @@ from flight.mission.items import (
     command_name,
     is_located,
     item_problem,
-    on_grid,
     position_problem,
     renumber_items,
+    round_to_grid,
 )
 from world.errors import MissionError
 from world.scenario_file import first_fault
@@ -53,9 +53,8 @@ _COORDINATE_TEXT = "expected latitude, longitude and altitude"
 def expand_items(items: list[Any], source: str, warnings: list[str], plans: list[SurveyPlan]) -> list[Any]:
     """Return the items of a `.plan` with each ComplexItem replaced by its simple items.
 
-    Add a warning for each replaced item.
-
-    plans: list to which the settings of its surveys are added.
+    warnings: list to which a warning is added for each replaced item.
+    plans: list to which the settings of each survey are added.
 
     Raises MissionError, naming the kind, if an item cannot be expanded. The contents of an item are checked later.
     """
@@ -105,13 +104,20 @@ def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
         and has_height
     ):
         warnings.append(
-            f"{place}: its height is not calculated yet and is taken as {height:g} m above the terrain there"
+            f"{place}: QGroundControl has not calculated its altitude: taken as {height:g} m above the terrain there"
         )
         return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
     return item
 
 
 def _transect_items(item: dict[str, Any], source: str, place: str, name: str) -> list[Any]:
+    """Return the simple items that a survey or corridor scan contains.
+
+    place: location of the item in the file, for messages.
+    name: kind of the ComplexItem.
+
+    Raises MissionError if the item contains none.
+    """
     settings = item.get("TransectStyleComplexItem")
     items = settings.get("Items") if isinstance(settings, dict) else None
     if not isinstance(items, list) or not items:
@@ -185,7 +191,13 @@ def _last_number(items: list[Any]) -> int:
 
 
 def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -> list[Any]:
-    """Return DO_LAND_START, the approach (a descending loiter or a waypoint) and LAND, as QGC sends them."""
+    """Return the items of a landing pattern as QGC sends them: DO_LAND_START, the approach, NAV_LAND.
+
+    The approach is a descending loiter or a waypoint.
+
+    place: location of the item in the file, for messages.
+    number: number of the first returned item.
+    """
 
     def read(key: str) -> list[Any] | None:
         return _read_coordinate(item, key, source, place)
@@ -227,6 +239,10 @@ def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -
 
 
 def _read_coordinate(item: dict[str, Any], key: str, source: str, place: str) -> list[Any] | None:
+    """Return latitude, longitude and altitude under a key, or None without this key.
+
+    Raises MissionError for anything but three values.
+    """
     value = item.get(key)
     if value is None:
         return None
@@ -334,7 +350,10 @@ def _check_vehicle(kind: int | None, source: str) -> None:
 
 
 def _autopilot_of(firmware: int | None, source: str) -> str:
-    """Return the autopilot that a firmwareType names, "" for none. Raises MissionError if it is unknown."""
+    """Return the name in scenarios of a firmwareType's autopilot; "" if the plan names none.
+
+    Raises MissionError for an unknown firmwareType.
+    """
     if firmware is None or firmware in _UNNAMED_FIRMWARES:
         return ""
     if firmware not in _FIRMWARES:
@@ -394,7 +413,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
 
 
 def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
-    """Check that data is a plan, before its missing keys are named, and expand its items.
+    """Raise MissionError if JSON data is no plan; otherwise expand its items in place.
 
     Return warnings and survey settings.
     """
@@ -416,9 +435,10 @@ def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
 
 
 def _read_item(item: _Item, index: int, source: str) -> MissionItem:
+    """Return a mission item; without a doJumpId its number is its index + 1. Raises MissionError if it is invalid."""
     p1, p2, p3, p4, lat, lon, alt = (math.nan if value is None else value + 0.0 for value in item.params)
     if is_located(item.command, item.frame) and position_problem(lat, lon) is None:
-        lat, lon = on_grid(lat), on_grid(lon)
+        lat, lon = round_to_grid(lat), round_to_grid(lon)
     seq = index + 1 if item.doJumpId is None else item.doJumpId
     mission_item = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
     problem = item_problem(mission_item)
@@ -428,6 +448,7 @@ def _read_item(item: _Item, index: int, source: str) -> MissionItem:
 
 
 def _read_home(values: list[float | None] | None, source: str) -> Home | None:
+    """Return the planned home, or None if it is missing or at 0, 0; a missing altitude is 0."""
     if values is None or values[0] is None or values[1] is None:
         return None
     lat, lon, alt = values[0], values[1], values[2] or 0.0
@@ -435,15 +456,22 @@ def _read_home(values: list[float | None] | None, source: str) -> Home | None:
     problem = item_problem(home_item)
     if problem is not None:
         raise MissionError(**problem.at(source, f"{source}: mission.plannedHomePosition"))
-    return Home(on_grid(lat), on_grid(lon), alt + 0.0) if home_item.has_position else None
+    return Home(round_to_grid(lat), round_to_grid(lon), alt + 0.0) if home_item.has_position else None
 
 
 def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
+    """Return the fence items of a plan. Raises MissionError for an invalid position."""
     fences: list[MissionItem] = []
 
     def add(command: Command, p1: float, point: list[float], place: str) -> None:
         item = MissionItem(
-            len(fences), int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), on_grid(point[0]), on_grid(point[1]), 0.0
+            len(fences),
+            int(command),
+            Frame.GLOBAL,
+            (p1, 0.0, 0.0, 0.0),
+            round_to_grid(point[0]),
+            round_to_grid(point[1]),
+            0.0,
         )
         problem = item_problem(item)
         if problem is not None:
@@ -465,10 +493,17 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
 
 
 def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
+    """Return the rally points of a plan. Raises MissionError for an invalid position."""
     points = []
     for number, (lat, lon, alt) in enumerate(rally.points):
         item = MissionItem(
-            number, int(Command.NAV_RALLY_POINT), Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, on_grid(lat), on_grid(lon), alt
+            number,
+            int(Command.NAV_RALLY_POINT),
+            Frame.GLOBAL_RELATIVE_ALT,
+            (0.0,) * 4,
+            round_to_grid(lat),
+            round_to_grid(lon),
+            alt,
         )
         problem = item_problem(item)
         if problem is not None:
@@ -518,10 +553,12 @@ def _altitude_mode(frame: int) -> int:
 
 
 def _altitude_modes(items: tuple[MissionItem, ...]) -> list[int]:
+    """Return the different altitude modes of the items with a position."""
     return sorted({_altitude_mode(item.frame) for item in items if is_located(item.command, item.frame)})
 
 
 def _cruise_speed(mission: Mission) -> float:
+    """Return the cruise speed to write, m/s; see `plan_file_text`."""
     if mission.cruise_speed is not None:
         return mission.cruise_speed
     for item in mission.items:

@@ -20,9 +20,9 @@ from flight.mission.items import (
     command_name,
     is_located,
     item_problem,
-    on_grid,
     position_problem,
     renumber_items,
+    round_to_grid,
 )
 from world.errors import MissionError
 from world.files import TextLine
@@ -75,7 +75,7 @@ _ALLOWED_RANGES = {
 class _Row:
     """Numbers of one line of the file."""
 
-    where: TextLine
+    location: TextLine
     current: bool
     item: MissionItem
 
@@ -130,6 +130,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
 
 
 def _parse_row(location: TextLine, line: str) -> _Row:
+    """Parse a line of twelve columns. Raises MissionError, which names the column, for an invalid line."""
     fields = line.split()
     if len(fields) != len(_COLUMNS):
         raise MissionError(
@@ -141,7 +142,7 @@ def _parse_row(location: TextLine, line: str) -> _Row:
     # A home line of Mission Planner may carry command 0.
     command = integers["command"] or (Command.NAV_WAYPOINT if integers["seq"] == 0 else 0)
     if is_located(command, integers["frame"]) and position_problem(lat, lon) is None:
-        lat, lon = on_grid(lat), on_grid(lon)
+        lat, lon = round_to_grid(lat), round_to_grid(lon)
     item = MissionItem(
         integers["seq"],
         int(command),
@@ -175,7 +176,7 @@ def _parse_number(location: TextLine, name: str, text: str) -> float:
     if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = " (a decimal comma?)" if "," in text else ""
         raise _value_error(location, name, text, _short_repr(text), f"expected a finite number{hint}")
-    # 0.0 for -0.0, which no other form of a mission keeps.
+    # Adding 0.0 turns -0.0 into 0.0, because no other form of a mission keeps the sign.
     return float(text) + 0.0
 
 
@@ -194,6 +195,7 @@ def _begins_with_home(rows: list[_Row]) -> bool:
 
 
 def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
+    """Return home, or None if the file states no valid one, and the rows of all items."""
     if not _begins_with_home(rows):
         return None, rows
     home_item = rows[0].item
@@ -203,6 +205,10 @@ def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
 
 
 def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> list[str]:
+    """Return warnings about home, numbers and positions of a file's rows.
+
+    body: rows without home.
+    """
     warnings: list[str] = []
     if all(row.item.command in _COMMANDS_WITH_OWN_FILES for row in body):
         # A fence or rally file may have a home line, as Mission Planner writes it, or none, as MAVProxy does.
@@ -212,38 +218,40 @@ def _collect_warnings(rows: list[_Row], home: Home | None, body: list[_Row]) -> 
     first = rows[0].item
     if len(body) == len(rows):
         warnings.append(
-            f"{rows[0].where}: no home line (seq 0): the mission has no home and begins with this "
+            f"{rows[0].location}: no home line (seq 0): the mission has no home and begins with this "
             "item, as in Mission Planner; QGroundControl and MAVProxy treat it as home and do "
             "not fly it"
         )
     elif first.command != Command.NAV_WAYPOINT:
         warnings.append(
-            f"{rows[0].where}: {command_name(first.command)} in the line of home (seq 0): "
+            f"{rows[0].location}: {command_name(first.command)} in the line of home (seq 0): "
             "ignored, because ground stations treat that line as home and do not fly it"
         )
     if len(body) < len(rows):
         if home is None:
-            warnings.append(f"{rows[0].where}: home at 0, 0, which is not a position: ignored; the mission has no home")
+            warnings.append(
+                f"{rows[0].location}: home at 0, 0, which is not a position: ignored; the mission has no home"
+            )
         elif first.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
             warnings.append(
-                f"{rows[0].where}: home in frame {first.frame}: its height is taken as above mean sea level"
+                f"{rows[0].location}: home in frame {first.frame}: its height is taken as above mean sea level"
             )
     numbering_text = "items are numbered by their lines, as in ground stations, and jumps use these numbers"
     seq_steps = [(following, following.item.seq - previous.item.seq) for previous, following in pairwise(rows)]
     gaps, falling = [row for row, step in seq_steps if step > 1], [row for row, step in seq_steps if step < 1]
     if gaps:
         warnings.append(
-            f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): {numbering_text}"
+            f"{gaps[0].location}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): {numbering_text}"
         )
     if falling:
         warnings.append(
-            f"{falling[0].where}: seq {falling[0].item.seq} does not rise ({len(falling)} in all): {numbering_text}"
+            f"{falling[0].location}: seq {falling[0].item.seq} does not rise ({len(falling)} in all): {numbering_text}"
         )
     unplaced = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if unplaced:
         name = command_name(unplaced[0].item.command)
         warnings.append(
-            f"{unplaced[0].where}: {name} at 0, 0, which is not a position ({len(unplaced)} such items in all)"
+            f"{unplaced[0].location}: {name} at 0, 0, which is not a position ({len(unplaced)} such items in all)"
         )
     return warnings
 
@@ -283,6 +291,7 @@ def _file_text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
 
 
 def _item_line(item: MissionItem, *, current: bool) -> str:
+    """Return the line of an item; ``current`` marks the item at which a mission starts."""
     numbers = [_format_decimal(value, 0) for value in item.params]
     position = [_format_decimal(item.lat_deg, 8), _format_decimal(item.lon_deg, 8), _format_decimal(item.alt, 3)]
     integers = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
@@ -302,6 +311,7 @@ def _format_decimal(value: float, places: int) -> str:
 
 
 def _short_repr(text: str) -> str:
+    """Return text in quotes, shortened to 40 characters."""
     return repr(text if len(text) <= 40 else text[:37] + "...")
 
 
@@ -317,7 +327,7 @@ MAX_POINTS = 255
 
 
 def is_point_list(text: str) -> bool:
-    r"""Return True if a fence's text begins with a number, as no other form of a fence does.
+    r"""Return True if a fence's text begins with a number: only the older tools' list of points does.
 
     >>> is_point_list("# saved\n36.5 -84.2\n"), is_point_list("QGC WPL 110\n")
     (True, False)
@@ -361,6 +371,7 @@ def _content_lines(text: str) -> list[tuple[int, str]]:
 
 
 def _parse_point(location: TextLine, line: str) -> tuple[float, float]:
+    """Parse a latitude and a longitude, degrees. Raises MissionError for an invalid line."""
     try:
         lat, lon = (float(part) for part in line.split())
     except ValueError:
@@ -371,4 +382,4 @@ def _parse_point(location: TextLine, line: str) -> tuple[float, float]:
     problem = position_problem(lat, lon)
     if problem is not None:
         raise MissionError(**problem.at(location.file, location))
-    return on_grid(lat), on_grid(lon)
+    return round_to_grid(lat), round_to_grid(lon)

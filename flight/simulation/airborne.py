@@ -49,7 +49,7 @@ class Airborne(ABC):
     fdm: the simulated aircraft.
     max_ticks: time limit, ticks.
     engine: flight model in use, and the reason for it, as in "JSBSim, as chosen".
-    _law: control law that keeps its record in the workspace; None for a program that starts in the air.
+    _law: control law of a simulated autopilot; None for an external program that starts in the air.
     """
 
     _law: ControlLaw | None = None
@@ -95,7 +95,9 @@ class Airborne(ABC):
         follows_arcs = turns.follows_path and turns.keeps_to_arcs
         follows_arcs = follows_arcs or not setup.route.fly_over.any()
         self.path = (
-            setup.path if follows_arcs else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, swing="none")
+            setup.path
+            if follows_arcs
+            else fly_by_path(setup.route, setup.limits, setup.scenario.terrain, fly_over_turn="none")
         )
         waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
         waypoints["is_mission_end"] &= setup.autopilot.loiters.ends_in_circle
@@ -113,22 +115,22 @@ class Airborne(ABC):
         self._work.settings.battery = setup.battery
         length = self.path.length + _extra_loiter_length(setup, waypoints)
         time_limit = TIME_LIMIT_FACTOR * length / _min_ground_speed(setup, self._airspeeds) + TIME_LIMIT_BASE_S
-        # A loiter for a time lasts as long as its item states, whatever circle the path has for it.
+        # A loiter for a time lasts as long as its item states, although its path is only one circle.
         timed_loiters = waypoints[(waypoints["loiter_time"] > 0.0) & (waypoints["loiter_time"] < math.inf)]
         time_limit += sum(
             dict(zip(timed_loiters["item"].tolist(), timed_loiters["loiter_time"].tolist(), strict=True)).values()
         )
-        if setup.route.return_to is not None:
+        if setup.route.rtl_loiter is not None:
             # An autopilot that flies an RTL by its own control law may loiter longer than the path does.
-            radius_factor = true_by_equivalent(setup.route.return_to.up) ** 2
-            time_limit += rtl_loiter_timeout(radius_factor * setup.route.return_to.radius)
+            radius_factor = true_by_equivalent(setup.route.rtl_loiter.up) ** 2
+            time_limit += rtl_loiter_timeout(radius_factor * setup.route.rtl_loiter.radius)
         if waypoints["is_mission_end"][-1]:
             time_limit += rtl_loiter_timeout(setup.autopilot.loiters.radius)
         self.max_ticks = int(time_limit / self.dt)
 
     @property
     def position(self) -> Floats:
-        """Position of the aircraft one tick ago, (3,) east, north and up, m."""
+        """Position of the aircraft at the start of the last tick, (3,) east, north and up, m."""
         true = self._work.true
         return np.array([true.east, true.north, true.up])
 
@@ -200,7 +202,7 @@ class Airborne(ABC):
         """Return the end reason of a flight that exceeded its time limit, in a loiter at an item or elsewhere."""
         route, next_waypoint = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
         time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
-        if route.arcs[next_waypoint] > 0.0 and route.return_from < 0:
+        if route.arcs[next_waypoint] > 0.0 and route.rtl_start < 0:
             return f"circled: at the loiter of item {route.items[next_waypoint]}, {time_text}"
         return f"time limit: {time_text}"
 
@@ -240,7 +242,7 @@ def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
 
 
 def _min_ground_speed(setup: FlightSetup, airspeeds: Floats) -> float:
-    """Return the lowest ground speed on any leg in the mean wind at its altitudes, m/s, at least 3."""
+    """Return the lowest ground speed on any leg, in the mean wind at the leg's altitudes, m/s; at least 3 m/s."""
     limits: Limits = setup.limits
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
     tables = {airspeed: limits.performance(airspeed) for airspeed in set(airspeeds.tolist())}

@@ -15,7 +15,7 @@ from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo, to_map
 from world.terrain import Terrain
 
 # Margin of the local map around the area and the route, m.
-MAP_BUFFER = 5000.0
+MAP_MARGIN_M = 5000.0
 # Maximum errors of the local map, m and rad.
 MAX_MAP_ERRORS = (0.01, 1e-6)
 
@@ -35,14 +35,14 @@ class LocalMap:
 
     @staticmethod
     def around(setup: FlightSetup) -> "LocalMap":
-        """Fit a local map around the area and the route, with a margin of `MAP_BUFFER`.
+        """Fit a local map around the area and the route, with a margin of `MAP_MARGIN_M`.
 
         The error is 0.1 mm and 1e-9 rad on areas up to 600 km wide. Raises FlightError if the map cannot be fitted, as
         for an area around a pole.
         """
         origin: GeoOrigin = setup.scenario.origin
         points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
-        min_corner, max_corner = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
+        min_corner, max_corner = points.min(axis=0) - MAP_MARGIN_M, points.max(axis=0) + MAP_MARGIN_M
         outline = np.array(
             [
                 [east, north]
@@ -87,8 +87,8 @@ class Ground:
     """Terrain for the compiled tick; without terrain, a raster without data.
 
     known: True if there is terrain.
-    heights: (rows, cols) m.
-    to_pixel: map from map positions to the raster.
+    heights: altitudes of the ground, (rows, columns) m; NaN if unknown.
+    to_pixel: transformation from map positions (east, north) to column and row of ``heights``.
     """
 
     def __init__(self, terrain: Terrain | None) -> None:

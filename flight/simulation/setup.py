@@ -80,7 +80,7 @@ class Damage:
     """Parts of a file that could not be read.
 
     places: number of unreadable stretches.
-    size: their total size, bytes.
+    size: total size of these stretches, bytes.
     cut: True if the file ends within a message.
     unreadable: number of complete messages without usable numbers.
     """
@@ -235,7 +235,7 @@ class FlightSetup:
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Build the path here, so that it always matches route and limits."""
+        """Build the reference path from the demanded route and the limits."""
         object.__setattr__(self, "path", fly_by_path(self.demanded_route, self.limits, self.scenario.terrain))
 
     @property
@@ -250,7 +250,7 @@ class FlightSetup:
 
     @property
     def corridor(self) -> float:
-        """Half width of the corridor along the legs in which the flight must stay, m."""
+        """Half width of the corridor along the legs that the flight must not leave, m."""
         return corridor_half_width(self.scenario.limits.corridor_m, self.autopilot.turns.acceptance_radius)
 
     @property
@@ -297,7 +297,10 @@ class FlightSetup:
             and (ground_phases.take_off is None or ground_phases.approach is None)
         ):
             missing_end = "take-off" if ground_phases.take_off is None else "landing"
-            text = f"without a {missing_end} that is flown from the ground, the program is put into the air on a rail"
+            text = (
+                f"the {missing_end} is not simulated on the ground, so the flight of the program starts in the air, on"
+                " a rail"
+            )
             return GroundPhases(notes=(*ground_phases.notes, text))
         return ground_phases
 
@@ -333,7 +336,7 @@ class FlightSetup:
     def with_long_reversals(self) -> "FlightSetup":
         """Return a copy of the setup with the longer turn at each course reversal."""
         setup = copy.copy(self)
-        path = fly_by_path(self.demanded_route, self.limits, self.scenario.terrain, swing="long")
+        path = fly_by_path(self.demanded_route, self.limits, self.scenario.terrain, fly_over_turn="long")
         object.__setattr__(setup, "path", path)
         return setup
 

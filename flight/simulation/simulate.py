@@ -130,14 +130,14 @@ def make_loop(
     return fly
 
 
-# Default guidance tick, s; `Flight.dt` is the tick of one flight.
-TICK = 1.0 / 60.0
+# Default duration of a guidance tick, s; `Flight.dt` is the duration in one flight.
+TICK_S = 1.0 / 60.0
 # Duration of one block of rows from `simulate`, s.
-BLOCK = 1.0
+BLOCK_DURATION_S = 1.0
 # Bank that guidance may add to the bank of planned turns in order to correct an error, rad.
-BANK_RESERVE = math.radians(3.0)
-# Time added to the limit of a flight that takes off or lands, s.
-GROUND_PATIENCE = 120.0
+BANK_RESERVE_RAD = math.radians(3.0)
+# Time added to the time limit of a flight that takes off or lands, s.
+GROUND_TIME_ALLOWANCE_S = 120.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,11 +155,11 @@ class SimulatedFlight:
 
 
 class FlightBlock(NamedTuple):
-    """Some rows of a flight, as `simulate` yields them.
+    """Consecutive rows of a flight, as `simulate` yields them.
 
     rows: `flight.simulation.track.TRACK_ROW` records, (t,).
     end_reason: "completed", or the reason why the flight ended with these rows; "" while it continues.
-    distance: distance along the path so far, m.
+    distance: distance along the path at the last row, m.
     """
 
     rows: Rows
@@ -181,7 +181,7 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
     """
     end_reason = ""
     while not end_reason:
-        rows, end_reason = flight.fly_block(round(BLOCK / flight.dt))
+        rows, end_reason = flight.fly_block(round(BLOCK_DURATION_S / flight.dt))
         yield FlightBlock(rows, end_reason, min(float(flight.memory.distance), flight.path.length))
 
 
@@ -211,7 +211,7 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
 
 
 def join_blocks(blocks: Sequence[FlightBlock]) -> Track:
-    """Join the rows of blocks to a track."""
+    """Return the track of successive blocks."""
     return as_track(join_rows([block.rows for block in blocks]))
 
 
@@ -269,11 +269,11 @@ class Flight(Airborne):
             self._law = ground_law(self._ground_phases, aircraft, find_contacts(aircraft, gear))
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset, gear)
         if self._ground_phases:
-            self.max_ticks += int(GROUND_PATIENCE / self.dt)
+            self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)
         # Guidance knows the model, but not the differences of the aircraft from it.
         model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._trim_at_start(setup, model, gains.reference_airspeed)
-        self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
+        self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE_RAD
         self._law.initialise(self.memory, self._workspace.own)
         self._start_disturbances(setup)
         self._compiled, self.engine = self._choose_engine(setup)

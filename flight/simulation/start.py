@@ -19,11 +19,12 @@ class Start:
     """Position, course, airspeed and wind at the start of a route.
 
     lat_deg, lon_deg: geodetic.
-    amsl, ground: altitude of the aircraft and of the ground, m.
+    amsl: altitude of the aircraft, m.
     course: true course of the first leg, rad.
     slope: slope of the first leg, rad.
     airspeed: m/s, true.
     wind: (3,) m/s, velocity of the air, north, east, down.
+    ground: altitude of the ground, m AMSL.
     """
 
     lat_deg: float
@@ -120,7 +121,7 @@ class Release:
 
 
 def default_gear(ground_phases: GroundPhases) -> Gear:
-    """Return the gear for a model without contacts: wheels for a take-off from a runway, otherwise a belly."""
+    """Return the gear to add to a model without contacts: wheels for a take-off from a runway, otherwise a belly."""
     return (
         "wheels" if ground_phases.take_off is not None and ground_phases.take_off.launch.method == "runway" else "belly"
     )
@@ -160,7 +161,7 @@ def _to_true_north(east: float, north: float, convergence: float) -> tuple[float
 def release(
     fdm: Fdm, release_state: Release, commands: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """Release the aircraft with some commands, and return these commands."""
+    """Release the aircraft with elevator, aileron, rudder and throttle commands, and return these commands."""
     fdm.release(
         release_state.position,
         release_state.attitude,

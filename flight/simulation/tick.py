@@ -18,9 +18,9 @@ from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.gains import GAINS, Gains
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import WAYPOINT
-from flight.guidance.navigation_error import MOTION, NAVIGATION_LAGS, navigate
+from flight.guidance.navigation_error import MOTION, NAVIGATION_LAGS, estimate_motion
 from flight.guidance.path import NODE, PIECE, FlyByPath, Records
-from flight.mission.itinerary import UNLIMITED
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE, TRACK_ROW
 from flight.simulation.turbulence import GUST_FILTERS, step_gusts
 from world.arrays import Floats, Heights
@@ -128,7 +128,7 @@ class Workspace:
     block: (n,) numbers of the workspace, of the control law's own record, and of the path.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
-    own: the autopilot's own record, or None.
+    own: record of the control law's memory, or None.
     path: rows of `PATH_ROW`, as many as the largest of the numbers of pieces, nodes and waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.
@@ -179,15 +179,14 @@ class Workspace:
 
 
 # Bank beyond which control is lost, rad.
-STEEPEST_BANK = math.radians(75.0)
-# Return values of a tick that ends the flight.
-# The end of the route was reached.
+LOSS_OF_CONTROL_BANK_RAD = math.radians(75.0)
+# Return values of a tick that ends the flight: the end of the route was reached.
 COMPLETED = 1
 # The state is not a number.
 NOT_A_NUMBER = 2
 # The aircraft touched the ground.
 GROUND = 3
-# The bank exceeded `STEEPEST_BANK`.
+# The bank exceeded `LOSS_OF_CONTROL_BANK_RAD`.
 END_OVERBANK = 4
 # The airspeed fell below the stall.
 STALLED = 5
@@ -212,8 +211,8 @@ RTL_ARRIVAL_ALTITUDE_TOLERANCE_M = 20.0
 LOITER_TIMEOUT_FACTOR = 5.0
 # Ground speed assumed for that circle, m/s.
 _CIRCLING_SPEED_MPS = 10.0
-# A mission that ends in a loiter about its last waypoint ends when the course has turned by this angle, rad: a quarter
-# turn onto the loiter, and one full circle.
+# Course change after which a loiter about a mission's last waypoint ends, rad: a quarter turn onto the loiter, and one
+# full circle.
 END_LOITER_ANGLE_RAD = 2.5 * math.pi
 # Texts for the ends of a flight.
 ENDS = {
@@ -243,7 +242,7 @@ def begin_tick(workspace: Record, heights: Heights) -> bool:
     settings, timing = workspace.settings, workspace.timing
     if not _read_sensors(workspace, heights):
         return False
-    navigate(
+    estimate_motion(
         workspace.true,
         workspace.estimated,
         workspace.navigation,
@@ -333,12 +332,12 @@ def fill_tick(workspace: Record) -> None:
 
 
 @inner
-def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
-    """Track the progress of an RTL around its loiter, and end the flight after it.
+def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
+    """Update the progress of an RTL around its loiter, and end the flight after the loiter.
 
     This is for an autopilot that flies an RTL by its own control law or its own program, which follows no line: there
-    is no cross-track error. The flight ends once the aircraft has arrived at the loiter and flown a full circle at its
-    altitude, and after `rtl_loiter_timeout` at the latest.
+    is no cross-track error. The flight ends once the aircraft has arrived at the loiter and flown a full circle at the
+    loiter's altitude, and after `rtl_loiter_timeout` at the latest.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -356,22 +355,22 @@ def end_return(motion: Record, waypoint: Record, memory: Record, dt: float) -> N
     if memory.loiter_time > 0.0 or (is_near and abs(motion.up - waypoint.up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M):
         memory.loiter_time += dt
     is_full_circle = abs(memory.loiter_angle) >= 2.0 * math.pi
-    memory.is_finished = (is_full_circle and memory.loiter_time > UNLIMITED) or memory.loiter_time > rtl_loiter_timeout(
-        radius
-    )
+    memory.is_finished = (
+        is_full_circle and memory.loiter_time > ENDLESS_LOITER_TIME_S
+    ) or memory.loiter_time > rtl_loiter_timeout(radius)
 
 
 @inner
-def end_around(motion: Record, memory: Record, dt: float) -> None:
-    """Track the course change since the last waypoint was reached, and end the flight at `END_LOITER_ANGLE_RAD`.
+def update_end_loiter(motion: Record, memory: Record, dt: float) -> None:
+    """Update the course change in the loiter at a mission's end, and end the flight at `END_LOITER_ANGLE_RAD`.
 
-    The course is used instead of the bearing from the waypoint: if the loiter is too tight for the aircraft, it flies
-    loops next to the waypoint, and the bearing may take one loop or three to go around.
+    The course is used instead of the bearing from the waypoint: an aircraft that cannot fly the loiter's radius flies
+    loops next to the waypoint, and the bearing then turns by 360 degrees in one loop or in three.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     """
-    # The mission's end is not missed, however wide the aircraft flies the loiter.
+    # The flight does not miss the mission's end, however wide the aircraft flies the loiter.
     memory.is_in_rtl = True
     course = math.atan2(motion.velocity_east, motion.velocity_north)
     if memory.loiter_time > 0.0:
@@ -387,7 +386,7 @@ def rtl_loiter_timeout(radius: float) -> float:
 
     radius: m.
     """
-    return LOITER_TIMEOUT_FACTOR * max(UNLIMITED, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
+    return LOITER_TIMEOUT_FACTOR * max(ENDLESS_LOITER_TIME_S, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
 
 
 @inner
@@ -405,9 +404,10 @@ def _to_si(state: Record, factors: Record) -> bool:
 def _air_status(
     state: Record, memory: Record, height_above_ground: float, min_airspeed: float, is_battery_empty: bool
 ) -> int:
+    """Return a key of `ENDS` if a flight in the air has ended, otherwise 0."""
     if height_above_ground <= 0.0:
         return GROUND
-    if abs(state.roll) > STEEPEST_BANK:
+    if abs(state.roll) > LOSS_OF_CONTROL_BANK_RAD:
         return END_OVERBANK
     if state.airspeed < min_airspeed:
         return STALLED
@@ -446,7 +446,7 @@ def _update_wind(
 ) -> None:
     """Set the mean wind and the next gust at the aircraft in ``air``, true north, east and down.
 
-    convergence_cos, convergence_sin: of the map course of true north.
+    convergence_cos, convergence_sin: cosine and sine of the map course of true north.
     """
     speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
     # The wind's map course minus the map course of true north.

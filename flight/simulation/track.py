@@ -38,8 +38,8 @@ RUDDER = 2
 # Column of `Track.controls` and `Track.commands`: throttle, 0..1.
 THROTTLE = 3
 
-# Upper bound of a row's time, s: the longest flight that a log can store; times start at 0.
-LATEST = 1e7
+# Upper bound of a row's time, s: the longest flight that a log can store.
+MAX_TIME_S = 1e7
 
 # Binary digits after the point that are kept in each column of a row. They are finer than any instrument, and make a
 # log a third smaller than full float32 values. Positions are the finest: courses and slopes are computed from rows
@@ -112,7 +112,7 @@ class Track:
         return int(self.time.size)
 
     def rows(self, start: int, stop: int) -> "Track":
-        """Return rows start..stop as a separate track."""
+        """Return the rows from ``start`` up to ``stop``, which is not included, as a separate track."""
         return Track(*(getattr(self, field.name)[start:stop] for field in fields(self)))
 
     def to_pandas(self) -> Any:
@@ -382,7 +382,9 @@ _LIMIT_TOLERANCE_FRACTION = 1e-3
 
 
 def control_limits(aircraft: str) -> list[tuple[str, float]]:
-    """Return each control with its limit in either direction, rad; 1 for the throttle, NaN for an unknown aircraft.
+    """Return each control with its limit in either direction, rad; NaN for an unknown aircraft.
+
+    The limit of the throttle is 1.
 
     >>> for name, limit in control_limits("aerosonde"):
     ...     print(f"{name} {limit:.2f}")

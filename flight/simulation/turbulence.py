@@ -24,7 +24,7 @@ def dryden_scales(height: float) -> tuple[float, float, float]:
     """
     h = min(1000.0, max(10.0, height / FOOT))
     base = 0.177 + 0.000823 * h
-    # One power for both: base^1.2 = base root, base^-0.4 = root^-2.
+    # Compute one power for both: base^1.2 = base * root, base^-0.4 = root^-2.
     root = base**0.2
     return h / (base * root) * FOOT, h * FOOT, 1.0 / (root * root)
 
@@ -67,7 +67,7 @@ def step_gusts(
 
 @inner
 def _step_transverse(first: float, second: float, noise: float, decay: float) -> tuple[float, float, float]:
-    """Advance both lags by a step, and return them with the gust in standard deviations."""
+    """Advance two lags in series by a tick, and return both with their weighted sum of unit variance."""
     previous = first
     first = decay * previous + math.sqrt(1.0 - decay * decay) * noise
     second = decay * second + (1.0 - decay) * 0.5 * (previous + first)

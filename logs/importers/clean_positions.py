@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flight.simulation.setup import Gap, RowFaults
-from flight.simulation.track import LATEST
+from flight.simulation.track import MAX_TIME_S
 from logs.importers.raw_log import LogSeries
 from world.arrays import Flags, Floats, Ints
 
@@ -151,7 +151,7 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     time, values = time[~out], values[~out]
     is_near = _is_in_main_group(time)
     time, shifts = _without_jumps(time[is_near], values[is_near])
-    is_in_range = time < LATEST
+    is_in_range = time < MAX_TIME_S
     time, values = time[is_in_range], values[is_near][is_in_range]
     unusable += is_near.size - time.size
     jumps = tuple(sorted((*earlier_jumps, *(start for start, _ in shifts))))
@@ -230,7 +230,7 @@ def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_spe
 
 def _is_in_main_group(time: Floats) -> Flags:
     """Return a mask of rows (n,), from their sorted times, without small groups far away in time from all others."""
-    parts = np.cumsum(np.concatenate([[0], np.diff(time) > LATEST])) if time.size else np.zeros(0, np.int64)
+    parts = np.cumsum(np.concatenate([[0], np.diff(time) > MAX_TIME_S])) if time.size else np.zeros(0, np.int64)
     counts = np.bincount(parts)
     return np.asarray((counts >= min(MIN_LATE_ROWS, int(counts.max(initial=0))))[parts])
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.guidance.equivalent_airspeed import true_by_equivalent
-from flight.mission.items import Home, MissionItem, on_grid
+from flight.mission.items import Home, MissionItem, round_to_grid
 from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
 from logs.importers.logged_missions import LoggedItem, combine_items, logged_mission, plane_mode
@@ -53,7 +53,7 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
         if not (0.0 <= number <= _MAX_ITEMS and math.isfinite(command) and math.isfinite(frame)):
             continue
         # A float32 has seven digits; a mission file has six after the decimal point.
-        place = (on_grid(lat), on_grid(lon), round(up, 6))
+        place = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
         item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *place)
         rows.append(LoggedItem(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
     notes = () if framed else ("the log states no frames: heights are taken as above home",)
@@ -74,7 +74,7 @@ def logged_home(origins: Messages) -> Home | None:
         return None
     lat, lon, up = (float(homes.column(name)[-1]) for name in ("Lat", "Lng", "Alt"))
     is_valid = np.isfinite([lat, lon, up]).all() and abs(lat) <= 90.0 and abs(lon) <= 180.0 and (lat, lon) != (0.0, 0.0)
-    return Home(on_grid(lat), on_grid(lon), up) if is_valid else None
+    return Home(round_to_grid(lat), round_to_grid(lon), up) if is_valid else None
 
 
 FORMAT = "ArduPilot dataflash log"

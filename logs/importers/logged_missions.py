@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-from flight.mission.items import Command, Home, Mission, MissionItem, item_problem, shifted
+from flight.mission.items import Command, Home, Mission, MissionItem, item_problem, with_shifted_numbers
 from flight.simulation.setup import MissingItems
 from logs.importers.raw_log import LoggedMission
 
@@ -136,7 +136,7 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
     # Both mission files keep number 0 for home.
     shift = 1 if items and items[0].seq == 0 else 0
     end = max(logged.total - 1, logged.items[-1].seq) + shift
-    mission = Mission(home, shifted(items, shift), warnings=tuple(warnings), source=f"{source}: {origin}")
+    mission = Mission(home, with_shifted_numbers(items, shift), warnings=tuple(warnings), source=f"{source}: {origin}")
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)
 
 
@@ -150,7 +150,7 @@ def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
     """
     vertical = Command.NAV_VTOL_TAKEOFF
     changed = (replace(item, command=int(Command.NAV_TAKEOFF)) if item.command == vertical else item for item in items)
-    return shifted(changed, 1)
+    return with_shifted_numbers(changed, 1)
 
 
 def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:

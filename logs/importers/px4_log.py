@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from pyulog import ULog
 
-from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid
+from flight.mission.items import Home, Mission, MissionItem, item_problem, round_to_grid
 from flight.simulation.setup import Damage
 from logs.importers.dataflash_frames import MappedFile, piece_ends
 from logs.importers.logged_missions import px4_items, px4_state, without_gaps
@@ -386,7 +386,7 @@ class Topics:
                 continue
             frame = _OVER_HOME if relative[k] else _AMSL
             params = (0.0, float(radius[k]), 0.0, 0.0)
-            place = (on_grid(lat), on_grid(lon), round(up, 6))
+            place = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
             item = MissionItem(int(number), int(command), frame, params, *place)
             if item_problem(item) is None:
                 items.setdefault(item.seq, item)
@@ -409,7 +409,11 @@ class Topics:
         placed = positions.values[
             np.isfinite(positions.values).all(axis=1) & (np.abs(positions.values) < _PLACE).all(axis=1)
         ]
-        return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
+        return (
+            Home(round_to_grid(placed[-1, 0]), round_to_grid(placed[-1, 1]), float(placed[-1, 2]))
+            if len(placed)
+            else None
+        )
 
     def parameters(self) -> dict[str, float]:
         """Return the parameters by name, with the last value of changed ones, without values that are no numbers."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from flight.simulation.setup import Damage, MissingItems, VerticalDatum
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
@@ -162,7 +162,13 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
     ]
     items = tuple(
         MissionItem(
-            number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(float(y)), on_grid(float(x)), up
+            number,
+            int(Command.NAV_WAYPOINT),
+            int(Frame.GLOBAL),
+            (0.0,) * 4,
+            round_to_grid(float(y)),
+            round_to_grid(float(x)),
+            up,
         )
         for number, (y, x) in enumerate(ends, 1)
     )

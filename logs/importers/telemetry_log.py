@@ -16,7 +16,7 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flight.guidance.equivalent_airspeed import true_by_equivalent
-from flight.mission.items import Home, Mission, MissionItem, on_grid
+from flight.mission.items import Home, Mission, MissionItem, round_to_grid
 from flight.simulation.setup import Damage
 from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import PIECE_BYTES, MappedFile
@@ -480,7 +480,9 @@ def _item(message: Any, *, scaled: bool) -> MissionItem:
     command, frame = int(message.command), int(message.frame)
     lat, lon = (message.x * 1e-7, message.y * 1e-7) if scaled else (float(message.x), float(message.y))
     params = (float(message.param1), float(message.param2), float(message.param3), float(message.param4))
-    return MissionItem(int(message.seq), command, frame, params, on_grid(lat), on_grid(lon), round(message.z, 6))
+    return MissionItem(
+        int(message.seq), command, frame, params, round_to_grid(lat), round_to_grid(lon), round(message.z, 6)
+    )
 
 
 def _px4_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:

@@ -21,9 +21,9 @@ import gpxpy.gpx
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_grid
 from flight.simulation.setup import Damage, VerticalDatum
-from flight.simulation.track import LATEST
+from flight.simulation.track import MAX_TIME_S
 from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, RawLog
 from world.errors import LogError
 
@@ -79,7 +79,7 @@ def _earliest(stamps: NDArray[np.float64]) -> float:
     """Return the earliest time of a track (n,) s, without damaged times far from the median."""
     # Take a time of the track itself: the mean of two may be near neither.
     middle = np.sort(stamps)[stamps.size // 2]
-    return float(stamps[np.abs(stamps - middle) < LATEST].min())
+    return float(stamps[np.abs(stamps - middle) < MAX_TIME_S].min())
 
 
 # ----------------------------------------------------------------------
@@ -132,8 +132,8 @@ def _routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
                 int(Command.NAV_WAYPOINT),
                 int(Frame.GLOBAL),
                 (0.0,) * 4,
-                on_grid(point.latitude),
-                on_grid(point.longitude),
+                round_to_grid(point.latitude),
+                round_to_grid(point.longitude),
                 float(point.elevation or 0.0),
             )
             for number, point in enumerate(route.points, 1)
@@ -257,7 +257,15 @@ def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
     # Take-off and landing are places of the glider on the ground, not part of the task.
     turn_points = points[1:-1] if len(points) > 3 else points
     items = tuple(
-        MissionItem(number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(lat), on_grid(lon), 0.0)
+        MissionItem(
+            number,
+            int(Command.NAV_WAYPOINT),
+            int(Frame.GLOBAL),
+            (0.0,) * 4,
+            round_to_grid(lat),
+            round_to_grid(lon),
+            0.0,
+        )
         for number, (lat, lon) in enumerate(turn_points, 1)
     )
     if len(items) < 2:

@@ -18,7 +18,7 @@ from mcap.records import Channel, Schema
 from mcap.records import Message as MessageRecord
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import LATEST, Track
+from flight.simulation.track import MAX_TIME_S, Track
 from logs.importers.open_log import is_imported_log
 from logs.recording.foxglove_scene import LOG_LEVELS
 from logs.recording.foxglove_updates import EVENT_SOURCE as FLIGHT_EVENT_SOURCE
@@ -357,7 +357,7 @@ def _usable_rows(rows: StateRecords, waypoint_count: int) -> tuple[StateRecords,
     """Return the rows before the first invalid row, and that row's fault; "" if all rows are valid."""
     state = rows["state"]
     time = state["time_s"]
-    is_increasing = np.isfinite(time) & (time >= 0.0) & (time < LATEST)
+    is_increasing = np.isfinite(time) & (time >= 0.0) & (time < MAX_TIME_S)
     is_increasing[1:] &= time[1:] > time[:-1]
     is_numbered = state["row"] == np.arange(len(rows), dtype=np.uint32)
     has_leg = (state["leg_index"] >= 0) & (state["leg_index"] < waypoint_count)

@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from flight.simulation.setup import FlightSetup
-from flight.simulation.track import COLUMNS, LATEST, TRACK_ROW, Rows, Track, join_rows, track_rows
+from flight.simulation.track import COLUMNS, MAX_TIME_S, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
 from logs.recording import foxglove_updates as clouds
 from logs.recording.foxglove_scene import aircraft_scene
@@ -164,9 +164,9 @@ class Recorder:
         if not len(rows):
             return
         times = np.ascontiguousarray(rows["time"])
-        newest = last_log_time(times, self._newest_ns, EPOCH_NS, LATEST)
+        newest = last_log_time(times, self._newest_ns, EPOCH_NS, MAX_TIME_S)
         if newest == OUT_OF_RANGE:
-            raise ValueError(f"time {times[0]}..{times[-1]} s: expected 0..{LATEST:g}")
+            raise ValueError(f"time {times[0]}..{times[-1]} s: expected 0..{MAX_TIME_S:g}")
         if newest == NOT_INCREASING:
             raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
@@ -201,8 +201,8 @@ class Recorder:
         """Record an event at ``time`` (s); level: debug, info, warning, error or fatal. Raises ValueError."""
         if level not in scene.LOG_LEVELS:
             raise ValueError(f"level {level!r}: expected {', '.join(scene.LOG_LEVELS)}")
-        if not 0.0 <= time < LATEST:
-            raise ValueError(f"time {time} s: expected 0..{LATEST:g}")
+        if not 0.0 <= time < MAX_TIME_S:
+            raise ValueError(f"time {time} s: expected 0..{MAX_TIME_S:g}")
         log_time = round(time * 1e9) + EPOCH_NS
         message = scene.log_message(log_time, text, level).SerializeToString(deterministic=True)
         self._events.append(single_record(self._channels[EVENT_TOPIC], log_time, message))

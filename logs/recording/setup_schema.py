@@ -139,16 +139,16 @@ class RouteTable(SetupModel):
     notes: tuple[str, ...]
     arcs: Annotated[_Column, Field(alias="arcs_m")] = []
     stops: Annotated[list[Annotated[int, Field(ge=0, lt=2**31)]], _LISTED] = []
-    endless: Annotated[int, Field(alias="endless_jump")] = -1
+    endless_jump: int = -1
     takeoff_ground: Annotated[_Height, Field(alias="takeoff_ground_m")] = None
     landing_ground: Annotated[_Height, Field(alias="landing_ground_m")] = None
-    return_from: Annotated[int, Field(ge=-1, alias="return_from_waypoint")] = -1
-    return_to: Annotated[
+    rtl_start: Annotated[int, Field(ge=-1, alias="return_from_waypoint")] = -1
+    rtl_loiter: Annotated[
         tuple[Finite, Finite, Finite, Finite, Finite] | None,
         Field(alias="return_to_east_north_amsl_radius_slope_base_m"),
     ] = None
-    straight_to: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
-    unjoined: Annotated[tuple[UnjoinedStop, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
+    direct_landing_start: Annotated[int, Field(ge=-1, alias="straight_to_waypoint")] = -1
+    unjoined_stops: Annotated[tuple[UnjoinedStop, ...], Field(alias="unjoined_item_circle_is_circle")] = ()
     above_ground: Annotated[list[_Height], Field(alias="above_ground_m"), _LISTED] = []
     home_up: Annotated[list[_Height], Field(alias="home_amsl_m"), _LISTED] = []
     min_ground_speed: Annotated[list[_Height], Field(alias="min_ground_speed_mps"), _LISTED] = []
@@ -172,19 +172,19 @@ class RouteTable(SetupModel):
             length, expected = len(getattr(self, field)), len(waypoints) - (field == "airspeed")
             if length != expected:
                 raise self.fault(file, field, f"{length} values: expected {expected}")
-        if self.return_from >= len(waypoints) - 1 or (self.return_from < 0) != (self.return_to is None):
-            raise self.fault(file, "return_from", f"{self.return_from}: a waypoint before the last, with its target")
-        if self.straight_to >= len(waypoints):
-            raise self.fault(file, "straight_to", f"{self.straight_to}: a waypoint, or -1")
+        if self.rtl_start >= len(waypoints) - 1 or (self.rtl_start < 0) != (self.rtl_loiter is None):
+            raise self.fault(file, "rtl_start", f"{self.rtl_start}: a waypoint before the last, with its target")
+        if self.direct_landing_start >= len(waypoints):
+            raise self.fault(file, "direct_landing_start", f"{self.direct_landing_start}: a waypoint, or -1")
         heights = {field: getattr(self, field) for field in ("takeoff_ground", "landing_ground")}
         ground_heights = {field: math.nan if height is None else height for field, height in heights.items()}
-        circle = None if self.return_to is None else ReturnCircle(*self.return_to)
+        circle = None if self.rtl_loiter is None else ReturnCircle(*self.rtl_loiter)
         items = np.array(self.items, dtype=np.int64)
         stops = np.array(self.stops, dtype=np.int64)
         columns = {"waypoints": waypoints, "items": items, "stops": stops}
         for name in ROUTE_COLUMNS_WITH_NAN:
             columns[name] = np.array([math.nan if value is None else value for value in getattr(self, name)])
-        return _make_from_table(Route, self, return_to=circle, **columns, **ground_heights)
+        return _make_from_table(Route, self, rtl_loiter=circle, **columns, **ground_heights)
 
 
 class EnvelopeTable(SetupModel):

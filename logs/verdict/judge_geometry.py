@@ -188,8 +188,8 @@ def with_suggestions(
 
     Findings on the legs of a return to launch get no suggestions, because the autopilot chooses its path.
     """
-    results, first_leg = [], requirements.setup.route.return_from
-    last_leg = min(requirements.legs, requirements.setup.route.return_until)
+    results, first_leg = [], requirements.setup.route.rtl_start
+    last_leg = min(requirements.legs, requirements.setup.route.rtl_end)
     return_legs = {requirements.leg(i) for i in range(first_leg, last_leg)} if first_leg >= 0 else set()
     for finding in findings:
         suggest = RULES[finding.rule].suggest

@@ -10,7 +10,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from world.frames import GeoOrigin, to_geo
 
 # Slopes of the mission as a fraction of the steepest climb and descent, which need slightly less than full throttle, so
@@ -43,7 +43,9 @@ def identification_mission(
         command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, altitude: float
     ) -> None:
         number = len(items) + 1
-        items.append(MissionItem(number, command, frame, params, on_grid(lat), on_grid(lon), round(altitude, 2)))
+        items.append(
+            MissionItem(number, command, frame, params, round_to_grid(lat), round_to_grid(lon), round(altitude, 2))
+        )
 
     speed = math.nan
     for (_, _, altitude, leg_airspeed), lat, lon in zip(places, lats.tolist(), lons.tolist(), strict=True):
@@ -53,7 +55,9 @@ def identification_mission(
         add_item(
             int(Command.NAV_WAYPOINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0, 0.0, 0.0, 0.0), lat, lon, altitude - ground
         )
-    return Mission(Home(on_grid(lat_deg), on_grid(lon_deg), ground), tuple(items), source="identify.waypoints")
+    return Mission(
+        Home(round_to_grid(lat_deg), round_to_grid(lon_deg), ground), tuple(items), source="identify.waypoints"
+    )
 
 
 def _waypoints(

@@ -100,7 +100,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "flight.dynamics.compiled_frame.initialise_attitude",
         "flight.dynamics.compiled_frame.step_repeatedly",
         "flight.guidance.equivalent_airspeed.true_by_equivalent",
-        "flight.guidance.path.profile",
+        "flight.guidance.path.profile_at",
         "flight.simulation.track._round_to_steps",
         _LAYOUT + "_copy_messages",
         _LAYOUT + "_index_messages",

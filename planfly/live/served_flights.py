@@ -36,7 +36,7 @@ from flight.live.telemetry import (
     SnapshotMaker,
     StatusText,
 )
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight
@@ -155,7 +155,13 @@ class ServedFlights:
         no_params, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
         items = tuple(
             MissionItem(
-                number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), no_params, on_grid(lat), on_grid(lon), amsl
+                number,
+                int(Command.NAV_WAYPOINT),
+                int(Frame.GLOBAL),
+                no_params,
+                round_to_grid(lat),
+                round_to_grid(lon),
+                amsl,
             )
             for number, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
@@ -195,7 +201,7 @@ class ServedFlights:
         """Prepare the flight that a station requests at the current position; a loiter lasts `LOITER_DURATION_S`."""
         served_scenario = self._served
         lat, lon = (
-            on_grid(float(value)) for value in to_geo(served_scenario.scenario.origin, position[0], position[1])
+            round_to_grid(float(value)) for value in to_geo(served_scenario.scenario.origin, position[0], position[1])
         )
         no_params = (0.0, 0.0, 0.0, 0.0)
         start_item = MissionItem(
@@ -239,8 +245,8 @@ def _loiter_item(current_item: MissionItem, center: LoiterCenter) -> MissionItem
         seq=0,
         command=int(Command.NAV_LOITER_TIME),
         params=(LOITER_DURATION_S, 0.0, center.radius, 0.0),
-        lat_deg=on_grid(center.lat_deg) if has_position else current_item.lat_deg,
-        lon_deg=on_grid(center.lon_deg) if has_position else current_item.lon_deg,
+        lat_deg=round_to_grid(center.lat_deg) if has_position else current_item.lat_deg,
+        lon_deg=round_to_grid(center.lon_deg) if has_position else current_item.lon_deg,
     )
 
 

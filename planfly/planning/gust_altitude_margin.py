@@ -16,7 +16,7 @@ import numpy as np
 
 from aircraft.path_limits import Limits, turn_tangents
 from flight.autopilots.autopilot import Autopilot
-from flight.autopilots.gust_height import LEAST_SIGMAS, gust_deviation
+from flight.autopilots.gust_height import MIN_SPARE_RATE_SIGMAS, gust_deviation
 from planfly.workflow.airframe import Airframe
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.airspace_scores import airspace_pieces
@@ -136,11 +136,15 @@ def _with_problems(plan: Plan, problems: list[str]) -> Plan:
 def _climb_problem(plan: Plan, airframe: Airframe) -> str:
     """Return the reason why no margin is enough for downdrafts at the plan's altitude, or "" if a margin is enough.
 
-    With a climb rate of less than `LEAST_SIGMAS`, several downdrafts follow before the aircraft has climbed back.  Of
-    24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none did.
+    With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, several downdrafts follow before the aircraft has climbed
+    back.  Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8,
+    none did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
-    climb_rate, min_climb_rate = airframe.limits.with_margin().rates(amsl)[0], LEAST_SIGMAS * gust_deviation(turbulence)
+    climb_rate, min_climb_rate = (
+        airframe.limits.with_margin().rates(amsl)[0],
+        MIN_SPARE_RATE_SIGMAS * gust_deviation(turbulence),
+    )
     if climb_rate >= min_climb_rate or not airframe.autopilot.deviations.gust_sink(climb_rate, turbulence):
         return ""
     return (
@@ -211,9 +215,9 @@ def limits_in_gusts(plan: Plan, airframe: Airframe, unused_fraction: float = _UN
             limits = replace(limits, reserve_height=displacement(unused_rate, turbulence), reserve_climb=unused_rate)
         else:
             unused_rate = max(
-                LEAST_SIGMAS * deviation, min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_FRACTION * sink)
+                MIN_SPARE_RATE_SIGMAS * deviation, min(_UNUSED_SINK_SIGMAS * deviation, _UNUSED_SINK_FRACTION * sink)
             )
-            if sink < LEAST_SIGMAS * deviation:
+            if sink < MIN_SPARE_RATE_SIGMAS * deviation:
                 unused_rate = 0.0
             limits = replace(limits, reserve_above=displacement(unused_rate, turbulence), reserve_sink=unused_rate)
     return limits

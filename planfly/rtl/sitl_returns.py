@@ -278,7 +278,7 @@ def _end_position(target: ReturnTarget) -> tuple[float, float, float]:
     """Return the position where the judgement of a return ends: loiter center, or last waypoint before the landing."""
     if target.landing is None:
         return target.position
-    return (target.landing, *target.landing.next_stops)[-1].place
+    return (target.landing, *target.landing.next_stops)[-1].position
 
 
 def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:

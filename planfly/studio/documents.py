@@ -356,7 +356,7 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
     )
     if (
         not has_unique_waypoints
-        or route.return_to is not None
+        or route.rtl_loiter is not None
         or any(item.frame not in AMSL and item.has_position for item in mission.items)
     ):
         raise MissionError(

@@ -166,7 +166,7 @@ def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None
     Overlapping spans are merged. Landing sequences and returns depend on the whole route.
     """
     rows = np.flatnonzero(route.items == seq)
-    if not len(rows) or route.return_from >= 0 or route.straight_to >= 0:
+    if not len(rows) or route.rtl_start >= 0 or route.direct_landing_start >= 0:
         return None
     spans: list[tuple[int, int]] = []
     for first, last in _consecutive_runs(rows):

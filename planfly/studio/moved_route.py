@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from flight.mission.items import AMSL, OVER_HOME, OVER_TERRAIN, PLACES, Command, Mission, MissionItem
-from flight.mission.placing import HIGHEST, LOWEST
+from flight.mission.placing import MAX_ALTITUDE_M, MIN_ALTITUDE_M
 from flight.mission.route import Route, fly_over_waypoints
 from planfly.workflow.airframe import Airframe
 from world.arrays import Floats
@@ -88,7 +88,7 @@ def _is_waypoint_move(old_item: MissionItem, new_item: MissionItem) -> bool:
 
 def _has_one_stop_per_item(route: Route, mission: Mission, scenario: Scenario) -> bool:
     """Return True if each position item is one stop of the route, with an altitude independent of other items."""
-    if route.return_from >= 0 or route.straight_to >= 0 or math.isfinite(route.landing_ground):
+    if route.rtl_start >= 0 or route.direct_landing_start >= 0 or math.isfinite(route.landing_ground):
         return False
     if scenario.start_course is not None or scenario.destination_course is not None:
         return False
@@ -110,7 +110,7 @@ def _map_position(item: MissionItem, mission: Mission, scenario: Scenario) -> tu
         altitude = home.alt + item.alt
     elif item.frame in OVER_TERRAIN and scenario.terrain is not None:
         altitude = float(scenario.terrain.height(east, north)) + item.alt
-    is_valid = LOWEST <= altitude <= HIGHEST and max(abs(east), abs(north)) <= MAP_EXTENT
+    is_valid = MIN_ALTITUDE_M <= altitude <= MAX_ALTITUDE_M and max(abs(east), abs(north)) <= MAP_EXTENT
     return (east, north, altitude) if is_valid else None
 
 

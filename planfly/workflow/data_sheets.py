@@ -304,7 +304,7 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
 
     properties: values of the model's properties by name.
     """
-    fdm = Fdm(aircraft, tried=True, variation=Variation(properties=properties))
+    fdm = Fdm(aircraft, is_tested=True, variation=Variation(properties=properties))
     angles = [trim_function(fdm, aircraft.airspeed, AMSL) for trim_function in (full_throttle_climb, idle_descent)]
     max_speed_trim = fastest_level_flight(fdm, AMSL)
     level = steady_flight(fdm, aircraft.airspeed, AMSL)
@@ -421,7 +421,7 @@ def _make_files(
     sheet = sized.sheet
     (folder / f"{name}.toml").write_text(_metadata_text(sized, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
     aircraft = read_aircraft(folder)
-    performance = measure_performance(Fdm(aircraft, tried=True), aircraft)
+    performance = measure_performance(Fdm(aircraft, is_tested=True), aircraft)
     # At the stall the propeller carries part of the weight.  If the model could fly slower, the sheet's stall speed
     # applies.
     stall_speed = max(
@@ -432,7 +432,7 @@ def _make_files(
     metadata = _metadata_text(sized, stall_speed, round(min_airspeed, 1), math.floor(10.0 * max_airspeed) / 10.0)
     (folder / f"{name}.toml").write_text(metadata, encoding="utf-8")
     aircraft = read_aircraft(folder)
-    fdm = Fdm(aircraft, tried=True)
+    fdm = Fdm(aircraft, is_tested=True)
     uncertainty, draws = _make_uncertainty(sized, aircraft)
     return {
         f"{name}.xml": model,

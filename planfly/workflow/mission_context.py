@@ -73,7 +73,7 @@ class MissionContext:
         that it states, NaN if unknown.
         """
         placed = self.place_mission(mission) if placed is None else placed
-        heights = {stop.item: stop.place[2] for stop in reversed(placed.stops)}
+        heights = {stop.item: stop.map_position[2] for stop in reversed(placed.stops)}
         items = [mission.items[k] for k in movable_indices(mission)]
         east, north = to_map(self.scenario.origin, [item.lat_deg for item in items], [item.lon_deg for item in items])
         altitudes = [

@@ -62,7 +62,7 @@ def _made(place: Path, numbers: ModelNumbers) -> Aircraft:
 
 
 def test_the_aerosondes_numbers_make_the_aerosonde(tmp_path: Path) -> None:
-    theirs, ours = Fdm(load_aircraft("aerosonde")), Fdm(_made(tmp_path, BOOK), tried=True)
+    theirs, ours = Fdm(load_aircraft("aerosonde")), Fdm(_made(tmp_path, BOOK), is_tested=True)
     random = np.random.default_rng(3)
     for fdm in (theirs, ours):
         fdm.move_to(700.0)
@@ -75,7 +75,7 @@ def test_the_aerosondes_numbers_make_the_aerosonde(tmp_path: Path) -> None:
 
 
 def test_power_is_the_aerosondes(tmp_path: Path) -> None:
-    theirs, ours = Fdm(load_aircraft("aerosonde")), Fdm(_made(tmp_path, BOOK), tried=True)
+    theirs, ours = Fdm(load_aircraft("aerosonde")), Fdm(_made(tmp_path, BOOK), is_tested=True)
     found = []
     for fdm in (theirs, ours):
         fdm.move_to(0.0)
@@ -92,7 +92,7 @@ def test_each_factor_moves_what_it_is_named_for(tmp_path: Path) -> None:
     states = np.array([25.0, 0.0, 1.25, 0.3, 0.2, 0.0, 0.0, 0.05])
 
     def rates(name: str, factor: float, commands: np.ndarray) -> np.ndarray:
-        fdm = Fdm(aircraft, tried=True, variation=Variation(properties=((f"ident/{name}", factor),)))
+        fdm = Fdm(aircraft, is_tested=True, variation=Variation(properties=((f"ident/{name}", factor),)))
         fdm.move_to(500.0)
         return fdm.derivatives(states, commands)
 
@@ -121,7 +121,7 @@ def test_each_factor_moves_what_it_is_named_for(tmp_path: Path) -> None:
 
 def test_elevons_mix_and_stop(tmp_path: Path) -> None:
     wing = replace(BOOK, layout="wing", throw=(0.4, 0.4, 0.0001))
-    fdm = Fdm(_made(tmp_path, wing), tried=True)
+    fdm = Fdm(_made(tmp_path, wing), is_tested=True)
     fdm.move_to(500.0)
     for elevator, aileron, expected in (
         (-0.2, 0.1, (-0.2, 0.1)),
@@ -134,7 +134,7 @@ def test_elevons_mix_and_stop(tmp_path: Path) -> None:
 
 
 def test_a_v_tail_mixes_elevator_and_rudder(tmp_path: Path) -> None:
-    fdm = Fdm(_made(tmp_path, replace(BOOK, layout="vtail")), tried=True)
+    fdm = Fdm(_made(tmp_path, replace(BOOK, layout="vtail")), is_tested=True)
     fdm.move_to(500.0)
     fdm.balance(np.array([25.0, 0.0, 0.05, 0.0, -0.2, 0.05, 0.1, 0.8]))
     state = fdm.read()

@@ -63,6 +63,6 @@ def test_every_command_with_an_answer_has_a_row() -> None:
 
 def test_every_command_that_an_autopilot_takes_has_a_row() -> None:
     table = command_table()
-    assert "\n| 601 | DO_JUMP_TAG | flown | refused | a jump to the first JUMP_TAG of its number |" in table
+    assert "\n| 601 | DO_JUMP_TAG | flown | refused | a jump to the first JUMP_TAG with its number |" in table
     assert "\n| 30 | NAV_CONTINUE_AND_CHANGE_ALT | not judged | refused |" in table
     assert all(f"| {command.name} |" in table for command in SUPPORT)

@@ -11,8 +11,8 @@ from aircraft.contacts import Contact
 from flight.autopilots.arduplane.failsafes import battery_failsafes
 from flight.autopilots.arduplane.ground_law import (
     ARDUPLANE_GROUND,
-    CONTACTS,
     IN_AIR,
+    MAX_CONTACT_POINTS,
     TAKING_OFF,
     ground_loop,
     ground_tick,
@@ -289,24 +289,24 @@ class ArduPlane(Autopilot):
         """Rules of an RTL from RTL_*, FLIGHT_OPTIONS, LEVEL_ROLL_LIMIT, RALLY_* and TECS and slope limits.
 
         >>> made = ArduPlane(ArduPilotParameters.defaults().changed(RTL_ALTITUDE=-1, FLIGHT_OPTIONS=16, RTL_AUTOLAND=2))
-        >>> made.returns.rules.height, made.returns.rules.climb_first, made.returns.rules.rally_limit
+        >>> made.returns.rules.height, made.returns.rules.initial_climb, made.returns.rules.rally_limit
         (nan, inf, 5000.0)
-        >>> made.returns.rules.lands
+        >>> made.returns.rules.landing_join
         'straight'
         """
         parameters = self.parameters
         return ReturnRules(
             height=math.nan if parameters.rtl_altitude < 0.0 else parameters.rtl_altitude,
             radius=parameters.return_radius,
-            climb_first=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
-            first_bank=min(parameters.level_roll_limit, parameters.roll_limit),
-            sink=parameters.tecs_sink_max or math.inf,
+            initial_climb=math.inf if parameters.climbs_before_turn else parameters.rtl_climb_min,
+            initial_climb_bank=min(parameters.level_roll_limit, parameters.roll_limit),
+            max_sink_rate=parameters.tecs_sink_max or math.inf,
             min_slope_height=parameters.altitude_slope_min,
             rally_limit=parameters.rally_limit,
             includes_home=parameters.rally_includes_home > 0.0,
             slope_to_stated_height=True,
-            lands=_LANDS.get(int(parameters.rtl_autoland), ""),
-            deviation_note=_RETURN_PATH if int(parameters.rtl_autoland) == 4 else "",
+            landing_join=_LANDING_JOIN_BY_AUTOLAND.get(int(parameters.rtl_autoland), ""),
+            deviation_note=_RETURN_PATH_TEXT if int(parameters.rtl_autoland) == 4 else "",
         )
 
     @property
@@ -321,15 +321,15 @@ class ArduPlane(Autopilot):
         return LoiterRules(
             radius=parameters.loiter_radius,
             radius_name="WP_LOITER_RAD",
-            radius_of=radius_read,
+            radius_of=read_loiter_radius,
             radius_scale=_radius_growth,
             steers_to_center=True,
             exits_on_heading=True,
-            climb=parameters.tecs_climb_max,
-            sink=parameters.tecs_sink_max or math.inf,
+            max_climb_rate=parameters.tecs_climb_max,
+            max_sink_rate=parameters.tecs_sink_max or math.inf,
             altitude_tolerance=LOITER_ALTITUDE_TOLERANCE_M,
             unflown_note=_bank_limit_note(parameters.navl1_lim_bank),
-            rtl_exit_note=_BEFORE_RETURN,
+            rtl_exit_note=_EXIT_BEFORE_RTL_TEXT,
         )
 
     @property
@@ -405,7 +405,7 @@ class ArduPlaneFromGround:
         record.parameters = self.parameters.record()
         record.stage_parameters = record.parameters
         ground = record.ground
-        contacts = self.contacts[:CONTACTS]
+        contacts = self.contacts[:MAX_CONTACT_POINTS]
         ground.contacts = len(contacts)
         for index, contact in enumerate(contacts):
             ground.contact[index] = contact.forward, contact.right, contact.down
@@ -418,6 +418,7 @@ class ArduPlaneFromGround:
             self._begin_landing(self.ground_phases.approach, ground)
 
     def _begin_take_off(self, take_off: TakeOff, ground: Record) -> None:
+        """Set stage, throttle, pitch and altitudes of a take-off in the ground record (`GROUND_STATE`)."""
         parameters, launch = self.parameters, take_off.launch
         ground.stage, ground.is_on_runway = TAKING_OFF, launch.method == "runway"
         ground.motor_start = self.motor_start
@@ -449,6 +450,7 @@ class ArduPlaneFromGround:
         return max(take_off.pitch, min(parameters.pitch_limit_max, parameters.tecs_pitch_max or math.inf))
 
     def _begin_landing(self, approach: Approach, ground: Record) -> None:
+        """Set glide, flare and airspeed of a landing in the ground record (`GROUND_STATE`)."""
         landing_altitude = float(approach.point[2])
         glide = self.autopilot.ground.glide(
             approach.start_altitude - landing_altitude, approach.length, approach.tail_wind, landing_altitude
@@ -471,39 +473,43 @@ _TURNOVER_SPEED_RATIO = 0.75
 # Ground speed above which ArduPlane knows its course, m/s.
 _COURSE_SPEED_MPS = 5.0
 
-# Continuation of an RTL, by RTL_AUTOLAND; with 3 the landing sequence is only for go-arounds.
-_LANDS: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
-_RETURN_PATH = (
-    "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence: not flown, it stays in its circle"
+# Join to the landing sequence after an RTL, by RTL_AUTOLAND; with 3 the landing sequence is only for go-arounds.
+_LANDING_JOIN_BY_AUTOLAND: dict[int, Literal["", "circle", "straight"]] = {1: "circle", 2: "straight"}
+_RETURN_PATH_TEXT = (
+    "RTL_AUTOLAND 4 returns along the mission's return path or landing sequence: this is not simulated, and the RTL"
+    " ends in its loiter"
 )
 
-# `Plane::verify_loiter_heading` lines up with the place of the next item; an RTL item has no place, which is 0 N 0 E.
-_BEFORE_RETURN = (
-    "ArduPlane leaves its circle on the heading to 0° N 0° E, and returns from there: so it is flown, but the route is"
-    " judged on the heading to home"
+# `Plane::verify_loiter_heading` waits for the heading to the position of the next item.  The position of an RTL item is
+# 0 N 0 E.
+_EXIT_BEFORE_RTL_TEXT = (
+    "ArduPlane leaves the loiter on the heading to 0° N 0° E, and starts the RTL there: the flight does so, but the"
+    " route is judged with an exit on the heading to home"
 )
 
 # Bit of MIS_OPTIONS: clear the mission when ArduPlane starts.
 _CLEAR_AT_START = 1 << 0
-# ArduPlane treats a radius up to this as no radius, m.
-_NO_RADIUS_M = 1.0
+# ArduPlane ignores a radius up to this value, m.
+_MAX_IGNORED_RADIUS_M = 1.0
 # The radius of LOITER_TURNS is stored in a byte, in whole metres or, from this on, in tens of metres.  Loiters without
 # end and to an altitude have sixteen bits (`AP_Mission::mavlink_int_to_mission_cmd`).
 _MAX_BYTE_RADIUS_M = 255.0
 
 
-def radius_read(loiter: Loiter) -> float:
-    """Return the radius that ArduPlane reads from a loiter's item, m; 0 if it reads no radius.
+def read_loiter_radius(loiter: Loiter) -> float:
+    """Return the radius that ArduPlane reads from a loiter's item, m; 0 if it flies WP_LOITER_RAD instead.
 
-    It reads the radius of loiters by turns, to an altitude, and without end.  For a loiter by time, even of zero time,
-    it flies WP_LOITER_RAD, and reads only the side from the item: of the four `Plane::verify_loiter_*` only the
-    function for time passes no radius of the item to `Plane::update_loiter`.
+    ArduPlane reads the radius of loiters by turns, to an altitude, and without end.  In a loiter by time, even of zero
+    time, it flies WP_LOITER_RAD, and reads only the direction from the item: `Plane::verify_loiter_time` passes no
+    radius of the item to `Plane::update_loiter`.
 
-    >>> radius_read(Loiter(-250.7, turns=3)), radius_read(Loiter(307.0, turns=3)), radius_read(Loiter(1.0, turns=3))
-    (250.0, 300.0, 0.0)
-    >>> radius_read(Loiter(307.0, seconds=60.0, endless=True)), radius_read(Loiter(200.0, to_height=True))
-    (307.0, 200.0)
-    >>> radius_read(Loiter(200.0, seconds=60.0, timed=True)), radius_read(Loiter(200.0, timed=True))
+    >>> [read_loiter_radius(Loiter(radius, turns=3)) for radius in (-250.7, 307.0, 1.0)]
+    [250.0, 300.0, 0.0]
+    >>> read_loiter_radius(Loiter(307.0, seconds=60.0, endless=True))
+    307.0
+    >>> read_loiter_radius(Loiter(200.0, to_altitude=True))
+    200.0
+    >>> read_loiter_radius(Loiter(200.0, seconds=60.0, timed=True)), read_loiter_radius(Loiter(200.0, timed=True))
     (0.0, 0.0)
     """
     if loiter.timed:
@@ -511,9 +517,9 @@ def radius_read(loiter: Loiter) -> float:
     if not math.isfinite(loiter.radius):
         return abs(loiter.radius)
     stated_radius = float(math.floor(abs(loiter.radius)))
-    if not (loiter.endless or loiter.to_height) and stated_radius > _MAX_BYTE_RADIUS_M:
+    if not (loiter.endless or loiter.to_altitude) and stated_radius > _MAX_BYTE_RADIUS_M:
         stated_radius = 10.0 * min(_MAX_BYTE_RADIUS_M, math.floor(stated_radius / 10.0))
-    return stated_radius if stated_radius > _NO_RADIUS_M else 0.0
+    return stated_radius if stated_radius > _MAX_IGNORED_RADIUS_M else 0.0
 
 
 def _radius_growth(up: float) -> float:

@@ -9,9 +9,9 @@ from typing import Literal, NamedTuple
 from flight.autopilots.arduplane.parameters import OTHER_BATTERY_MONITORS, ArduPilotParameters
 from flight.autopilots.parts import BatteryFailsafe
 
-# Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or else RTL;
-# "on": it continues the mission; "landed": it is on the ground; "never": nothing can trigger the cause; the others do
-# not lead home.
+# Reaction of ArduPlane.  "return": RTL; "land": the mission's landing sequence; "autoland": mode AUTOLAND, or RTL
+# without that mode; "on": continue the mission; "landed": none, because the aircraft is on the ground; "never": none,
+# because nothing can trigger the cause; the other reactions do not lead home.
 FailsafeAction = Literal[
     "return",
     "land",
@@ -31,7 +31,7 @@ FailsafeAction = Literal[
 class Cause(NamedTuple):
     """A possible cause of leaving the mission.
 
-    name: name for people.
+    name: name in messages.
     does: ArduPlane's reaction.
     parameter, value: the parameter that decides the reaction, and its value; "" if no parameter decides.
     """
@@ -43,14 +43,14 @@ class Cause(NamedTuple):
 
     @property
     def returns(self) -> bool:
-        """True if it flies an RTL; a landing is not an RTL."""
+        """True if the reaction is an RTL; a landing is not an RTL."""
         return self.does == "return"
 
 
 _LONG_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
 # FBWA without a pilot: wings level, nose level, throttle at its minimum.
 _SHORT_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "circle", 2: "glide", 3: "on", 4: "level"}
-# Without a quadplane's rotors a landing on them (4, 6) is the same as 2.
+# Without a quadplane's rotors the vertical landings 4 and 6 are the same as 2.
 _BATTERY_FAILSAFE: dict[int, FailsafeAction] = {
     0: "on",
     1: "return",
@@ -72,8 +72,8 @@ def failsafe_causes(
     """Return the causes that can end a mission in AUTO, in the order of interest to pilots.
 
     has_fence: True if the mission carries a fence.
-    has_landing: True if it has a landing sequence; without one a landing is an RTL.
-    ends_landed: True if it ends on the ground.
+    has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
+    ends_landed: True if the mission ends on the ground.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
@@ -89,13 +89,13 @@ def failsafe_causes(
     long_action = int(parameters.long_failsafe)
     causes = [Cause("the pilot's RTL", "return"), Cause("the mission's end", "landed" if ends_landed else "return")]
     short_action = int(parameters.short_failsafe)
-    # THR_FAILSAFE 2 notices the loss, and starts no failsafe.
+    # THR_FAILSAFE 2 detects the loss, but starts no failsafe.
     detects_loss = parameters.throttle_failsafe == 1.0
     leaves_auto = _SHORT_FAILSAFE.get(short_action, "on") != "on" and detects_loss
     if leaves_auto:
         causes.append(Cause("RC lost for 1.5 s", _SHORT_FAILSAFE[short_action], "FS_SHORT_ACTN", short_action))
     if leaves_auto and long_action == 0:
-        # It is no longer in AUTO, and from any other mode FS_LONG_ACTN 0 is an RTL.
+        # After the short failsafe ArduPlane is no longer in AUTO; in any other mode FS_LONG_ACTN 0 is an RTL.
         causes.append(Cause("RC lost", "return", "FS_SHORT_ACTN", short_action))
     elif detects_loss:
         causes.append(Cause("RC lost", _LONG_FAILSAFE.get(long_action, "on"), "FS_LONG_ACTN", long_action))
@@ -118,7 +118,7 @@ def failsafe_causes(
 def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> list[Cause]:
     """Return the reactions to a low and a critical battery, for each battery monitor that is on.
 
-    Nothing triggers them without a monitor or without a threshold that the monitor can reach.
+    The reaction is "never" without a monitor or without a threshold that the monitor can reach.
     """
     monitors, causes = monitored_batteries(parameters), []
     for monitor in dict.fromkeys(["BATT", *monitors]):

@@ -3,11 +3,11 @@
 It follows `AP_Landing::type_slope_verify_abort_landing` and `restart_landing_sequence` (libraries/AP_Landing) and
 `Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  The aircraft climbs with
 level wings at the pitch of the last take-off and open throttle until it is above the go-around altitude, which is
-relative to *home*; if the field lies higher than home, that may be at once.  Then it goes to the nearest landing
-sequence: from its position to the first place of the sequence, turning on the short side, on a straight slope from its
-altitude, and by the sequence's other places back to the line-up.
+relative to *home*: at an airfield above home, the climb may end at once.  Then it joins the nearest landing sequence:
+it takes the shorter turn to the first stop of the sequence, on a straight slope from its altitude, and flies the other
+stops back to the line-up.
 
-The point mass and the control law of each leg are those of `flight.autopilots.arduplane.rtl_point_mass`.
+The point mass and the control law are the same as in `flight.autopilots.arduplane.rtl_point_mass`.
 """
 
 import math
@@ -42,7 +42,7 @@ class GoArounds:
 
     flown: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
     ways: n arrays (t, 3) of positions at intervals of 1 s, m.
-    landings: n, the landing sequence that each go-around joins.
+    landings: landing sequence that each go-around joins, n.
     """
 
     flown: Records
@@ -60,24 +60,27 @@ def climb_rows(positions: Floats, end_altitude: float) -> int:
     return int(np.argmax(is_above)) if is_above.any() else len(positions)
 
 
-def aborted_at(place: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass) -> Records:
-    """Return (1,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`: the abort point on a glide.
+def abort_start(
+    position: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass
+) -> Records:
+    """Return the start of a go-around at a position on a glide, (1,) of `RETURN_START`.
 
-    place: east, north, up, m.
+    position: east, north, up, m.
     course: course of the glide over the ground, rad.
     slope: slope of the glide, m per m.
-    airspeed: true airspeed, m/s.  The wind is taken from the aircraft.
+    airspeed: true airspeed, m/s.
+    aircraft: point mass, which also holds the wind.
     """
     start: Records = np.zeros(1, RETURN_START)
     record = aircraft.record
-    wind_speed = mean_wind_speed(record.wind_speed, record.wind_gradient, record.wind_reference, float(place[2]))
+    wind_speed = mean_wind_speed(record.wind_speed, record.wind_gradient, record.wind_reference, float(position[2]))
     wind_east, wind_north = wind_speed * record.wind_east, wind_speed * record.wind_north
     sin, cos = math.sin(course), math.cos(course)
     cross_wind = wind_east * cos - wind_north * sin
     speed = max(
         1.0, math.sqrt(max(1.0, airspeed * airspeed - cross_wind * cross_wind)) + wind_east * sin + wind_north * cos
     )
-    start["east"], start["north"], start["up"] = place
+    start["east"], start["north"], start["up"] = position
     start["velocity_east"], start["velocity_north"], start["velocity_up"] = speed * sin, speed * cos, -speed * slope
     return start
 
@@ -91,12 +94,12 @@ def fly_go_arounds(
     aircraft: PointMass,
     environment: ReturnEnvironment,
 ) -> GoArounds:
-    """Simulate a go-around from each of n places on a glide to the end of a landing sequence.
+    """Simulate a go-around from each of n starts on a glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    end_altitude: altitude above which the climb ends, m AMSL.  pitch: pitch of the climb, rad.
-    landings: one or more landing sequences; each go-around joins the nearest one where its climb is over.  A loiter in
-        a sequence is the last place: the go-around is over once around it.
+    end_altitude, pitch: altitude above which the climb ends, m AMSL, and its pitch, rad.
+    landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  A
+        loiter in a sequence is its last stop: the go-around ends after one circle.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -107,7 +110,7 @@ def fly_go_arounds(
     >>> from world.wind import Wind
     >>> aerosonde = load_aircraft("aerosonde")
     >>> made = point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
-    >>> start = aborted_at((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, made)
+    >>> start = abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, made)
     >>> behind = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
     >>> world, law = surroundings(load_scenario("jacksboro")), ArduPilotParameters.load(aerosonde)
     >>> (way,) = fly_go_arounds(start, 840.0, 0.17, behind, law, made, world).ways
@@ -170,7 +173,7 @@ def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
 
 
 def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
-    """Return (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`: the places up to the first loiter."""
+    """Return the stops up to the first loiter, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`."""
     places = truncate_at_first_loiter(sequence)
     stages: Records = np.zeros(len(places), WAYPOINT)
     for stage, place in zip(stages, places, strict=True):

@@ -7,9 +7,9 @@ Take-off (ArduPlane/takeoff.cpp, `Plane::verify_takeoff` in commands_logic.cpp):
 been above 5 m/s, in 4.6 for two seconds; then the course over the ground at that time is held as heading, less the yaw
 since the launch.  Full throttle, speed by pitch, never below the pitch of the item; bank limited to LEVEL_ROLL_LIMIT up
 to TKOFF_LVL_ALT, unrestricted from three times that height.  It ends above the item's altitude, or TKOFF_PLIM_SEC after
-leveling off began.  The next leg begins at the aircraft, and is flown without a line.
+leveling off began.  The next leg begins at the aircraft, and follows no line.
 
-Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the line beyond the landing point, on the glide of
+Landing (libraries/AP_Landing/AP_Landing_Slope.cpp): along the extended line to the landing point, on the glide of
 `flight.autopilots.arduplane.landing`.  The approach stage begins when the aircraft is lined up, or at once after a
 NAV_LOITER_TO_ALT; until then the airspeed is AIRSPEED_CRUISE.  From then on the flare may begin: below LAND_FLARE_ALT,
 or LAND_FLARE_SEC before the ground at the current sink rate on the second half, or beyond the point.  In the flare the
@@ -24,7 +24,7 @@ import numpy as np
 
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
-    NAVIGATION_TICK,
+    NAVIGATION_TICK_S,
     control_as_ardupilot,
     control_attitude,
     initialise_memory,
@@ -47,11 +47,11 @@ from flight.simulation.tick import (
     END_OVERBANK,
     END_TIPPED_OVER,
     GROUND,
+    LOSS_OF_CONTROL_BANK_RAD,
     NO_MOTOR,
     NOT_A_NUMBER,
     PATH_ROW,
     STALLED,
-    STEEPEST_BANK,
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
@@ -63,7 +63,7 @@ from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 
 # Maximum number of points of an aircraft that may touch the ground: JSBSim's own models have up to 19.
-CONTACTS = 24
+MAX_CONTACT_POINTS = 24
 # Stages of a flight, in order: the take-off ...
 TAKING_OFF = 0
 # ... the legs of the mission ...
@@ -81,13 +81,13 @@ GROUND_STATE = record_dtype(
     ("has_lifted_off", np.bool_),
     ("has_touched_down", np.bool_),  # True once it touched down
     "time",  # s since the release
-    # Points that may touch the ground, from the center of gravity: m forward, right, down.
-    ("contact", np.float64, (CONTACTS, 3)),
-    ("is_support", np.int64, (CONTACTS,)),  # 1 for a point on which the aircraft stands, else 0
+    # Points that may touch the ground: m forward, right and down of the center of gravity.
+    ("contact", np.float64, (MAX_CONTACT_POINTS, 3)),
+    ("is_support", np.int64, (MAX_CONTACT_POINTS,)),  # 1 for a point on which the aircraft stands, else 0
     ("contacts", np.int64),
     ("touches_ground", np.bool_),
     ("is_tipped", np.bool_),  # True if the lowest touching point is not one on which the aircraft stands
-    "turnover_speed",  # m/s, ground speed above which that ends the flight
+    "turnover_speed",  # m/s, ground speed above which a tipped aircraft ends the flight
     "rest_time",  # s at rest
     # Take-off.
     "motor_start",  # s, time of the motor start
@@ -102,7 +102,8 @@ GROUND_STATE = record_dtype(
     "yaw",  # rad, at the launch
     ("is_heading_held", np.bool_),
     "heading",  # rad, heading that is held (`steer_state.hold_course_cd`)
-    # m below the end, where leveling off began; 0 before (`auto_state.height_below_takeoff_to_level_off_cm`).
+    # m below the end altitude at which leveling off began; 0 before
+    # (`auto_state.height_below_takeoff_to_level_off_cm`).
     "leveling_height",
     "leveling_start",  # s since the release (`takeoff_state.level_off_start_time_ms`)
     ("rotation_complete", np.bool_),  # `auto_state.rotation_complete`
@@ -112,7 +113,7 @@ GROUND_STATE = record_dtype(
     "east",  # m, of the landing point
     "north",
     "up",  # m AMSL
-    "glide_start_altitude",  # m AMSL, of the waypoint before
+    "glide_start_altitude",  # m AMSL, of the waypoint before the landing point
     "slope",
     "flare_height",  # m above the landing point, start of the flare
     "flare_distance",  # m before the landing point, start of the flare
@@ -138,17 +139,17 @@ GROUND_NUMBERS = ARDUPLANE_GROUND.itemsize // 8
 _COURSE_SPEED_MPS = 5.0
 # Time above that speed after which the heading is held, s; 4.7 holds it at once.
 _HEADING_HOLD_DELAY_S = 2.0
-# L1's frequency times its period: sqrt(2) pi.
+# Product of L1's frequency and NAVL1_PERIOD: sqrt(2) pi.
 _HEADING_GAIN = 4.4428
 # Lowest pitch of a rotation after TKOFF_ROTATE_SPD, rad.
 _MIN_ROTATION_PITCH_RAD = math.radians(5.0)
 # A take-off levels off only above this height over home, m.
 _MIN_LEVELING_HEIGHT_M = 10.0
-# The aircraft is lined up within this angle of the landing line, rad ...
+# The approach begins within this angle of the landing line, rad ...
 _LINE_UP_ANGLE_RAD = math.radians(10.0)
-# ... and within this cross-track distance, m.  Lined up, it begins the approach.
+# ... and within this cross-track distance, m.
 _LINE_UP_CROSS_TRACK_M = 5.0
-# Past this fraction of the line, within the angle and below the start of the glide, it begins the approach as well ...
+# The approach also begins past this fraction of the line, within that angle and below the start of the glide ...
 _APPROACH_START_FRACTION = 0.15
 # ... and past this fraction in any case.
 _APPROACH_LATEST_FRACTION = 0.5
@@ -160,7 +161,7 @@ _TOUCHDOWN_DISTANCE_M = 150.0
 _STOPPED_SPEED_MPS = 0.2
 # ... for this time, s.
 _STOPPED_TIME_S = 5.0
-# An aircraft on a runway whose motor has not started by then never takes off, s.
+# Time after which a motor that has not started on a runway is assumed never to start, s.
 _MOTOR_START_TIMEOUT_S = 10.0
 
 
@@ -231,7 +232,7 @@ def ground_loop(
 
 @inner
 def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:
-    """Update whether the aircraft touches the ground, and whether it is tipped over; the ground is level, as in JSBSim.
+    """Update whether the aircraft touches the ground, and whether it is tipped over; assume level ground, as in JSBSim.
 
     state: a `flight.dynamics.state.STATE` record.
     clearance: height of the center of gravity above ground, m.
@@ -246,7 +247,7 @@ def update_ground_contact(state: Record, clearance: float, ground: Record) -> No
             cos_pitch * (math.sin(state.roll) * contact[1] + math.cos(state.roll) * contact[2]) - sin_pitch * contact[0]
         )
         if depth >= lowest_depth:
-            # The lowest touching point decides: an aircraft on its skids may be pressed into the ground.
+            # The lowest touching point decides whether the aircraft is tipped, because skids may sink into the ground.
             lowest_depth, ground.touches_ground, ground.is_tipped = depth, True, ground.is_support[k] == 0
 
 
@@ -261,7 +262,7 @@ def end_status(work: Record, ground: Record) -> int:
     is_battery_empty = work.air.energy >= work.settings.battery
     if ground.stage == IN_AIR:
         return GROUND if ground.touches_ground else status_in_air(work)
-    if abs(state.roll) > STEEPEST_BANK:
+    if abs(state.roll) > LOSS_OF_CONTROL_BANK_RAD:
         return END_OVERBANK
     if ground.is_tipped and ground_speed > ground.turnover_speed:
         return END_TIPPED_OVER
@@ -294,7 +295,7 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
     eas2tas = true_by_equivalent(estimated.up)
-    # The measured track begins where the take-off ends.
+    # The track is measured against the path only after the take-off.
     work.memory.leg, work.memory.distance = ground.leg, pieces[0].start
     work.memory.cross_track, work.memory.height_error = 0.0, 0.0
     if not memory.is_initialised:
@@ -306,7 +307,7 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
     )
     memory.time_to_update -= dt
     if memory.time_to_update < 0.5 * dt:
-        memory.time_to_update += NAVIGATION_TICK
+        memory.time_to_update += NAVIGATION_TICK_S
         _demand_heading(state, estimated, arduplane.parameters, ground, memory)
         memory.altitude_demand_in, memory.altitude_demand_limited = estimated.up, estimated.up
         memory.altitude_demand, memory.climb_rate_demand = estimated.up, 0.0
@@ -317,7 +318,7 @@ def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: 
             stage_parameters.airspeed_max, max(stage_parameters.airspeed_min, waypoints[ground.leg].airspeed)
         )
         work.memory.speed_command = target_airspeed * eas2tas
-        update_tecs(state, estimated, stage_parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK)
+        update_tecs(state, estimated, stage_parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK_S)
         _limit_rotation_pitch(estimated, arduplane.parameters, ground, memory)
     throttle_demand = ground.takeoff_throttle if ground.time >= ground.motor_start else 0.0
     max_step = ground.throttle_slew * dt
@@ -371,7 +372,7 @@ def _set_take_off_parameters(
     stage_parameters.pitch_limit_min = ground.takeoff_pitch * _leveling_fraction(estimated, parameters, ground)
     if parameters.stall_prevention > 0.0:
         stage_parameters.pitch_limit_min *= math.cos(min(0.5 * math.pi, roll_error)) ** 2
-    # The minimum pitch is also the maximum: no observed take-off had more, because TECS's integrators stay wound up.
+    # The minimum pitch is also the maximum: no observed take-off exceeded it, because TECS's integrators stay wound up.
     stage_parameters.pitch_limit_max = stage_parameters.pitch_limit_min
     level_height, height = parameters.takeoff_level_height, estimated.up - ground.launch_up
     fraction = min(1.0, max(0.0, (height - level_height) / (2.0 * level_height))) if level_height > 0.0 else 1.0
@@ -381,11 +382,10 @@ def _set_take_off_parameters(
 
 @inner
 def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:
-    """Return the fraction of the minimum pitch that remains near the end of the take-off.
+    """Return the fraction of the minimum pitch that applies near the end of the take-off.
 
-    Follows `Plane::get_takeoff_pitch_min_cd`.
-
-    The pitch is reduced once the climb would reach the final altitude within TKOFF_PLIM_SEC.
+    Follows `Plane::get_takeoff_pitch_min_cd`: the pitch is reduced once the climb would reach the end altitude within
+    TKOFF_PLIM_SEC.
     """
     remaining_height = ground.takeoff_end_altitude - estimated.up
     if ground.leveling_height > 0.0:
@@ -403,13 +403,13 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 
 @inner
 def _demand_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
-    """Demand the lateral acceleration to the held heading, or 0 before it is known.
+    """Set the lateral acceleration demand to hold the heading, or to 0 before that heading is known.
 
     Follows `AP_L1_Control::update_heading_hold`.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     if ground.time_at_course_speed > 0.0 or ground_speed > _COURSE_SPEED_MPS:
-        ground.time_at_course_speed += NAVIGATION_TICK
+        ground.time_at_course_speed += NAVIGATION_TICK_S
     delay = 0.0 if parameters.is_4_7 else _HEADING_HOLD_DELAY_S
     if not ground.is_heading_held and ground.time_at_course_speed > 0.0 and ground.time_at_course_speed >= delay:
         ground.is_heading_held = True
@@ -427,12 +427,12 @@ def _demand_heading(state: Record, estimated: Record, parameters: Record, ground
 def _begin_first_leg(
     estimated: Record, waypoints: Records, pieces: Records, guidance: Record, ground: Record, memory: Record
 ) -> None:
-    """Begin the leg that follows the take-off at the aircraft's position, without a line (`Plane::set_next_WP`)."""
+    """Begin the leg after the take-off at the aircraft's position; the leg follows no line (`Plane::set_next_WP`)."""
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
     waypoints[ground.leg + 1].without_crosstrack = True
-    # Go to the first piece of that leg.
+    # Advance to the first piece of that leg.
     while pieces[guidance.piece].leg < ground.leg and guidance.piece + 1 < pieces.shape[0]:
         guidance.piece += 1
 
@@ -453,7 +453,7 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
     work.memory.is_finished = False
     memory.time_to_update -= dt
     if memory.time_to_update < 0.5 * dt:
-        memory.time_to_update += NAVIGATION_TICK
+        memory.time_to_update += NAVIGATION_TICK_S
         line_position = _follow_line_to_point(estimated, arduplane.parameters, ground, memory)
         _update_stage(estimated, arduplane.parameters, ground, memory, line_position)
         _demand_glide(estimated, arduplane.parameters, ground, memory, line_position[0])
@@ -464,9 +464,9 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
         )
         work.memory.speed_command = target_airspeed * eas2tas
         if ground.stage == FLARING:
-            # Slow and without throttle it must not be in underspeed: the flare ignores it.
+            # The flare ignores underspeed, which begins only at full throttle.
             memory.throttle_demand = 0.0
-        update_tecs(state, estimated, stage_parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK)
+        update_tecs(state, estimated, stage_parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK_S)
     work.memory.height_error = estimated.up - memory.altitude_demand
     previous_throttle = work.commands.throttle
     control_attitude(state, estimated, work.gains, work.memory, stage_parameters, memory, eas2tas, work.commands, dt)
@@ -480,12 +480,12 @@ def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> Non
 def _follow_line_to_point(
     estimated: Record, parameters: Record, ground: Record, memory: Record
 ) -> tuple[float, float, float, float]:
-    """Demand the lateral acceleration along the line to the landing point and beyond.
+    """Set the lateral acceleration demand to follow the extended line to the landing point.
 
     Follows `AP_L1_Control::update_waypoint`.
 
-    Return the distance to the point along the line (m), the flown fraction of the line, the angle between course and
-    line as L1 measures it (rad), and the cross-track distance (m).
+    Return the remaining distance along the line (m), the flown fraction of the line, the magnitude of L1's angle
+    (`_last_Nu`, rad), and the cross-track distance (m).
     """
     leg_e, leg_n = ground.east - memory.from_east, ground.north - memory.from_north
     line_length = max(1e-6, math.hypot(leg_e, leg_n))
@@ -495,7 +495,7 @@ def _follow_line_to_point(
     extended_length = math.hypot(offset_e, offset_n) + _LINE_EXTENSION_M
     ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
-    angle, aim = l1_angles(
+    angle, aim_angle = l1_angles(
         estimated,
         memory.from_east,
         memory.from_north,
@@ -504,10 +504,10 @@ def _follow_line_to_point(
         l1_distance,
     )
     memory.cross_track_integrator = l1_integrate(
-        aim, memory.cross_track_integrator, parameters.navl1_xtrack_i, NAVIGATION_TICK
+        aim_angle, memory.cross_track_integrator, parameters.navl1_xtrack_i, NAVIGATION_TICK_S
     )
-    if not math.isnan(aim):
-        angle += aim + memory.cross_track_integrator
+    if not math.isnan(aim_angle):
+        angle += aim_angle + memory.cross_track_integrator
     angle = keep_turn_side(estimated, angle, ground.east, ground.north, memory)
     memory.lateral_acceleration = l1_acceleration(angle, ground_speed, l1_distance, parameters.navl1_damping)
     return line_length - along, along / line_length, abs(angle), abs(cross_track)
@@ -521,11 +521,11 @@ def _update_stage(
     memory: Record,
     line_position: tuple[float, float, float, float],
 ) -> None:
-    """Change to the approach, or to the flare, when its condition is met.
+    """Change to the approach stage or to the flare once the stage's condition is met.
 
     Follows `AP_Landing::type_slope_verify_land`.
 
-    line_position: as `_follow_line_to_point` returns it.
+    line_position: result of `_follow_line_to_point`.
     """
     _, fraction, line_angle, cross_track = line_position
     height, sink_rate = estimated.up - ground.up, -estimated.velocity_up
@@ -560,11 +560,11 @@ def _update_stage(
 def _demand_glide(
     estimated: Record, parameters: Record, ground: Record, memory: Record, remaining_distance: float
 ) -> None:
-    """Demand the altitude of the glide, and in the flare a sink rate that blends to its final value.
+    """Set the altitude and climb rate demands of the glide, or of the flare, whose sink rate blends to TECS_LAND_SINK.
 
     Follows `AP_Landing::type_slope_setup_landing_glide_slope` and `AP_TECS::_update_height_demand`.
 
-    remaining_distance: to the landing point, m.
+    remaining_distance: distance to the landing point along the line, m; negative beyond it.
     """
     memory.max_climb_scaler, memory.max_sink_scaler = 1.0, 1.0
     if ground.stage < FLARING:
@@ -579,8 +579,8 @@ def _demand_glide(
             fraction = min(1.0, max(0.0, (entry_height - height) / (entry_height - parameters.flare_holdoff)))
         final_sink = parameters.landing_sink + parameters.landing_sink_change * max(0.0, -remaining_distance)
         memory.climb_rate_demand = -ground.entry_sink * (1.0 - fraction) - final_sink * fraction
-        ground.flare_adjusted += memory.climb_rate_demand * NAVIGATION_TICK
-        ground.flare_ideal += memory.climb_rate_demand * NAVIGATION_TICK
+        ground.flare_adjusted += memory.climb_rate_demand * NAVIGATION_TICK_S
+        ground.flare_ideal += memory.climb_rate_demand * NAVIGATION_TICK_S
         # As in `AP_TECS::_update_height_demand` since 4.6.3.
         memory.altitude_demand = ground.flare_adjusted * (1.0 - fraction) + ground.flare_ideal * fraction
     memory.altitude_demand_in, memory.altitude_demand_limited = memory.altitude_demand, memory.altitude_demand

@@ -1,8 +1,8 @@
 """Compute ArduPlane's glide from the waypoint before the landing, and its go-around altitude.
 
-From that waypoint it flies a straight slope to the start of the flare, before and above the landing point.  The flare
-starts at the height which the slope's sink rate covers in LAND_FLARE_SEC, but no higher than twice LAND_FLARE_ALT, and
-at the distance which it flies over the ground while the sink rate falls to TECS_LAND_SINK.  Follows
+From that waypoint ArduPlane flies a straight slope to the start of the flare, before and above the landing point.  The
+height at the start of the flare is the sink rate of the slope times LAND_FLARE_SEC, at most twice LAND_FLARE_ALT; the
+distance from the landing point is flown while the sink rate falls to TECS_LAND_SINK.  Follows
 `AP_Landing::type_slope_setup_landing_glide_slope` and `type_slope_get_target_airspeed_cm`
 (libraries/AP_Landing/AP_Landing_Slope.cpp) in ArduPlane 4.6.
 """
@@ -21,9 +21,12 @@ _GO_AROUND_ALTITUDE_M = 30.0
 
 
 def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float:
-    """Return the equivalent airspeed on the glide, between minimum and cruise and higher in a head wind, m/s.
+    """Return the equivalent airspeed on the glide, m/s.
 
-    No landing is faster than the cruise airspeed, whatever TECS_LAND_ARSPD is.
+    The airspeed is TECS_LAND_ARSPD, or by default midway between AIRSPEED_MIN and AIRSPEED_CRUISE, increased in a head
+    wind, and never above AIRSPEED_CRUISE.
+
+    tail_wind: m/s, negative for a head wind.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> default = ArduPilotParameters.defaults()  # minimum 9, cruise 12
@@ -40,7 +43,8 @@ def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float
 def landing_glide(height: float, distance: float, ground_speed: float, parameters: ArduPilotParameters) -> LandingGlide:
     """Return the glide to a landing point from the waypoint before it.
 
-    height, distance: height of the waypoint above the landing point, and its distance before it, m.
+    height: height of the waypoint above the landing point, m.
+    distance: distance of the waypoint from the landing point, m.
     ground_speed: m/s.
 
     At 20 m/s the sink rate from 54 m over 600 m is 1.8 m/s, and the flare's two seconds 3.6 m; the flare lasts
@@ -68,7 +72,7 @@ def landing_glide(height: float, distance: float, ground_speed: float, parameter
 
 
 def go_around_height(stated_height: float, takeoff_height: float) -> float:
-    """Return the height of a go-around above home, m, as the landing item or the take-off states it, or 30 m.
+    """Return the height of a go-around above home, m: from the landing item, else from the take-off, else 30 m.
 
     >>> go_around_height(50.0, 80.0), go_around_height(0.0, 80.0), go_around_height(0.0, 0.0)
     (50.0, 80.0, 30.0)

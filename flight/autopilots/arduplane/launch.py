@@ -1,35 +1,35 @@
 """Compute when ArduPlane starts the motor of a launched aircraft, from acceleration, speed and attitude.
 
-With TKOFF_THR_MINACC it waits for an acceleration along the nose, and then for TKOFF_THR_DELAY; then within a tenth of
-a second the ground speed must be above TKOFF_THR_MINSPD, and the nose between -30 and 45 degrees, or it waits for an
-acceleration again (`Plane::auto_takeoff_check`, ArduPlane/takeoff.cpp, of ArduPlane 4.6).  Without MINACC it waits
-only for the speed, and without either the motor runs as soon as the mission does.
+With TKOFF_THR_MINACC ArduPlane waits for an acceleration along the nose, and then for TKOFF_THR_DELAY.  Within a tenth
+of a second after that the ground speed must be above TKOFF_THR_MINSPD, and the nose between -30 and 45 degrees;
+otherwise ArduPlane waits for an acceleration again (`Plane::auto_takeoff_check`, ArduPlane/takeoff.cpp, of ArduPlane
+4.6). Without TKOFF_THR_MINACC it waits only for the speed; without both parameters the motor starts with the mission.
 """
 
 import math
 
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 
-# Interval of its checks, s.
+# Interval between ArduPlane's checks, s.
 _CHECK_INTERVAL_S = 0.02
-# It gives up waiting for the speed this long after the delay, s.
+# Time after the delay within which the ground speed must be reached, s.
 _SPEED_TIMEOUT_S = 0.1
-# Range of pitch within which it accepts a launch, rad.
+# Range of pitch within which ArduPlane accepts a launch, rad.
 _PITCH_RANGE_RAD = (math.radians(-30.0), math.radians(45.0))
-# A launched aircraft whose motor has not started after this time flies without it, s.
+# Time after the release at which a motor that has not started is assumed never to start, s.
 _MOTOR_START_TIMEOUT_S = 5.0
 
 
 def motor_start(acceleration: float, speed: float, incline: float, parameters: ArduPilotParameters) -> float:
     """Return the time of the motor start after the release, s; it is negative on the rail.
 
-    The result is inf if the motor never starts, and -inf if it runs before the launch.
+    The result is inf if the motor never starts, and -inf if the motor runs before the launch.
 
     acceleration: steady acceleration along the rail, m/s^2; 0 for a runway.
     speed: ground speed at the end of the rail, m/s.
     incline: pitch of the nose, rad.
 
-    A rail of 6 m takes 0.6 s to 20 m/s, at 33 m/s^2; 10 m/s need 8.3 m/s^2.
+    On a rail of 6 m the aircraft reaches 20 m/s in 0.6 s at 33 m/s^2; for 10 m/s it needs 8.3 m/s^2.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(TKOFF_THR_MINACC=15.0)
@@ -63,7 +63,7 @@ def motor_start(acceleration: float, speed: float, incline: float, parameters: A
 
 
 def takeoff_slew(parameters: ArduPilotParameters) -> float:
-    """Return the throttle slew rate of a take-off, fraction of its range per s; inf for no limit.
+    """Return the throttle slew rate of a take-off, fraction of the throttle range per s; inf for no limit.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> [takeoff_slew(ArduPilotParameters.defaults().changed(TKOFF_THR_SLEW=slew)) for slew in (0.0, -1.0, 50.0)]

@@ -11,8 +11,8 @@ from flight.autopilots.arduplane.tecs import airspeed_target, limited_nav_roll, 
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.path import find_on_path, leave_sharp_corners, profile
-from flight.mission.itinerary import UNLIMITED
+from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     MISSED_ROUTE_DISTANCE_M,
@@ -21,8 +21,8 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
-    end_return,
     end_tick,
+    update_rtl_loiter,
 )
 from world.arrays import Floats, Heights
 from world.frames import polymap
@@ -46,11 +46,11 @@ ARDUPILOT_MEMORY = record_dtype(
     "loiter_time",  # s since the capture (compared with `loiter.time_max_ms`)
     "loiter_angle_sum",  # rad around the center since the capture, in the loiter's direction (`loiter.sum_cd`)
     "old_loiter_bearing",  # rad, from the center at the last update (`loiter.old_target_bearing_cd`: to the center)
-    ("reached_target_altitude", np.bool_),  # True once it was reached, or given up (`loiter.reached_target_alt`)
+    ("reached_target_altitude", np.bool_),  # True once reached, or abandoned (`loiter.reached_target_alt`)
     "next_sum_lap",  # rad around the loiter at which progress in altitude is checked next (`loiter.next_sum_lap_cd`)
     "start_lap_altitude",  # m, altitude at the last such check (`loiter.start_lap_alt_cm`)
     ("loiter_complete", np.bool_),  # True once the loiter's turns, time or altitude are done
-    "exit_wait_angle",  # rad around the loiter since then
+    "exit_wait_angle",  # rad around the loiter since it was complete
     ("leg_after_loiter", np.int64),  # leg that followed the last loiter, 0 if none
     ("is_in_rtl", np.bool_),  # True during an RTL; from_east, from_north and from_up are then where the RTL began
     ("rtl_climb_complete", np.bool_),  # True once the climb that precedes the turn to home is done (`rtl.done_climb`)
@@ -120,8 +120,8 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
     Follows `AP_TECS::_update_height_demand`.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
-    target: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    parameters, memory: as `flight.autopilots.arduplane.navigator.navigate_legs` takes them.
+    target: the leg's end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    parameters, memory: as for `flight.autopilots.arduplane.navigator.navigate_legs`.
     """
     if target.is_rtl:
         altitude_target = _rtl_altitude(estimated, target, parameters, memory)
@@ -130,7 +130,7 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
     else:
         altitude_target = _leg_altitude(estimated, target, parameters, memory)
     lag_fraction = dt / (dt + parameters.tecs_height_demand_time)
-    # In saturation the raw demand is frozen, and the limits of its rate fade out.
+    # In saturation the input of the demand is frozen, and the limits of the climb and sink rates fade to 0.
     cannot_climb, cannot_sink = (
         memory.saturation > 0 and memory.climb_rate_demand > 0.0,
         memory.saturation < 0 and memory.climb_rate_demand < 0.0,
@@ -152,12 +152,14 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
 
 @inner
 def _is_altitude_step(start_altitude: float, altitude_change: float, target: Record, parameters: Record) -> bool:
-    """Return True if the altitude of a leg from an altitude (m AMSL) changes in a step, not on a slope.
+    """Return True if the altitude demand of a leg jumps to the altitude of the leg's end instead of following a slope.
 
-    altitude_change: height of the leg's end above the aircraft, m.  target: the leg's end.
+    A descent follows a slope. A climb is a step if FLIGHT_OPTIONS demands immediate climbs, and in 4.6 also if the
+    leg begins low over home (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
 
-    It is a step unless it leads down, if every climb is one, and in 4.6 if it begins low over home
-    (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
+    start_altitude: altitude of the leg's start, m AMSL.
+    altitude_change: height of the leg's end above the aircraft, m.
+    target: the leg's end.
     """
     if altitude_change < 0.0:
         return False
@@ -168,10 +170,10 @@ def _is_altitude_step(start_altitude: float, altitude_change: float, target: Rec
 
 @inner
 def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude on the leg's slope at the aircraft, or of the leg's end if the leg is a step.
+    """Return the altitude demand of a leg at the aircraft, m AMSL: on the leg's slope, or the altitude of its end.
 
-    The slope of a leg to a loiter leads to the loiter's center; on the loiter the loiter's altitude applies.  In 4.7
-    the altitude of the leg's end also applies in a climb while the aircraft is low over home
+    The slope of a leg to a loiter leads to the loiter's center. The altitude of the leg's end applies if the altitude
+    changes in a step or only a little, on a loiter, and in 4.7 in a climb while the aircraft is low over home
     (`Plane::set_target_altitude_proportion`).
     """
     end_altitude: float = target.up
@@ -198,7 +200,7 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
     slope_threshold = parameters.altitude_slope_threshold
     if slope_threshold <= 0.0 or altitude_change <= 0.0 or current_altitude <= slope_altitude + slope_threshold:
         return slope_altitude
-    # Above the threshold over a climbing slope, the slope is redrawn from here to its end.
+    # If the aircraft is above a climbing slope by more than the threshold, the slope starts again at the aircraft.
     remaining_change = end_altitude - current_altitude
     if remaining_change < parameters.altitude_slope_min:
         memory.from_up = end_altitude
@@ -211,12 +213,12 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
 def _leg_altitude_above_terrain(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
     """Return the altitude demand of a leg above terrain at the aircraft, m AMSL.
 
-    The height above ground changes linearly along the leg, whatever the change, from the height of the leg's start
-    above the ground there (`Plane::set_target_altitude_proportion_terrain`).  Rise of the terrain ahead beyond half of
-    the maximum climb is added, less the leg's descent (`lookahead_adjustment` in ArduPlane/altitude.cpp).
+    The demanded height above ground changes linearly along the leg, from the height of the leg's start above the ground
+    there (`Plane::set_target_altitude_proportion_terrain`).  The rise of the terrain ahead that exceeds half of the
+    maximum climb rate is added, less the leg's descent (`lookahead_adjustment` in ArduPlane/altitude.cpp).
     """
     if memory.terrain_leg != memory.leg + 1:
-        # The leg began in this update: the ground at its start is looked up before the next update.
+        # The leg began in this update: `update_terrain_lookahead` has not yet looked up the ground at its start.
         return memory.altitude_demand_in
     if memory.reached_loiter_target:
         return memory.terrain_altitude + target.above_ground
@@ -240,7 +242,8 @@ def update_terrain_lookahead(
 
     At the first update of a leg, store the height above ground of its start.  The lookahead follows
     `AP_Terrain::lookahead` with half of TECS_CLMB_MAX as the climb: one sample every TERRAIN_SPACING towards the
-    waypoint, no further than the waypoint or TERRAIN_LOOKAHD.  Samples of unknown ground change nothing.
+    waypoint, no further than the waypoint or TERRAIN_LOOKAHD.  Samples of unknown ground are ignored.
+
     work: a record of `flight.simulation.tick.WORKSPACE`.
     """
     target = waypoints[memory.leg + 1]
@@ -281,9 +284,9 @@ def update_terrain_lookahead(
 
 @inner
 def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude demand of an RTL, m, on a straight slope in a descent, or the target's altitude in a climb.
+    """Return the altitude demand of an RTL, m AMSL: on a straight slope in a descent, else the target's altitude.
 
-    The slope leads from where the RTL began to the center of its loiter; on the loiter the target's altitude applies
+    The slope leads from the start of the RTL to the center of its loiter; on the loiter the target's altitude applies
     (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  The slope down to a rally point is computed as if the
     point's altitude above home were an altitude AMSL, and never exceeds the altitude at which the RTL began
     (`Plane::set_offset_altitude_location`, `Plane::constrain_target_altitude_location`; seen in 20 flights).  Until the
@@ -308,14 +311,14 @@ def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Re
 # One tick of ArduPlane: navigation and TECS run ten times a second, attitude control at every tick.
 #
 # Attitude control uses planfly's inner loops (`flight.guidance.inner_loops`) with the lags of ArduPlane's controllers,
-# whose gains are tuned to the aircraft and do not belong to the law.
+# whose gains are tuned to the aircraft and are not part of this model.
 
 # Interval between updates of navigation and TECS, s (ArduPlane's scheduler table: 10 Hz).
-NAVIGATION_TICK = 0.1
+NAVIGATION_TICK_S = 0.1
 # Lag of the bank behind its demand, as a ratio to RLL2SRV_TCONST.
-ROLL_LAG = 0.84
+ROLL_LAG_RATIO = 0.84
 # Lag of the pitch behind its demand, as a ratio to PTCH2SRV_TCONST.
-PITCH_LAG = 1.1
+PITCH_LAG_RATIO = 1.1
 # Initial value of the SKE integrator, m^2/s^3.  The two pitch integrators balance each other, so steady flight does not
 # determine it; the flight before the first waypoint has left 12 to 39, 27 on average, in 18 flights of ArduPlane.
 INITIAL_SKE_INTEGRATOR = 27.0
@@ -388,29 +391,29 @@ def control_as_ardupilot(
     commands: Record,
     dt: float,
 ) -> None:
-    """Fill the commands for one tick of ``dt`` seconds, and update both memories.
+    """Compute the commands for one tick of ``dt`` seconds, and update both memories.
 
     guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
-
     parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
-    memory: a `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY` record.  The other parameters are those of
-    `flight.autopilots.planfly.law.guide`.  The path is only the reference against which the track is measured; the law
-    does not use it.
+    memory: a record of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
+    Other arguments as for `flight.autopilots.planfly.law.guide`.
+
+    The path is only the reference against which the track is measured; ArduPlane does not use it.
     """
     find_on_path(estimated, pieces, guidance)
     target = waypoints[memory.leg + 1]
     if target.loiter_radius != 0.0 and not target.is_rtl:
         # ArduPlane's own logic ends a loiter; an aircraft that loiters at the mission's end has not missed the route.
         is_last = target.stop == waypoints[-1].stop
-        # An altitude that ArduPlane gave up to reach is a missed altitude.
+        # If ArduPlane ends the loiter without reaching its altitude, the route is missed.
         guidance.is_in_rtl = is_last and (
             not target.loiters_to_altitude or abs(estimated.up - target.up) <= MISSED_ROUTE_DISTANCE_M
         )
-        loiters_forever = target.loiter_time == math.inf and memory.loiter_time > UNLIMITED
+        loiters_forever = target.loiter_time == math.inf and memory.loiter_time > ENDLESS_LOITER_TIME_S
         guidance.is_finished = is_last and (memory.loiter_complete or loiters_forever)
     if memory.is_in_rtl and waypoints[waypoints.shape[0] - 1].is_rtl:
-        end_return(estimated, waypoints[memory.leg + 1], guidance, dt)
-    guidance.height_error = estimated.up - profile(nodes, guidance.distance)[0]
+        update_rtl_loiter(estimated, waypoints[memory.leg + 1], guidance, dt)
+    guidance.height_error = estimated.up - profile_at(nodes, guidance.distance)[0]
     if guidance.is_finished and target.loiters_to_altitude:
         guidance.height_error = estimated.up - target.up
     eas2tas = true_by_equivalent(estimated.up)
@@ -418,17 +421,17 @@ def control_as_ardupilot(
         initialise_memory(state, estimated, waypoints, guidance, parameters, memory)
     memory.time_to_update -= dt
     if memory.time_to_update < 0.5 * dt:
-        memory.time_to_update += NAVIGATION_TICK
-        navigate_legs(estimated, waypoints, parameters, memory, eas2tas, NAVIGATION_TICK)
-        # Skip the rest of a loiter that was left earlier than the path has it.
+        memory.time_to_update += NAVIGATION_TICK_S
+        navigate_legs(estimated, waypoints, parameters, memory, eas2tas, NAVIGATION_TICK_S)
+        # Skip the rest of a loiter that ArduPlane left earlier than the path does.
         while pieces[guidance.piece].leg < memory.leg_after_loiter - 1 and guidance.piece + 1 < pieces.shape[0]:
             guidance.piece += 1
         leave_sharp_corners(pieces, guidance, memory.leg)
-        update_height_demand(estimated, waypoints[memory.leg + 1], parameters, memory, NAVIGATION_TICK)
+        update_height_demand(estimated, waypoints[memory.leg + 1], parameters, memory, NAVIGATION_TICK_S)
         commanded_airspeed, target = waypoints[memory.leg].airspeed, waypoints[memory.leg + 1]
         target_airspeed = airspeed_target(state, estimated, commanded_airspeed, target, parameters, memory, eas2tas)
         guidance.speed_command = target_airspeed * eas2tas
-        update_tecs(state, estimated, parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK)
+        update_tecs(state, estimated, parameters, memory, target_airspeed * eas2tas, eas2tas, NAVIGATION_TICK_S)
     control_attitude(state, estimated, gains, guidance, parameters, memory, eas2tas, commands, dt)
 
 
@@ -436,7 +439,7 @@ def control_as_ardupilot(
 def initialise_memory(
     state: Record, estimated: Record, waypoints: Records, guidance: Record, parameters: Record, memory: Record
 ) -> None:
-    """Initialise the controller's memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
+    """Initialise the memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
     memory.altitude_demand_in = estimated.up
@@ -469,13 +472,13 @@ def control_attitude(
 ) -> None:
     """Drive roll and pitch to their demands with the lags of ArduPlane's controllers, and set the throttle.
 
-    Stands for `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
+    Represents `Plane::stabilize_roll`, `Plane::stabilize_pitch` and `Plane::set_servos`.
     """
     memory.roll_demand = limited_nav_roll(
         memory.lateral_acceleration, state.pitch, state.airspeed / eas2tas, parameters
     )
     previous_roll_rate = guidance.bank_rate
-    roll_rate = (memory.roll_demand - guidance.bank) / (ROLL_LAG * parameters.roll_time)
+    roll_rate = (memory.roll_demand - guidance.bank) / (ROLL_LAG_RATIO * parameters.roll_time)
     roll_rate_max = min(gains.roll_rate_max, parameters.roll_rate_max)
     roll_rate = min(roll_rate_max, max(-roll_rate_max, roll_rate))
     max_change = gains.roll_acceleration_max * dt
@@ -492,7 +495,7 @@ def control_attitude(
     )
     # The rudder gets only its mix with the ailerons: the sideslip of a turn remains and widens the turn.
     commands.rudder = -parameters.rudder_mix * commands.aileron
-    pitch_rate = (memory.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
+    pitch_rate = (memory.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG_RATIO * parameters.pitch_time)
     pitch_rate = min(_MAX_PITCH_RATE_RADPS, max(-_MAX_PITCH_RATE_RADPS, pitch_rate))
     steer_elevator(state, gains, guidance, commands, estimated.velocity_up, state.airspeed * pitch_rate)
     commands.throttle = memory.throttle_demand

@@ -7,9 +7,10 @@ the parameters of ArduPlane's documentation (ardupilot.org, Plane, "Navigation T
 Loiters follow ArduPlane's `Plane::update_loiter`, `verify_loiter_*` and `ModeLoiter::isHeadingLinedUp`.  The aircraft
 follows the line to the center of the loiter until it is within three radii, then steers to the center until the loiter
 demands the sharper turn, and then flies around.  Turns, time and altitude are measured from there on.  Once they are
-done, it keeps loitering until the circle at its place leads to what follows, within ten degrees plus ten for each lap
-of waiting.  The next leg's line begins in the loiter's center, or at the aircraft if the item says so.  The radius
-grows with altitude as the square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).
+complete, it keeps loitering until the tangent at its position leads to the next waypoint, within ten degrees plus ten
+for each lap of waiting.  The next leg's line begins at the loiter's center, or at the aircraft if the item says so.
+The radius grows with altitude as the square of the ratio of true to equivalent airspeed
+(`AP_L1_Control::loiter_radius`).
 """
 
 import math
@@ -25,11 +26,11 @@ from world.kernels import Record, Records, compiled, inner
 MAX_ACCEPTANCE_M = 255.0
 # Distance from the center, in radii, up to which the line to a loiter is followed.
 _APPROACH_LINE_RADII_RATIO = 3.0
-# Altitude tolerance at which a loiter to an altitude is done, m.
+# Altitude tolerance within which a loiter to an altitude is complete, m.
 LOITER_ALTITUDE_TOLERANCE_M = 5.0
-# A loiter to an altitude is also done when the altitude changed by less than that tolerance in this many laps.
+# A loiter to an altitude is also complete if the altitude changes by less than that tolerance in this many laps.
 _ALTITUDE_CHECK_INTERVAL_LAPS = 3.0
-# Heading tolerance for leaving a loiter towards what follows, rad ...
+# Heading tolerance for leaving a loiter towards the next waypoint, rad ...
 _EXIT_HEADING_TOLERANCE_RAD = math.radians(10.0)
 # ... and its growth for each lap of waiting, rad.
 _EXIT_HEADING_GROWTH_RAD = math.radians(10.0)
@@ -82,7 +83,7 @@ def navigate_legs(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Demand a lateral acceleration for the current leg, and change to the next leg when it is time.
+    """Set the lateral acceleration demand on the current leg, and change to the next leg once the leg is over.
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -114,9 +115,9 @@ def navigate_legs(
 
 @inner
 def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
-    """Return east and north (m) of the leg's end, which lies beyond a target with a pass-by distance.
+    """Return east and north (m) of the leg's end: the target, or a point beyond the target with a pass-by distance.
 
-    `Plane::verify_nav_wp` moves the waypoint on along the leg.
+    Follows `Plane::verify_nav_wp`, which moves the waypoint along the leg by that distance.
     """
     leg_e, leg_n = target.east - memory.from_east, target.north - memory.from_north
     leg_length = math.hypot(leg_e, leg_n)
@@ -127,7 +128,7 @@ def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
 
 @inner
 def target_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north (m) of a waypoint of the route, or of the center if it belongs to a loiter."""
+    """Return east and north (m) of a waypoint, or of the loiter's center for a waypoint of a loiter."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0 and not waypoint.is_rtl
@@ -147,27 +148,31 @@ def _follow_line(
     dt: float,
     without_crosstrack: bool,
 ) -> None:
-    """Demand the lateral acceleration along the line from the leg's start to its end, m.
+    """Set the lateral acceleration demand to follow the line from the leg's start to its end.
 
     Follows `AP_L1_Control::update_waypoint`.
 
+    end_e, end_n: end of the leg, m.
     without_crosstrack: True for a line from the aircraft itself (`Plane::verify_nav_wp` without crosstrack).
     """
     from_e, from_n = (estimated.east, estimated.north) if without_crosstrack else (memory.from_east, memory.from_north)
-    angle, aim = l1_angles(estimated, from_e, from_n, end_e, end_n, l1_distance)
-    memory.cross_track_integrator = l1_integrate(aim, memory.cross_track_integrator, parameters.navl1_xtrack_i, dt)
-    if not math.isnan(aim):
-        angle += aim + memory.cross_track_integrator
+    angle, aim_angle = l1_angles(estimated, from_e, from_n, end_e, end_n, l1_distance)
+    memory.cross_track_integrator = l1_integrate(
+        aim_angle, memory.cross_track_integrator, parameters.navl1_xtrack_i, dt
+    )
+    if not math.isnan(aim_angle):
+        angle += aim_angle + memory.cross_track_integrator
     angle = keep_turn_side(estimated, angle, end_e, end_n, memory)
     memory.lateral_acceleration = l1_acceleration(angle, ground_speed, l1_distance, parameters.navl1_damping)
 
 
 @inner
 def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
-    """Return L1's angle (rad) to its aim, or the last angle if a turn by almost 180 degrees changed its side.
+    """Return L1's angle (rad), or L1's last angle if a turn of almost 180 degrees has just changed its side.
 
-    Follows `AP_L1_Control::_prevent_indecision`, with the course in place of the heading.
+    Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the heading.
 
+    angle: angle from the direction to the L1 point to the ground velocity, rad (`-Nu`).
     target_e, target_n: position that the aircraft flies to, m.
     """
     course = math.atan2(estimated.velocity_east, estimated.velocity_north)
@@ -186,7 +191,7 @@ def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: f
 def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
     """Return the turn angle at the target that ArduPlane uses, rad, positive (`Plane::setup_turn_angle`).
 
-    Next to a loiter, the angle is that of the turn from or to the loiter's center.
+    If the target or the next waypoint belongs to a loiter, the leg there leads from or to the loiter's center.
     """
     turn_angle: float = target.turn
     if memory.leg + 2 >= waypoints.shape[0]:
@@ -201,7 +206,7 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
 
 @inner
 def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
-    """Begin a leg, whose line leads from its waypoint to the next, or from the aircraft if it is past the end."""
+    """Begin a leg on the line between its two waypoints, or from the aircraft if the aircraft is past the leg's end."""
     start, target = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
     # The next loiter has not been captured yet, even if the current one was.
@@ -229,11 +234,11 @@ def _is_leg_over(
     l1_distance: float,
     eas2tas: float,
 ) -> bool:
-    """Return True if the leg's end is within the turn distance, or the line across it is passed.
+    """Return True if the leg's end is within the turn distance, or if the aircraft is past the line across the end.
 
-    Follows `Plane::verify_nav_wp`.
+    Follows `Plane::verify_nav_wp`. Beyond WP_MAX_RADIUS from the target the leg is never over.
 
-    end_e, end_n: end of the leg, m; it lies beyond a target with a pass-by distance, and is then flown to.
+    end_e, end_n: end of the leg, m; with a pass-by distance it lies beyond the target, and the aircraft flies to it.
     turn_angle: turn of the route at the target, rad.
     """
     is_past_end = is_past_finish_line(estimated, memory.from_east, memory.from_north, end_e, end_n)
@@ -242,7 +247,7 @@ def _is_leg_over(
         and math.hypot(target.east - estimated.east, target.north - estimated.north) > parameters.wp_max_radius
     ):
         if is_past_end and target.pass_by <= 0.0:
-            # Passed beyond WP_MAX_RADIUS: it turns back to the waypoint.
+            # The aircraft has passed the waypoint beyond WP_MAX_RADIUS, and turns back to it.
             memory.from_east, memory.from_north = estimated.east, estimated.north
         return False
     if target.fly_over or (target.pass_by > 0.0 and target.acceptance < 1.0):
@@ -351,10 +356,11 @@ def _is_heading_lined_up(
 ) -> bool:
     """Return True if the tangent of a loiter's circle at the aircraft leads to the next waypoint, within the tolerance.
 
-    To a waypoint inside the circle no tangent leads: the aircraft then leaves on a tangent next to it.  Follows
-    `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft from its center.
+    No tangent leads to a waypoint inside the circle: the aircraft then leaves on a tangent that passes the waypoint.
+    Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft from the
+    center.
 
-    radius: of the circle, m.
+    radius: radius of the circle, m.
     """
     next_e, next_n = (
         (next_waypoint.centre_east, next_waypoint.centre_north)
@@ -362,7 +368,7 @@ def _is_heading_lined_up(
         else target_position(next_waypoint)
     )
     side = math.copysign(1.0, loiter.loiter_radius)
-    place_angle = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
+    aircraft_bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
     offset_e, offset_n = next_e - loiter.centre_east, next_n - loiter.centre_north
     distance = math.hypot(offset_e, offset_n)
     if loiter.exit_bearing > 0.0:
@@ -370,11 +376,13 @@ def _is_heading_lined_up(
     elif radius <= 0.0 or distance < _SAME_PLACE_M:
         return True
     elif distance >= radius:
-        exit_course = math.atan2(offset_e - radius * math.sin(place_angle), offset_n - radius * math.cos(place_angle))
+        exit_course = math.atan2(
+            offset_e - radius * math.sin(aircraft_bearing), offset_n - radius * math.cos(aircraft_bearing)
+        )
     else:
         segment_angle = 2.0 * math.asin((radius - distance) / (2.0 * radius))
         exit_course = math.atan2(offset_e, offset_n) + side * (0.5 * math.pi - segment_angle)
-    heading_error = abs(wrap(exit_course - place_angle - side * 0.5 * math.pi))
+    heading_error = abs(wrap(exit_course - aircraft_bearing - side * 0.5 * math.pi))
     return heading_error <= _EXIT_HEADING_TOLERANCE_RAD + _EXIT_HEADING_GROWTH_RAD * math.floor(
         abs(memory.exit_wait_angle) / (2.0 * math.pi)
     )
@@ -382,11 +390,11 @@ def _is_heading_lined_up(
 
 @inner
 def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Record, eas2tas: float) -> None:
-    """Demand the lateral acceleration of an RTL (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
+    """Set the lateral acceleration demand of an RTL (`ModeRTL::update`, ArduPlane/mode_rtl.cpp).
 
     The aircraft turns to the center of the RTL loiter at once, from any leg; the radius grows with altitude as the
     square of the ratio of true to equivalent airspeed (`AP_L1_Control::loiter_radius`).  Until the initial climb is
-    done, bank is limited to LEVEL_ROLL_LIMIT; only then the altitude slope begins, at the aircraft.
+    done, bank is limited to LEVEL_ROLL_LIMIT; the altitude slope begins at the aircraft once that climb is done.
     """
     if not memory.is_in_rtl:
         memory.is_in_rtl, memory.reached_loiter_target = True, False
@@ -414,9 +422,9 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
 
 @inner
 def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Record) -> None:
-    """Leave the RTL loiter for the landing sequence, if there is one, once the aircraft loiters near its altitude.
+    """Leave the RTL loiter for the landing sequence, if any, once the aircraft loiters near the loiter's altitude.
 
-    `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The leg begins at the aircraft.
+    Follows `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The next leg begins at the aircraft.
     """
     landing_index = memory.leg + 2
     while landing_index < waypoints.shape[0] and waypoints[landing_index].is_rtl:
@@ -443,10 +451,11 @@ def _loiter_acceleration(
     l1_distance: float,
     ground_speed: float,
 ) -> float:
-    """Return the lateral acceleration of a loiter, m/s^2 (`AP_L1_Control::update_loiter`).
+    """Return the lateral acceleration that a loiter demands, m/s^2 (`AP_L1_Control::update_loiter`).
 
-    It steers straight to the center until the circle demands the sharper turn, and then around the circle.  A circle
-    that was reached stays reached, even if a gust or an unachievable radius takes the aircraft out of it.
+    The aircraft steers straight to the center until the circle demands the sharper turn, and then flies around the
+    circle.  The circle then counts as reached, even if a gust or a radius that is too small takes the aircraft out of
+    it.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north
@@ -455,14 +464,14 @@ def _loiter_acceleration(
     capture_angle = wrap(course - math.atan2(-offset_e, -offset_n))
     turn_angle = keep_turn_side(estimated, capture_angle, loiter.centre_east, loiter.centre_north, memory)
     capture_acceleration = l1_acceleration(turn_angle, ground_speed, l1_distance, parameters.navl1_damping)
-    # Speeds over the ground: outwards, and around the circle in its direction.
+    # Components of the ground velocity: outwards, and around the circle in the loiter's direction.
     outward_velocity = -ground_speed * math.cos(capture_angle)
     tangential_velocity = -direction * ground_speed * math.sin(capture_angle)
     omega = 2.0 * math.pi / parameters.navl1_period
     radial_error = distance - radius
     pd_correction = omega * (omega * radial_error + 2.0 * parameters.navl1_damping * outward_velocity)
     if outward_velocity > 0.0 and tangential_velocity < 0.0:
-        # Flying outwards against the loiter's direction, it turns in the loiter's direction.
+        # Flying outwards against the loiter's direction, the aircraft turns in the loiter's direction.
         pd_correction = max(pd_correction, 0.0)
     circle_acceleration = direction * (
         pd_correction + tangential_velocity * tangential_velocity / max(0.5 * radius, distance)

@@ -54,7 +54,7 @@ class PointMass(NamedTuple):
     record: of `POINT_MASS`.
     excess: (t, v, h) specific excess power, by throttle, m/s.
     power: (3, v, h) electric power at idle, in level flight and at full throttle, W.
-    glides: True if its excess power with closed throttle is from trims.
+    glides: True if the excess power with closed throttle is known from trims.
     """
 
     record: Record
@@ -66,7 +66,9 @@ class PointMass(NamedTuple):
 def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
     """Return the point mass of an aircraft from its trims, in a wind.
 
-    airspeed: commanded, m/s, equivalent.  Beyond the grid of trims, the values at its edge apply.
+    airspeed: commanded equivalent airspeed, m/s.
+
+    Beyond the grid of trims, the values at the grid's edge apply.
     """
     speeds, trims, alpha, lift = _trimmed(aircraft)
     excess = filled_excess(trims)
@@ -85,7 +87,7 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
 
 
-# Version of the cached tables: increase it with any change of what `_trims` computes.
+# Version of the cached tables: increase it with any change of `_trims`.
 _CACHE_VERSION = 2
 
 
@@ -93,8 +95,8 @@ _CACHE_VERSION = 2
 def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     """Return airspeeds (v,), specific excess power (t, v, h), and two terms of the angle of attack.
 
-    The first term is the angle without lift, the second is the part from lift times the square of airspeed.  Excess
-    power is NaN without a trim.  Trims are stored in the user's cache folder, as the envelope is.
+    The first term is the angle without lift; the second term, divided by the square of airspeed, is added for lift.
+    Excess power is NaN without a trim.  Trims are cached in the user's cache folder, like the envelope.
     """
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _AIRSPEED_COUNT)
     version = model_hash(aircraft)
@@ -137,11 +139,11 @@ def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
 
 
 def filled_excess(trims: Floats) -> Floats:
-    """Return specific excess power (t, v, h) in m/s, with values for grid points without a trim (NaN).
+    """Return specific excess power (t, v, h) in m/s, with values instead of NaN at grid points without a trim.
 
-    Such a point takes the value of the nearest throttle, then of the nearest airspeed, then of the nearest
-    altitude.  But a closed throttle is filled only from closed throttles, as long as there are any: a more open
-    throttle has thrust, and would not be a glide.
+    Such a point takes the value of the nearest throttle, then of the nearest airspeed, then of the nearest altitude.  A
+    closed throttle is filled only from closed throttles, if there are any, because with more throttle the aircraft has
+    thrust and does not glide.
 
     >>> trims = np.array([[[-2.0], [np.nan]], [[1.0], [0.5]]])
     >>> filled_excess(trims)[0].tolist(), filled_excess(trims)[1].tolist()
@@ -158,21 +160,21 @@ def filled_excess(trims: Floats) -> Floats:
 
 
 def _fill_along(table: Floats, axis: int) -> None:
-    """Fill the missing values in each line along an axis."""
+    """Fill NaN in each line along an axis; see `_fill`."""
     lines = np.moveaxis(table, axis, -1)
     for index in np.ndindex(lines.shape[:-1]):
         _fill(lines[index])
 
 
 def _fill(values: Floats) -> None:
-    """Fill NaN by interpolation between known values, and by the nearest known value beyond them."""
+    """Replace NaN by interpolation between known values, and by the nearest known value beyond them."""
     is_known = ~np.isnan(values)
     if is_known.any():
         values[:] = np.interp(np.arange(len(values)), np.flatnonzero(is_known), values[is_known])
 
 
 def _resample(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
-    """Return a table of the envelope at airspeeds (v,) and the grid's altitudes, with extended edges."""
+    """Return a table of the envelope at airspeeds (v,) and the grid's altitudes; beyond an edge, the edge's value."""
     filled = np.array(table)
     for column in filled.T:
         _fill(column)
@@ -191,7 +193,7 @@ def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
 
 @inner
 def angle_of_attack(state: Record, aircraft: Record) -> float:
-    """Return the angle of attack at an airspeed in a bank, rad."""
+    """Return the angle of attack at the state's airspeed and bank, rad."""
     load_factor = 1.0 / max(0.3, math.cos(state.roll))
     return aircraft.alpha + aircraft.alpha_lift * load_factor / (state.airspeed * state.airspeed)
 
@@ -266,7 +268,7 @@ def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: f
 
 @inner
 def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:
-    """Interpolate a table (v, h) bilinearly at an airspeed and an altitude, with extended edges."""
+    """Interpolate a table (v, h) bilinearly at an airspeed and an altitude; beyond an edge, use the edge's value."""
     x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.slowest) / aircraft.speed_step))
     y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.height_step))
     i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))

@@ -48,7 +48,7 @@ def simulated_release(program: str) -> ArduPlaneVersion:
 
 
 def release_note(program: str) -> str:
-    """Return a note that another release is simulated than a program's; "" if it is the same, or if none is stated.
+    """Return a note if the simulated release differs from a program's release; "" if not, or if none is stated.
 
     >>> release_note("ArduPlane V4.5.7"), release_note("ArduPlane V4.7.3")
     ('ArduPlane 4.5 flew it, and 4.6 is simulated', '')
@@ -60,6 +60,7 @@ def release_note(program: str) -> str:
 
 
 def _nearest(release: tuple[int, int]) -> ArduPlaneVersion:
+    """Return the newest simulated release that is not newer than a release, or the oldest simulated release."""
     known = [tuple(map(int, version.split("."))) for version in _VERSIONS]
     older = [version for version, numbers in zip(_VERSIONS, known, strict=True) if numbers <= release]
     return older[-1] if older else _VERSIONS[0]
@@ -68,7 +69,7 @@ def _nearest(release: tuple[int, int]) -> ArduPlaneVersion:
 def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
     r"""Return the release that wrote a parameter file, or None if unknown.
 
-    A comment decides before the names; a file with names of both is of no release.
+    A comment has priority over the names.  Returns None for a file with names of both 4.6 and 4.7, or of neither.
 
     >>> file_release("#NOTE: ArduPlane V4.5.7\nALT_SLOPE_MIN 15", ["ALT_SLOPE_MIN"])
     FileRelease(release='4.5', evidence='ArduPlane V4.5')
@@ -96,9 +97,9 @@ class ReleaseChoice(NamedTuple):
 
 
 def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
-    """Return the release to simulate: the stated one, or the parameter file's, or the newest.
+    """Return the release to simulate: the stated release, or that of the parameter file, or the newest.
 
-    A note names the parameters of the file that the release names otherwise.
+    A note names the parameters of the file that have another name in this release.
 
     params: path of the parameter file.  Raises ParameterError if it cannot be read.
     """
@@ -117,7 +118,11 @@ def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> Relea
 def _choose_for_file(
     stated: ArduPlaneVersion | None, found: FileRelease | None, params: str
 ) -> tuple[ArduPlaneVersion, tuple[str, ...]]:
-    """Return the release to simulate with a file of a release, and a note if they differ.  params: the file's path."""
+    """Return the release to simulate with a parameter file, and a note if the file is from another release.
+
+    found: release of the file.
+    params: path of the file.
+    """
     if found is None:
         return stated or NEWEST_ARDUPLANE, ()
     major, minor = map(int, found.release.split("."))

@@ -1,13 +1,13 @@
 """Simulate an RTL with a point mass in about 2 ms, at least 100 times faster than JSBSim.
 
-The law is the compiled code of `flight.autopilots.arduplane.law`: L1 to the target, the slope or the climb, and TECS
-with its limits.  It controls a `flight.autopilots.arduplane.point_mass.PointMass`, whose bank and pitch follow their
-demands with the lags of ArduPlane's controllers.  The least clearance is within 7 m of 38 flights of ArduPlane itself
-(`tests/flight/autopilots/arduplane/test_rtl_point_mass.py`).
+The control law is the compiled code of `flight.autopilots.arduplane.law`: L1 to the target, the slope or the climb, and
+TECS with its limits.  It controls a `flight.autopilots.arduplane.point_mass.PointMass`, whose bank and pitch follow
+their demands with the lags of ArduPlane's controllers.  The minimum clearance is within 7 m of the minimum clearances
+of 38 flights of ArduPlane (`tests/flight/autopilots/arduplane/test_rtl_point_mass.py`).
 
-After an engine failure the law does not know that there is no thrust: it demands full throttle, slows down until it is
-in underspeed (`flight.autopilots.arduplane.tecs.detect_underspeed`), holds its minimum airspeed from then on, and
-dives onto its slope where it meets the slope.  Fourteen such flights of ArduPlane are reproduced as well
+After an engine failure the control law does not know that there is no thrust: it demands full throttle, slows down to
+underspeed (`flight.autopilots.arduplane.tecs.detect_underspeed`), holds the minimum airspeed from then on, and dives
+onto its slope where it meets the slope.  Fourteen such flights of ArduPlane are reproduced as well
 (`tests/flight/autopilots/arduplane/test_engine_out.py`).
 """
 
@@ -21,9 +21,9 @@ from aircraft.envelope import GRAVITY
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
     INITIAL_SKE_INTEGRATOR,
-    NAVIGATION_TICK,
-    PITCH_LAG,
-    ROLL_LAG,
+    NAVIGATION_TICK_S,
+    PITCH_LAG_RATIO,
+    ROLL_LAG_RATIO,
     update_height_demand,
 )
 from flight.autopilots.arduplane.navigator import LANDING_JOIN_ALTITUDE_TOLERANCE_M, is_past_finish_line, navigate_legs
@@ -39,7 +39,7 @@ from flight.dynamics.state import STATE
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION
-from flight.mission.itinerary import UNLIMITED
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import LandingStart, ReturnCircle
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from world.arrays import Floats, Heights
@@ -70,7 +70,7 @@ CLIMB = record_dtype(
 NO_CLIMB: Record = np.zeros(1, CLIMB)[0]
 
 # End of an RTL: it reached its landing sequence, or flew its loiter at the target altitude once around and for
-# `flight.mission.itinerary.UNLIMITED` s.
+# `flight.mission.itinerary.ENDLESS_LOITER_TIME_S` s.
 RETURN_ARRIVED = 1
 # End of an RTL: it hit the ground.
 RETURN_GROUND_IMPACT = 2
@@ -78,35 +78,35 @@ RETURN_GROUND_IMPACT = 2
 RETURN_OFF_TERRAIN = 3
 # End of an RTL: it timed out.
 RETURN_TIMEOUT = 4
-# End of an RTL: it fell below the caller's least clearance or distance.
+# End of an RTL: it fell below the minimum clearance or distance that the caller demands.
 RETURN_ABORTED = 5
 # Outcome of one simulated RTL.  Heights above ground and distances outside kill spheres in m; threat -1 if none.
 RETURN_RESULT = record_dtype(
     ("ended", np.int64),
     "seconds",  # to its end
-    "to_circle",  # s, first time within `LOITER_CAPTURE_RADIUS_M` of its target; NaN if it never is
-    "circle_up",  # m, its altitude then
-    "clearance",  # least of the whole RTL; after ground contact at most `DEEPEST` below the ground
-    "clearance_time",  # after ground contact: the time of the first contact
+    "to_circle",  # s, time of the arrival within `LOITER_CAPTURE_RADIUS_M` of the target; NaN without an arrival
+    "circle_up",  # m AMSL, altitude at the arrival
+    "clearance",  # minimum height above ground; after ground contact down to -`MAX_IMPACT_DEPTH_M`
+    "clearance_time",  # s, time of that minimum, or of the first ground contact
     "clearance_east",
     "clearance_north",
     "clearance_up",
-    "clearance_before",  # least before it arrived at its loiter
-    "outside",  # least distance outside any kill sphere
+    "clearance_before",  # minimum height above ground before the arrival
+    "outside",  # minimum distance outside any kill sphere
     ("threat", np.int64),
     "threat_time",
-    "outside_before",  # least before it arrived at its loiter
+    "outside_before",  # minimum distance outside any kill sphere before the arrival
     "energy",  # Wh, NaN if the envelope has no power data
     ("rows", np.int64),  # number of stored positions
 )
 # An RTL has arrived at its loiter within this distance of its target (m), or within
 # `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of its radii.  Flights of ArduPlane were compared up to there.
 LOITER_CAPTURE_RADIUS_M = 200.0
-# An RTL that hits the ground is continued to this depth (m), to know by how much it hits, and what an RTL that barely
-# hits would meet after that.
-DEEPEST = 10.0
+# Depth below the ground to which an RTL that hits the ground is continued, m: this shows by how much it is too low, and
+# whether an RTL that barely hits the ground would hit again.
+MAX_IMPACT_DEPTH_M = 10.0
 # Interval between stored positions, ticks; 1 s.
-KEPT_EVERY = 10
+STORED_EVERY_TICKS = 10
 # Lag of the flight path behind the pitch, s: the time in which lift turns the velocity of a small aircraft.
 _PATH_LAG_S = 0.4
 # An RTL times out after this multiple of the nominal time for its distance and climb ...
@@ -115,7 +115,7 @@ _TIMEOUT_RATIO = 3.0
 _TIMEOUT_BASE_S = 600.0
 # Bank above which an aircraft without thrust is treated as turning, rad.
 _TURN_BANK_RAD = math.radians(5.0)
-# Lag with which it settles at the airspeed of that turn, s.
+# Lag with which the airspeed settles in such a turn, s.
 _TURN_AIRSPEED_LAG_S = 8.0
 # Delay from engine failure to the turn back, s; the delay used in the ArduPlane reference flights.
 ENGINE_FAILURE_REACTION_S = 3.0
@@ -127,7 +127,7 @@ class ReturnEnvironment:
 
     heights, to_pixel: of the terrain; one pixel without data if there is no terrain.
     spheres, radii: (m, 3) centers and (m,) radii of kill spheres, m; a radius of 0 stands for no sphere.
-    known: True if there is a terrain.
+    known: True if the terrain is known.
     """
 
     heights: Heights
@@ -138,11 +138,11 @@ class ReturnEnvironment:
 
 
 @dataclass(frozen=True, slots=True)
-class SwiftReturns:
+class SimulatedReturns:
     """Simulated RTLs.
 
     flown: (n,) of `RETURN_RESULT`.
-    ways: n arrays (t, 3) of positions at intervals of 1 s, m; empty if they were not stored.
+    ways: n arrays (t, 3) of positions at intervals of 1 s, m; empty if positions were not stored.
     """
 
     flown: Records
@@ -170,16 +170,16 @@ def fly_returns(
     keep: bool = False,
     least: tuple[Floats, Floats] | None = None,
     engine_out: bool = False,
-) -> SwiftReturns:
+) -> SimulatedReturns:
     """Simulate an RTL from each of n starts.
 
     starts: (n,) of `RETURN_START`.
     targets: n loiters, the target of each start; None to go straight to the landing sequence.
-    landings: n landing sequences to join afterwards, up to the line-up or a loiter, None for no sequence; or empty.
+    landings: n landing sequences to join after the loiter, up to their end or first loiter, or None; or no sequences.
     keep: True to store the positions.
     least: (n,) heights above ground and (n,) distances outside spheres, m, below which an RTL is aborted.
-    engine_out: True after an engine failure: the aircraft flies on for `ENGINE_FAILURE_REACTION_S` s, and ends at its
-    loiter.
+    engine_out: True after an engine failure: the aircraft flies on for `ENGINE_FAILURE_REACTION_S`, and the RTL ends at
+        its loiter.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -235,7 +235,7 @@ def fly_returns(
         )
         if keep:
             ways.append(positions[: int(flown[k]["rows"])].copy())
-    return SwiftReturns(flown, tuple(ways))
+    return SimulatedReturns(flown, tuple(ways))
 
 
 def _make_stages(
@@ -243,7 +243,7 @@ def _make_stages(
 ) -> Records:
     """Return the successive targets of an RTL as `flight.guidance.lateral_reference_laws.WAYPOINT` records, (n,).
 
-    A place of a landing sequence is a waypoint, or the center of a loiter of the mission, which is the last target.
+    A stop of a landing sequence is a waypoint, or the center of a loiter of the mission, which is the last target.
     """
     places = truncate_at_first_loiter(() if landing is None else (landing, *landing.next_stops))
     stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
@@ -254,34 +254,32 @@ def _make_stages(
         first.east, first.north, first.is_rtl = target.east, target.north, True
     for stage, place in zip(stages[len(stages) - len(places) :], places, strict=True):
         fill_stage(stage, place, parameters)
-        # The first leg of an RTL to the landing follows no line, as after any change of mode.
+        # The first leg of an RTL to a landing sequence follows no line, as after any mode change.
         stage.without_crosstrack = place is landing
     return stages
 
 
 def truncate_at_first_loiter(places: Sequence[LandingStart]) -> Sequence[LandingStart]:
-    """Return the places of a landing sequence up to the first loiter.
+    """Return the stops of a landing sequence up to the first loiter, whose exit is not simulated.
 
-    A point mass cannot say when the loiter is left.
-
-    >>> spots = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), circles=k == 2) for k in (1, 2, 3)]
+    >>> spots = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), is_loiter=k == 2) for k in (1, 2, 3)]
     >>> [one.item for one in truncate_at_first_loiter(spots)]
     [1, 2]
     """
-    loiter_indices = [k for k, place in enumerate(places) if place.circles]
+    loiter_indices = [k for k, place in enumerate(places) if place.is_loiter]
     return places[: loiter_indices[0] + 1] if loiter_indices else places
 
 
 def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParameters) -> None:
-    """Fill a stage with a place of a landing sequence, which is a waypoint or the center of a loiter."""
-    stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = landing.place
+    """Fill a stage with a stop of a landing sequence, which is a waypoint or the center of a loiter."""
+    stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = landing.position
     stage.pass_by, stage.home_up = landing.pass_by, landing.home_up
-    # The turn to its next leg is unknown: use a right angle, as at a mission's end.
+    # The turn to the next leg is unknown: use a right angle, as at a mission's end.
     stage.turn = 0.5 * math.pi
-    stage.loiter_radius = (landing.radius or parameters.loiter_radius) if landing.circles else 0.0
+    stage.loiter_radius = (landing.radius or parameters.loiter_radius) if landing.is_loiter else 0.0
 
 
-# Length of a leg that is not flown to its end, m.
+# Length of a leg on the current course, m, long enough never to be flown to its end.
 _STRAIGHT_LEG_LENGTH_M = 10_000.0
 
 
@@ -330,9 +328,12 @@ def fly_stages(
 ) -> None:
     """Fly from stage to stage for at most ``timeout`` s, and fill in the outcome.
 
-    climb: of `CLIMB`.  climb_parameters: parameters of that climb.  excesses: table of specific excess power.
+    stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    climb, climb_parameters: a record of `CLIMB`, and the parameters during that climb.
+    min_clearance, min_outside: height above ground and distance outside spheres, m, below which the flight is aborted.
+    positions, result: (t, 3) array to fill with a position each second until it is full; a record of `RETURN_RESULT`.
     """
-    # The same spacing as in `waypoint_column`.  A loiter is flown until the RTL is over: no leg follows it.
+    # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
     waypoints, loiter = spaced[::2], progress_records[0]
     motions, states, memories = np.zeros(1, MOTION), np.zeros(1, STATE), np.zeros(1, ARDUPILOT_MEMORY)
@@ -340,17 +341,14 @@ def fly_stages(
     _initialise_outcome(start, estimated, has_terrain, result)
     _load_stage(stages, 0, waypoints, estimated, memory)
     _initialise_memory(start, parameters, aircraft, excesses, state, memory)
-    pitch, path_angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK
-    roll_fraction = 1.0 - math.exp(-dt / (ROLL_LAG * parameters.roll_time))
-    pitch_fraction = 1.0 - math.exp(-dt / (PITCH_LAG * parameters.pitch_time))
-    path_fraction = 1.0 - math.exp(-dt / _PATH_LAG_S)
+    pitch, path_angle, dt = state.pitch, state.pitch - state.alpha, NAVIGATION_TICK_S
+    roll_fraction, pitch_fraction, path_fraction = _lag_fractions(parameters, dt)
     stage, energy, max_roll_change = 0, 0.0, parameters.roll_rate_max * dt
     for tick in range(int(timeout / dt)):
         time = tick * dt
-        if tick % KEPT_EVERY == 0:
+        if tick % STORED_EVERY_TICKS == 0:
             _store_position(estimated, positions, result)
-        eas2tas = true_by_equivalent(estimated.up)
-        is_last = stage + 1 == stages.shape[0]
+        eas2tas, is_last = true_by_equivalent(estimated.up), stage + 1 == stages.shape[0]
         distance = math.hypot(estimated.east - target.centre_east, estimated.north - target.centre_north)
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas2tas * eas2tas
         if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):
@@ -388,6 +386,16 @@ def fly_stages(
 
 
 @inner
+def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
+    """Return the fractions by which roll, pitch and flight path approach their demands in a tick of ``dt`` s."""
+    return (
+        1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time)),
+        1.0 - math.exp(-dt / (PITCH_LAG_RATIO * parameters.pitch_time)),
+        1.0 - math.exp(-dt / _PATH_LAG_S),
+    )
+
+
+@inner
 def _store_position(estimated: Record, positions: Floats, result: Record) -> None:
     """Store a position unless the array is full."""
     if result.rows < positions.shape[0]:
@@ -401,11 +409,11 @@ def _store_position(estimated: Record, positions: Floats, result: Record) -> Non
 
 @inner
 def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Record) -> None:
-    """Record time and altitude of the first arrival at the loiter."""
+    """Record time and altitude of the first arrival at the loiter; without an engine, end the RTL there."""
     if math.isnan(result.to_circle):
         result.to_circle, result.circle_up = time, estimated.up
         if engine_out:
-            # Without an engine it comes down in circles there.
+            # Without an engine the aircraft descends in circles there.
             result.ended = RETURN_ARRIVED
 
 
@@ -423,14 +431,14 @@ def _is_stage_complete(
     arrival_radius: float,
     dt: float,
 ) -> bool:
-    """Return True if the next stage begins.
+    """Return True if the current stage is complete.
 
     is_reacting: True while the aircraft flies straight on, until the engine failure is noticed.
     """
     if is_reacting:
         return time >= ENGINE_FAILURE_REACTION_S
     if climb.climbs and is_first:
-        # The climb ends no earlier than it has begun.
+        # The climb lasts at least one tick.
         return time > 0.0 and estimated.up > climb.top
     return _is_target_reached(estimated, target, memory, loiter, is_last, arrival_radius, dt)
 
@@ -446,7 +454,7 @@ def _demand_climb(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Demand a climb straight ahead, with level wings, the pitch of its parameters, and increasing throttle.
+    """Demand a climb straight ahead, with level wings, the pitch of ``climb_parameters``, and increasing throttle.
 
     airspeed_demand: equivalent airspeed, m/s.
     """
@@ -465,8 +473,7 @@ def _demand_climb(
     memory.tas_demand = airspeed_demand * eas2tas
     update_tecs(state, estimated, climb_parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
     wind_up_ste_integrator(climb_parameters, memory)
-    # The pitch integrators stay: `AP_TECS::_update_pitch` starts them from the minimum pitch here, so what the minimum
-    # adds does not enter them.
+    # The pitch integrators do not change: `AP_TECS::_update_pitch` starts them from the minimum pitch here.
     memory.seb_integrator, memory.ske_integrator = seb_integrator, ske_integrator
     memory.throttle_demand = max(previous_throttle, min(climb.throttle, previous_throttle + climb.slew * dt))
 
@@ -481,7 +488,7 @@ def _is_target_reached(
     arrival_radius: float,
     dt: float,
 ) -> bool:
-    """Return True once a waypoint is reached, the last loiter is flown, or a loiter is left for the landing.
+    """Return True once a waypoint is reached, the last loiter is complete, or a loiter is left for the landing.
 
     target: waypoint of the stage.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
@@ -502,14 +509,14 @@ def _is_target_reached(
         and altitude_error < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
     ):
         loiter.seconds += dt
-    return loiter.seconds > UNLIMITED and abs(loiter.turned) >= 2.0 * math.pi
+    return loiter.seconds > ENDLESS_LOITER_TIME_S and abs(loiter.turned) >= 2.0 * math.pi
 
 
 @inner
 def _initialise_outcome(
     start: Record, estimated: Record, has_terrain: bool, result: Record
 ) -> None:  # pragma: no cover
-    """Fill in the start, and the outcome before the flight."""
+    """Set the motion to the start, and the outcome to its values before the flight."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
@@ -527,9 +534,10 @@ def _initialise_outcome(
 
 @inner
 def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Record, memory: Record) -> None:
-    """Make the stage ``index`` the current leg, from the previous stage if that was passed, else from the aircraft.
+    """Make the stage ``index`` the target of the current leg.
 
-    Both waypoints 1 and 2 become a copy of the stage.
+    The leg starts at the previous stage if the aircraft has passed it, otherwise at the aircraft. Waypoints 1 and 2
+    both become a copy of the stage.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
@@ -570,9 +578,10 @@ def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Reco
 def _initialise_memory(
     start: Record, parameters: Record, aircraft: Record, excess_table: Floats, state: Record, memory: Record
 ) -> None:
-    """Fill the state from the motion over the ground, and the law's memory as after a long steady flight.
+    """Set the state from the motion over the ground, and the control law's memory as after a long steady flight.
 
-    Follows `flight.autopilots.arduplane.law.initialise_memory`, but on a slope: the altitude setpoint leads by its lag.
+    Follows `flight.autopilots.arduplane.law.initialise_memory`, but on a slope: the altitude demand is ahead by its
+    lag.
     """
     wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
     air_east = start.velocity_east - wind * aircraft.wind_east
@@ -643,8 +652,9 @@ def _demand_throttle_and_pitch(
     """Demand throttle and pitch by TECS, or in a turn without thrust the pitch for an airspeed.
 
     airspeed_demand: equivalent, m/s.  In a bank it grows as the root of the load factor, at the same angle of attack.
-    Of eight flights of ArduPlane six turned back so, and lost 55 m in their turn; the other two, which had been sinking
-    before, held their altitude and slowed down, which costs half of that.  The worse case stands for both.
+
+    Six of eight ArduPlane flights turned back like this, and lost 55 m in their turn; the other two, which had been
+    sinking before, held their altitude and slowed down, and lost half of that.  The worse case is simulated.
     """
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
@@ -672,7 +682,7 @@ def _update_clearances(
     has_terrain: bool,
     result: Record,
 ) -> None:
-    """Update the clearances above ground and outside each sphere, and end the RTL where they demand it."""
+    """Update the minimum clearances above ground and outside the spheres; end the RTL on or outside the terrain."""
     for m in range(spheres.shape[0]):
         radius = radii[m]
         if radius <= 0.0:
@@ -704,5 +714,5 @@ def _update_clearances(
                 estimated.up,
             )
         result.clearance = clearance
-    if clearance <= -DEEPEST:
+    if clearance <= -MAX_IMPACT_DEPTH_M:
         result.ended, result.seconds = RETURN_GROUND_IMPACT, result.clearance_time

@@ -46,9 +46,10 @@ def min_airspeed(bank: float, parameters: Record) -> float:
 
 @inner
 def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank: float) -> float:
-    """Return the bank that an airspeed allows without a stall, rad, but at least a given bank.
+    """Return the maximum bank without a stall at an airspeed, rad, but at least ``min_bank``.
 
-    airspeed: flown, m/s.  min_level_airspeed: minimum of straight flight, equivalent or true like ``airspeed``, m/s.
+    airspeed: m/s.
+    min_level_airspeed: minimum airspeed in straight flight, m/s; both airspeeds are equivalent, or both are true.
     min_bank: rad.
     """
     speed_ratio = max(1.0, airspeed / min_level_airspeed)
@@ -61,7 +62,8 @@ def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float,
 
     Follows `Plane::calc_nav_roll` and `Plane::update_load_factor`.
 
-    pitch: rad.  airspeed: equivalent, m/s.
+    pitch: rad.
+    airspeed: equivalent, m/s.
     """
     bank = nav_roll(lateral_acceleration, pitch, parameters)
     if parameters.stall_prevention <= 0.0:
@@ -101,9 +103,9 @@ _READING_FRACTION = 0.3
 _STE_RATE_LAG_S = 0.5
 # Damping ratio of the complementary filter that combines the airspeed reading and the acceleration.
 _FILTER_DAMPING_RATIO = 1.414
-# How far the SEB integrator may demand beyond the pitch limits, rad.
+# Pitch by which the SEB integrator may exceed the pitch limits, rad.
 _PITCH_OVERSHOOT_RAD = math.radians(5.0)
-# How far the STE integrator may demand beyond the throttle limits, 0..1.
+# Throttle by which the STE integrator may exceed the throttle limits, 0..1.
 _THROTTLE_OVERSHOOT_FRACTION = 0.1
 # Limit of the SKE integrator, as a fraction of the pitch range in either direction.
 _SKE_INTEGRATOR_FRACTION = 0.25
@@ -123,7 +125,7 @@ _SEB_INTEGRATOR_STEP_FRACTION = 0.1
 # the demand touch the limit now and then: the band is three standard deviations.  Climbs at full throttle depend on it:
 # with 0.003 to 0.005 the least clearances of 20 ArduPlane flights are met within 1.2 m; without it one is 9 m off.
 _SATURATION_BAND_FRACTION = 0.003
-# A raise of the airspeed for a minimum ground speed falls by no less than this, m/s.
+# Smallest reduction of an airspeed increase for a minimum ground speed, m/s; a smaller reduction is not applied.
 _GROUND_SPEED_HYSTERESIS_MPS = 1.2
 # Underspeed begins below this ratio of airspeed to AIRSPEED_MIN ...
 _UNDERSPEED_RATIO = 0.9
@@ -172,8 +174,8 @@ def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas
 
     tas_min: AIRSPEED_MIN as a true airspeed, m/s.
 
-    After an engine failure underspeed lasts until the aircraft meets a slope that leads down: it glides at
-    AIRSPEED_MIN, and does not become as slow again (seen in 14 flights).
+    After an engine failure, underspeed lasts until the gliding aircraft meets its descending altitude demand; from then
+    on it glides at AIRSPEED_MIN, above the underspeed threshold (seen in 14 flights).
     """
     is_slow = memory.tas < _UNDERSPEED_RATIO * tas_min
     memory.time_above_underspeed_threshold = 0.0 if is_slow else memory.time_above_underspeed_threshold + dt
@@ -198,13 +200,14 @@ def airspeed_target(
     memory: Record,
     eas2tas: float,
 ) -> float:
-    """Return the target equivalent airspeed for a commanded one, raised for a minimum ground speed, within limits, m/s.
+    """Return the target airspeed (equivalent, m/s): the commanded airspeed plus an increase for a minimum ground speed.
 
+    The shortfall of the ground speed along the heading is added to the measured airspeed. The increase is in whole m/s,
+    and is reduced only by more than a hysteresis (`Plane::calc_airspeed_errors`, `Plane::calc_gndspeed_undershoot`).
+    The result is within AIRSPEED_MIN and AIRSPEED_MAX.
+
+    commanded_airspeed: equivalent, m/s.
     target: the leg's end, with the minimum ground speed.
-
-    The undershoot of the ground speed along the heading is added to the measured airspeed.  The raise is in whole
-    m/s, and falls only by more than a hysteresis (`Plane::calc_airspeed_errors`,
-    `Plane::calc_gndspeed_undershoot`).
     """
     target_airspeed = commanded_airspeed
     if target.min_ground_speed > 0.0:
@@ -226,18 +229,20 @@ def airspeed_target(
 def update_tecs(
     state: Record, estimated: Record, parameters: Record, memory: Record, tas_target: float, eas2tas: float, dt: float
 ) -> None:
-    """Update the throttle and pitch demands for the altitude demand and a target airspeed (m/s, true).
+    """Update the throttle and pitch demands for the altitude demand and a target airspeed.
 
     Follows `AP_TECS::update_pitch_throttle`: `_update_speed`, `_detect_underspeed`, `_update_speed_demand`,
     `_update_energies`, `_update_throttle_with_airspeed` and `_update_pitch`.
 
-    state: a record of `flight.dynamics.state.STATE`.  eas2tas: ratio of true to equivalent airspeed.  The other
-    parameters are those of `update_height_demand`.
+    state: a record of `flight.dynamics.state.STATE`.
+    tas_target: m/s, true.
+    eas2tas: ratio of true to equivalent airspeed.
+    Other arguments as for `flight.autopilots.arduplane.law.update_height_demand`.
     """
     _update_speed(state, estimated, parameters, memory, dt)
     tas = memory.tas
     tas_min = min_airspeed(nav_roll(memory.lateral_acceleration, state.pitch, parameters), parameters) * eas2tas
-    # Where the aircraft fails to climb as demanded, full throttle is assumed to give less.
+    # If the aircraft cannot climb as demanded, a lower STE rate is assumed at full throttle.
     ste_rate_max = GRAVITY * parameters.tecs_climb_max * memory.max_climb_scaler
     ste_rate_min = -GRAVITY * parameters.tecs_sink_min
     tas_max = _update_tas_max(parameters, memory, tas_min, eas2tas, ste_rate_max, ste_rate_min, dt)
@@ -294,10 +299,11 @@ def _update_speed_demand(
     eas2tas: float,
     dt: float,
 ) -> float:
-    """Change the airspeed demand towards a target, and return the demanded rate of kinetic energy, m^2/s^3.
+    """Move the airspeed demand towards a target, and return the demanded SKE rate, m^2/s^3.
 
-    Follows `AP_TECS::_update_speed_demand`.  The airspeed rises with half of the climb's energy rate, and falls with
-    nine tenths of the rate of TECS_SINK_MIN at AIRSPEED_CRUISE, of TECS_SINK_MAX at the maximum airspeed.
+    Follows `AP_TECS::_update_speed_demand`.  The airspeed rises with half of the energy rate of TECS_CLMB_MAX, and
+    falls with nine tenths of the energy rate of TECS_SINK_MIN at AIRSPEED_CRUISE, or of TECS_SINK_MAX at the maximum
+    airspeed.
 
     tas_target, tas_min, tas_max: true airspeeds, m/s.
     """
@@ -317,7 +323,10 @@ def _update_speed_demand(
 def _is_bad_descent(parameters: Record, memory: Record, ste_error: float, ste_rate: float) -> bool:
     """Return True if the aircraft sinks at full throttle because too high an airspeed is demanded.
 
-    Follows `AP_TECS::_detect_bad_descent`; it lasts until the STE error (m^2/s^2) is gone.
+    Follows `AP_TECS::_detect_bad_descent`. A bad descent lasts until the STE error is no longer positive.
+
+    ste_error: m^2/s^2.
+    ste_rate: m^2/s^3.
     """
     if memory.bad_descent and ste_error > 0.0:
         return True
@@ -344,7 +353,7 @@ def _update_throttle(
     ste_rate_demand: m^2/s^3.
     ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
     """
-    # No thrust is reversed (`Plane::apply_throttle_limits`).
+    # There is no reverse thrust (`Plane::apply_throttle_limits`).
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
     ste_rate_per_throttle = (ste_rate_max - ste_rate_min) / (throttle_max - throttle_min)
     memory.ste_rate_error += (ste_rate_demand - ste_rate - memory.ste_rate_error) * dt / (dt + _STE_RATE_LAG_S)
@@ -376,8 +385,8 @@ def _update_throttle(
 def wind_up_ste_integrator(parameters: Record, memory: Record) -> None:
     """Set the STE integrator to its value at full throttle, as ArduPlane does at every update of a climb-out.
 
-    `AP_TECS::_update_throttle_with_airspeed` does so during take-off and an aborted landing; the throttle stays open
-    for a while after that.
+    `AP_TECS::_update_throttle_with_airspeed` does so during take-off and an aborted landing; the throttle therefore
+    stays open for a while afterwards.
     """
     throttle_min, throttle_max = max(0.0, parameters.throttle_min), parameters.throttle_max
     integrator_limit = _STE_INTEGRATOR_FRACTION * (throttle_max - throttle_min)
@@ -402,7 +411,8 @@ def _update_pitch_integrators(
 
     Follows `AP_TECS::_update_pitch`.
 
-    seb_rate_demand_total, seb_change, ske_change: demand without integrators, changes of the integrators, m^2/s^3.
+    seb_rate_demand_total: SEB rate demand without integrators, m^2/s^3.
+    seb_change, ske_change: changes of the integrators in this update, m^2/s^3.
     pitch_min, pitch_max: rad.
     """
     seb_rate_per_pitch = memory.tas * GRAVITY
@@ -438,7 +448,10 @@ def _update_pitch(
 ) -> None:
     """Set the pitch demand from the balance between potential and kinetic energy.
 
-    Follows `AP_TECS::_update_pitch`.  spe_error, ske_error: m^2/s^2.  spe_rate, ske_rate: m^2/s^3.
+    Follows `AP_TECS::_update_pitch`.
+
+    spe_error, ske_error: m^2/s^2.
+    spe_rate, ske_rate: m^2/s^3.
     """
     ske_weight = 1.0 if is_underspeed else min(1.0, parameters.tecs_speed_weight)
     spe_weight = 0.0 if is_underspeed else min(1.0, 2.0 - parameters.tecs_speed_weight)

@@ -14,8 +14,8 @@ from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
-    NAVIGATION_TICK,
-    ROLL_LAG,
+    NAVIGATION_TICK_S,
+    ROLL_LAG_RATIO,
 )
 from flight.autopilots.arduplane.navigator import MAX_ACCEPTANCE_M, navigate_legs
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -29,7 +29,7 @@ from world.kernels import Record, Records, compiled, field_names, inner, record_
 from world.scenario_tables import Navigation
 from world.wind import Turbulence
 
-# A corner is over where the aircraft stays this close to the next leg, m ...
+# A corner is complete once the aircraft stays this close to the next leg, m ...
 _SETTLED_CROSS_TRACK_M = 2.0
 # ... for this time, s.
 _SETTLED_TIME_S = 8.0
@@ -39,28 +39,29 @@ _LEG_LENGTH_M = 4000.0
 _RUN_IN_M = 200.0
 # Number of acceptance radii that are tried in one round.
 _ACCEPTANCES_PER_ROUND = 9
-# Number of rounds, each after the first around the best radius of the one before.
+# Number of rounds; each round after the first searches around the best radius of the previous round.
 _SEARCH_ROUNDS = 2
-# Minimum acceptance radius, m: the one of a straight leg, which navigation errors and gusts do not use up.
-MIN_ACCEPTANCE = 15.0
-# Margin for wind, as a factor on the excursion in still air at the highest ground speed, and what is added to it at a
-# right angle.  Of 200 corners of 15 to 90 degrees at 25 m/s, in 5 and 10 m/s from any direction, wind made at most 1.17
-# of it up to 45 degrees, 1.22 at 60 and 1.54 at 90.
+# Minimum acceptance radius, m, also for a straight leg: navigation errors and gusts stay within it.
+MIN_ACCEPTANCE_M = 15.0
+# Margin for wind: factor on the excursion in still air at the highest ground speed, and addition to that factor for a
+# turn of 90 degrees.  In 200 corners of 15 to 90 degrees at 25 m/s, with 5 and 10 m/s of wind from any direction, the
+# factor was at most 1.17 up to 45 degrees, 1.22 at 60 degrees and 1.54 at 90 degrees.
 WIND_SPREAD = 1.1, 0.5
-# Number of standard deviations of navigation for which room is left.
+# Margin for navigation errors, in standard deviations.
 _NAVIGATION_SIGMAS = 3.0
-# ArduPlane's deviation across straight legs in light turbulence, without navigation, m.
+# ArduPlane's cross-track deviation on straight legs in light turbulence, without navigation errors, m.
 _CROSS_TRACK_M = 2.0
-# ArduPlane's deviation from its lagged altitude in light turbulence, without navigation, m.
+# ArduPlane's deviation from its lagged altitude in light turbulence, without navigation errors, m.
 _ALTITUDE_ERROR_M = 3.0
-# Fraction of TECS_CLMB_MAX that a plan uses, by turbulence.  Where a climb takes full throttle, the altitude demand is
-# frozen and its rate fades out: 200 m of climb at more than this left the Aerosonde 8 to 60 m below its lagged
-# altitude; at this the error hardly exceeds the one that the same gusts cause at 2 m/s (four streams).
+# Fraction of TECS_CLMB_MAX that a plan uses, by turbulence.  In a climb at full throttle the altitude demand is frozen
+# and its rate fades to 0: with larger fractions the Aerosonde was 8 to 60 m below its lagged altitude after a climb of
+# 200 m; with these fractions the error hardly exceeds the error of a climb at 2 m/s in the same gusts (four streams).
 _CLIMB_FRACTIONS = {"none": 0.9, "light": 0.65, "moderate": 0.45}
 # The same fraction of TECS_SINK_MAX.
 _SINK_FRACTIONS = {"none": 0.9, "light": 0.81, "moderate": 0.72}
-# Fraction of the aircraft's own climb rate, where thin air reduces that below TECS_CLMB_MAX: at 0.9 in light turbulence
-# a downdraft of 40 s took an Aerosonde at 2,900 m 2 m below its clearance; at 0.8 seven streams left 13 m and more.
+# Fraction of the aircraft's own climb rate that a plan uses if thin air reduces that rate below TECS_CLMB_MAX: with 0.9
+# in light turbulence a downdraft of 40 s took an Aerosonde at 2,900 m 2 m below its clearance; with 0.8 at least 13 m
+# remained in seven streams.
 _OWN_CLIMB_FRACTIONS = {"none": 1.0, "light": 0.8, "moderate": 0.7}
 
 
@@ -138,9 +139,9 @@ def _measure_corners(
         for j in range(ground_speeds.size):
             corner = corners[i, j]
             if turn_angles[i] == 0.0:
-                corner.acceptance = MIN_ACCEPTANCE
+                corner.acceptance = MIN_ACCEPTANCE_M
                 continue
-            min_acceptance, max_acceptance = MIN_ACCEPTANCE, MAX_ACCEPTANCE_M
+            min_acceptance, max_acceptance = MIN_ACCEPTANCE_M, MAX_ACCEPTANCE_M
             best_acceptance, min_excursion = min_acceptance, math.inf
             for _ in range(1 if fly_over else _SEARCH_ROUNDS):
                 step = (max_acceptance - min_acceptance) / (_ACCEPTANCES_PER_ROUND - 1)
@@ -153,7 +154,7 @@ def _measure_corners(
                         best_acceptance, min_excursion = acceptance, corner_flight[0]
                         corner.excursion, corner.after = corner_flight
                 min_acceptance, max_acceptance = (
-                    max(MIN_ACCEPTANCE, best_acceptance - step),
+                    max(MIN_ACCEPTANCE_M, best_acceptance - step),
                     min(MAX_ACCEPTANCE_M, best_acceptance + step),
                 )
             corner.acceptance = best_acceptance
@@ -170,9 +171,9 @@ def _fly_corner(
     fly_over: bool,
     waypoints: Records,
 ) -> tuple[float, float]:
-    """Return the maximum distance from the two legs, and the length of the second leg until the flight settles, m.
+    """Return the maximum distance from the two legs, and the distance along the second leg until the flight settles, m.
 
-    The first leg leads north to the origin.  turn_angle: rad, to the right.  ground_speed: m/s.
+    The first leg leads north to the origin; the turn leads to the right.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, memory = motions[0], memories[0]
@@ -181,30 +182,30 @@ def _fly_corner(
     waypoints[1].turn, waypoints[1].acceptance, waypoints[1].fly_over = turn_angle, acceptance, fly_over
     waypoints[2].east, waypoints[2].north = _LEG_LENGTH_M * east, _LEG_LENGTH_M * north
     memory.from_north = -_LEG_LENGTH_M
-    # The waypoint comes within the acceptance radius in the middle between two updates, which is the average case.
-    tick_length = ground_speed * NAVIGATION_TICK
+    # The aircraft crosses the acceptance radius halfway between two updates, which is the average case.
+    tick_length = ground_speed * NAVIGATION_TICK_S
     estimated.north = -acceptance - (math.floor(_RUN_IN_M / tick_length) + 0.5) * tick_length
-    lag = ROLL_LAG * parameters.roll_time
-    decay = math.exp(-NAVIGATION_TICK / lag)
+    lag = ROLL_LAG_RATIO * parameters.roll_time
+    decay = math.exp(-NAVIGATION_TICK_S / lag)
     course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
     while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:
         estimated.velocity_east, estimated.velocity_north = (
             ground_speed * math.sin(course),
             ground_speed * math.cos(course),
         )
-        navigate_legs(estimated, waypoints, parameters, memory, 1.0, NAVIGATION_TICK)
+        navigate_legs(estimated, waypoints, parameters, memory, 1.0, NAVIGATION_TICK_S)
         acceleration_demand = GRAVITY * math.tan(
             limited_nav_roll(memory.lateral_acceleration, 0.0, airspeed, parameters)
         )
         # The exact solution of the lag, and the displacement on the mean course.
         course_change = (
-            acceleration_demand * NAVIGATION_TICK + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
+            acceleration_demand * NAVIGATION_TICK_S + (lateral_acceleration - acceleration_demand) * lag * (1.0 - decay)
         ) / ground_speed
         lateral_acceleration = acceleration_demand + (lateral_acceleration - acceleration_demand) * decay
         estimated.east += tick_length * math.sin(course + 0.5 * course_change)
         estimated.north += tick_length * math.cos(course + 0.5 * course_change)
         course += course_change
-        time += NAVIGATION_TICK
+        time += NAVIGATION_TICK_S
         distance_along = estimated.east * east + estimated.north * north
         corner_distance = math.hypot(estimated.east, estimated.north)
         first_leg_distance = abs(estimated.east) if estimated.north < 0.0 else corner_distance

@@ -12,7 +12,7 @@ from flight.autopilots.program import ProgramAutopilot, ProgramFlight
 from flight.autopilots.sitl.servos import SERVO_FILE, load_servo_map
 from flight.simulation.setup import FlightSetup
 
-# Settings that the program gets from the user's file, and flies where the control law does not.
+# Parameters that the program flies, in contrast to the simulated control law.
 _FLOWN_BY_PROGRAM = ("ARSPD_USE", "RLL_RATE_P", "PTCH_RATE_P")
 
 
@@ -39,15 +39,18 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return the servo map, if it is missing."""
+        """Return a sentence that names the servo map if the aircraft's folder lacks it."""
         if (aircraft.folder / SERVO_FILE).exists():
             load_servo_map(aircraft)
             return []
-        return [f"{aircraft.folder / SERVO_FILE}: missing; --sitl needs to know what each servo moves"]
+        return [
+            f"{aircraft.folder / SERVO_FILE}: missing; a flight with --sitl needs this file, which states"
+            " the control that each servo moves"
+        ]
 
     @property
     def checks(self) -> MissionChecks:
-        """Checks of a program; the program's battery failsafes are off."""
+        """Checks of the simulated ArduPlane, without battery failsafes: the program flies with them switched off."""
         return replace(super().checks, battery_failsafes=())
 
     def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
@@ -68,7 +71,7 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
     def start(self, setup: FlightSetup, aircraft: Aircraft) -> ProgramFlight:
         """Start the program.
 
-        Raises FlightError if it does not start, and ParameterError if a file is invalid.
+        Raises FlightError if the program does not start, and ParameterError if a file is invalid.
         """
         # Imported here: only this needs MAVLink.
         from flight.autopilots.arduplane_sitl.flight import AutopilotFlight

@@ -16,10 +16,10 @@ from flight.autopilots.arduplane_sitl.physics import JsonLockstep, PhysicsPort
 from flight.autopilots.arduplane_sitl.preflight import Preflight, version_text
 from flight.autopilots.arduplane_sitl.process import (
     RENAMED_IN_4_7,
-    AutopilotParameters,
+    ArduPlaneFlightParameters,
     arduplane_launch,
-    autopilot_parameters,
-    person_parameters,
+    collect_arduplane_parameters,
+    load_user_parameters,
 )
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.parts import Tick
@@ -32,7 +32,7 @@ from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import SimulatedFlight, fly_to_end
 
-# Time for the motor to follow its throttle, s.
+# Time in which the motor follows the throttle, s.
 _SPOOL_TIME_S = 0.5
 
 
@@ -41,7 +41,7 @@ class AutopilotFlight(SitlFlight):
 
     autopilot: autopilot that flies the setup instead of the setup's own; it has ArduPlane's parameters and the
         program's file.
-    user_parameters: the user's parameters by ArduPlane's names; None takes those of the scenario's file.
+    user_parameters: the user's parameters by ArduPlane's names; None takes the parameters of the scenario's file.
     """
 
     def __init__(
@@ -57,21 +57,21 @@ class AutopilotFlight(SitlFlight):
         setup = replace(setup, autopilot=autopilot)
         digest = check_binary(binary, autopilot.title)
         servos = load_servo_map(aircraft)
-        flight_parameters = autopilot_parameters(
-            setup, aircraft, servos, person_parameters(setup) if user_parameters is None else user_parameters
+        flight_parameters = collect_arduplane_parameters(
+            setup, aircraft, servos, load_user_parameters(setup) if user_parameters is None else user_parameters
         )
         super().__init__(setup, aircraft, binary)
         with contextlib.ExitStack() as stack, self._errors_name_program():
             port = stack.enter_context(contextlib.closing(PhysicsPort()))
             self._link = stack.enter_context(contextlib.closing(TcpLink()))
             heading = math.degrees(self._rail.yaw) % 360.0
-            launch = arduplane_launch(self._mission.home, heading, flight_parameters.given, port.port, self._link.port)
+            launch = arduplane_launch(self._mission.home, heading, flight_parameters.values, port.port, self._link.port)
             self._process = stack.enter_context(AutopilotProcess(binary, launch))
             port.watch = self._process.watch
             self._lockstep = JsonLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
             self._preflight = Preflight(self._link, lambda: self._lockstep.time)
             self._apply_gnss_error()
-            self._hold_during(self._preflight.meet(flight_parameters.given))
+            self._hold_during(self._preflight.identify(flight_parameters.values))
             program = _program_of_messages(self._link, digest, flight_parameters)
             flown_autopilot = autopilot.in_release(simulated_release(program.version))
             self.setup = replace(setup, autopilot=replace(flown_autopilot, program=program))
@@ -92,7 +92,7 @@ class AutopilotFlight(SitlFlight):
         self._push()
 
     def _wait_for_thrust(self) -> Talk:
-        """Wait for full thrust before the launch, if the motor runs before it."""
+        """Wait until the motor has full thrust, if ArduPlane starts the motor before the launch."""
         take_off = self._ground_phases.take_off
         parameters = self.setup.autopilot.parameters
         if take_off is None or take_off.launch.method == "runway" or not isinstance(parameters, ArduPilotParameters):
@@ -104,15 +104,17 @@ class AutopilotFlight(SitlFlight):
             yield
 
 
-def _program_of_messages(link: AutopilotLink, digest: str, parameters: AutopilotParameters) -> AutopilotProgram:
-    """Return the program that flew, from its messages."""
-    news = link.news
-    known = {RENAMED_IN_4_7.get(name, name) for name in news.parameters}
+def _program_of_messages(link: AutopilotLink, digest: str, parameters: ArduPlaneFlightParameters) -> AutopilotProgram:
+    """Return the description of the program that flew, from the messages that it sent."""
+    reported = link.reported
+    known = {RENAMED_IN_4_7.get(name, name) for name in reported.parameters}
     unknown = parameters.changed.keys() - known
     return AutopilotProgram(
-        version=version_text(news.texts, news.version),
+        version=version_text(reported.texts, reported.version),
         sha256=digest,
-        parameters={name: news.parameters[name] for name in sorted(parameters.given) if name in news.parameters},
+        parameters={
+            name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
+        },
         changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
         unused=tuple(sorted({*parameters.unused, *unknown})),
     )

@@ -1,7 +1,7 @@
 """Run one tick of an ArduPlane SITL flight from the ground to the ground, with its phases and its end.
 
-The phases, and the ends of a flight in each, are the ones of `flight.autopilots.arduplane.ground_law`.  The program
-reports only the mission's items; everything else follows from positions and altitudes.
+The phases of a flight, and the events that end it, are defined in `flight.autopilots.arduplane.ground_law`.  The
+program reports only the number of the mission item; the phases follow from position and altitude.
 """
 
 import math
@@ -30,10 +30,10 @@ from world.kernels import Record, compiled, inner
 
 # Height above its standing position at which an aircraft on a runway has lifted off, m.
 _LIFT_OFF_HEIGHT_M = 2.0
-# The aircraft may be slow in its flare.  The flare begins no higher over the landing point than this multiple of the
-# glide's flare height ...
+# From the start of the flare a low airspeed is no stall.  The flare is taken to begin below this multiple of the
+# glide's flare height above the landing point ...
 _MAX_FLARE_HEIGHT_RATIO = 2.0
-# ... or than this, m.
+# ... or below this height, m.
 _MIN_FLARE_HEIGHT_M = 6.0
 
 
@@ -62,11 +62,11 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
 
 @inner
 def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
-    """Change to the next phase when its condition is met.
+    """Change to the next phase when its condition is met: lift-off, end of the climb, last item, flare.
 
     true: a `flight.guidance.navigation_error.MOTION` record.
     ground: a `flight.autopilots.arduplane.ground_law.GROUND_STATE` record.
-    on_last_leg: True if the program flies to its landing.
+    on_last_leg: True if the program flies to its landing point.
     """
     if ground.stage == TAKING_OFF:
         ground.has_lifted_off = ground.has_lifted_off or (

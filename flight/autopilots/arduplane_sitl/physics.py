@@ -5,7 +5,7 @@ import struct
 from collections.abc import Callable
 from typing import NamedTuple
 
-from flight.autopilots.sitl.exchange import LOOPBACK, SILENCE, BodyMotion, Lockstep
+from flight.autopilots.sitl.exchange import LOOPBACK, SILENCE_TIMEOUT_S, BodyMotion, Lockstep
 from flight.autopilots.sitl.servos import ServoMap
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.state import Commands
@@ -17,8 +17,8 @@ from world.running_clock import RunningClock
 # ----------------------------------------------------------------------
 # ArduPilot's JSON physics interface: the packets between an autopilot and its physics.
 #
-# The autopilot sends the state of its servo outputs as a binary datagram, and waits for one JSON object about the
-# aircraft a step later; so both keep step.  Published by ArduPilot as "JSON interface" for software in the loop
+# The autopilot sends its servo outputs as a binary datagram, and waits for one JSON object with the aircraft's motion a
+# step later.  Published by ArduPilot as "JSON interface" for software in the loop
 # (https://github.com/ArduPilot/ardupilot/tree/master/libraries/SITL/examples/JSON).
 
 # Number of outputs by the first number of a packet.
@@ -56,7 +56,7 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
     if packet_format is None or len(data) != packet_format.size:
         allowed = " or ".join(f"{number} with {count} outputs" for number, count in MAGIC.items())
         raise FlightError(
-            f"speaks another version of the physics interface: a packet of {len(data)} bytes that begins with {magic};"
+            f"uses another version of the physics interface: a packet of {len(data)} bytes that begins with {magic};"
             f" allowed: {allowed}",
             field="packet",
             value=magic,
@@ -78,13 +78,13 @@ def encode_motion(motion: BodyMotion | tuple[float, ...], battery: tuple[float, 
 
 
 # ----------------------------------------------------------------------
-# The physics' end of the exchange with an autopilot: a datagram socket on this machine, a frame at a time.
+# planfly's socket for the exchange with an autopilot.
 
 # Interval at which a wait checks whether the program still runs, s.
 _CHECK_INTERVAL_S = 0.25
 _MAX_DATAGRAM_BYTES = 1024
-# A request within this time after the answer was sent before the answer arrived, s by the clock: ArduPilot repeats a
-# request only after a second.
+# ArduPilot repeats a request only after a second.  A repeated request that arrives within this time after an answer was
+# sent before that answer arrived, s by the clock.
 _CROSSING_TIME_S = 0.1
 
 
@@ -133,21 +133,25 @@ class PhysicsPort:
                 if packet.frame < self._frame:
                     message = f"restarted in the air: frame {packet.frame} after frame {self._frame}"
                     raise FlightError(message, field="frame", value=packet.frame)
-                # A request that was sent while the answer was on its way has its answer.
+                # A request that was sent before the answer arrived needs no second answer.
                 if self._clock() - self._answered > _CROSSING_TIME_S:
                     self._send(self._last_answer)
             now = self._clock()
             waiting_since = waiting_since or now
             self.watch()
-            if now - waiting_since > SILENCE:
+            if now - waiting_since > SILENCE_TIMEOUT_S:
                 if data:
                     raise FlightError(
-                        f"does not understand the physics it is sent: asked for frame {self._frame} again for"
-                        f" {SILENCE:.0f} s (another version of the interface?)",
+                        f"does not understand planfly's answers: it requested frame {self._frame} again for"
+                        f" {SILENCE_TIMEOUT_S:.0f} s (another version of the physics interface?)",
                         field="frame",
                         value=self._frame,
                     )
-                raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="frame", value=self._frame)
+                raise FlightError(
+                    f"sent no outputs for {SILENCE_TIMEOUT_S:.0f} s; the flight is ended",
+                    field="frame",
+                    value=self._frame,
+                )
 
     def answer(self, data: bytes) -> None:
         """Send the autopilot the motion of the aircraft after the last received frame."""
@@ -156,7 +160,7 @@ class PhysicsPort:
         self._send(data)
 
     def _next_datagram(self) -> bytes:
-        """Return a datagram, or nothing after `_CHECK_INTERVAL_S` seconds."""
+        """Return the next datagram, or no bytes if none arrives within `_CHECK_INTERVAL_S`."""
         try:
             if self._connected:
                 return self._socket.recv(_MAX_DATAGRAM_BYTES)
@@ -184,7 +188,9 @@ def _do_nothing() -> None:
 class JsonLockstep(Lockstep):
     """Exchange over a `PhysicsPort`: servo outputs request a frame, and the motion answers it.
 
-    servos: outputs of the controls.  The other parameters are those of `Lockstep`.
+    port: socket of the exchange.
+    servos: servos of the controls.
+    fdm, workspace, home, poll: see `Lockstep`.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Prepare ArduPlane before it flies, by parameters, mission, home, arming, and AUTO."""
+"""Prepare ArduPlane before a flight: read parameters, upload the mission, set home, arm, and switch to AUTO."""
 
 from collections.abc import Iterable
 
@@ -21,21 +21,21 @@ _FORCE_ARMING = 21196
 
 
 class Preflight(Conversation):
-    """The conversation with one ArduPlane."""
+    """Conversation with one running ArduPlane."""
 
-    def meet(self, parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, and read those of the given parameters that it has.
+    def identify(self, parameters: Iterable[str]) -> Talk:
+        """Identify the autopilot, and read the named parameters that it has.
 
-        Raises FlightError if it is not ArduPlane.
+        Raises FlightError if the vehicle is not a fixed wing.
         """
         yield from self._identify("ArduPlane", _MESSAGE_INTERVALS_US, parameters)
 
     def prepare(self, mission: UploadedMission) -> Talk:
-        """Wait until it has a position, upload the mission, and start it in AUTO.
+        """Wait until ArduPlane has a position, upload the mission, arm ArduPlane, and start AUTO.
 
-        Raises FlightError if it finds no position, or refuses.
+        Raises FlightError if ArduPlane has no position estimate, or refuses one of these steps.
         """
-        news, ekf = self._news, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT
+        reported, ekf = self._reported, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT
         yield from self._wait_for_position(ekf, _MESSAGE_INTERVALS_US[ekf], mavlink.ESTIMATOR_CONST_POS_MODE)
         yield from self._upload([_home_item(mission.home), *mission.items], MissionType.MISSION)
         if mission.rally:
@@ -51,8 +51,8 @@ class Preflight(Conversation):
             lambda: self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
             "AUTO",
         )
-        auto_mode = Awaited("AUTO", REPLY_TIMEOUT_S, "is not in AUTO, armed")
-        yield from self._wait_until(lambda: news.mode == AUTO and news.armed, auto_mode)
+        auto_mode = Awaited("AUTO", REPLY_TIMEOUT_S, "did not change to AUTO, armed,")
+        yield from self._wait_until(lambda: reported.mode == AUTO and reported.armed, auto_mode)
 
 
 def _home_item(home: Home) -> MissionItem:
@@ -62,7 +62,7 @@ def _home_item(home: Home) -> MissionItem:
 
 
 def version_text(texts: list[str], number: int | None) -> str:
-    """Return the autopilot's name and version from its messages, or otherwise from its version number.
+    """Return ArduPlane's name and version from its texts, or from AUTOPILOT_VERSION.flight_sw_version.
 
     >>> version_text(["Initialising", "ArduPlane V4.6.0-dev (0123abcd)"], None)
     'ArduPlane V4.6.0-dev (0123abcd)'

@@ -69,16 +69,16 @@ SIMULATION = {
     "ARSPD_PIN": 1.0,
     "ARSPD_SKIP_CAL": 1.0,
     "ARSPD_OFFSET": 2013.0,
-    # It is armed in the air.
+    # The autopilot is armed in the air.
     "ARMING_CHECK": 0.0,
     "LOG_FILE_DSRMROT": 0.0,
-    # It sends only the requested messages.
+    # The autopilot sends only the requested messages.
     **dict.fromkeys(
         [f"SR0_{name}" for name in ("RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3")], 0.0
     ),
 }
-# Battery voltage and current are measured, so that its log has them (BAT); no battery failsafe ends a flight: the
-# verdict judges energy.
+# Battery voltage and current are measured, so that the autopilot's log contains them (BAT).  No battery failsafe ends a
+# flight: the verdict judges energy.
 _MEASURED = {"BATT_MONITOR": 4.0, "BATT_FS_LOW_ACT": 0.0, "BATT_FS_CRT_ACT": 0.0, "BATT_LOW_VOLT": 0.0}
 _UNMEASURED = {"BATT_MONITOR": 0.0}
 # Prefixes of the user's parameters for flight; others belong to the hardware of the file.
@@ -91,38 +91,39 @@ FLYING = (
 )
 
 
-# Present names of parameters of 4.6 that 4.7 renamed.
+# Names in 4.7 by the names in 4.6, of the parameters that 4.7 renamed.
 RENAMED_IN_4_7 = {"GLIDE_SLOPE_MIN": "ALT_SLOPE_MIN", "GLIDE_SLOPE_THR": "ALT_SLOPE_MAXHGT"}
 
 
 @dataclass(frozen=True, slots=True)
-class AutopilotParameters:
-    """Parameters by name.
+class ArduPlaneFlightParameters:
+    """Parameters of a flight of ArduPlane's program, by name.
 
-    given: all parameters that the autopilot gets in addition to its own defaults; a parameter that 4.7 renamed is given
-        under both names, of which a program reads the one that it has.
-    changed: parameters of the user among them, if the aircraft has another value or no value.
-    unused: the user's parameters that belong to other hardware.
+    values: all parameters that replace ArduPlane's own defaults; a parameter that 4.7 renamed is contained under both
+        names, of which a program knows one.
+    changed: values that the user's file states and that differ from the aircraft's, or that the aircraft lacks.
+    unused: names in the user's file that ArduPlane does not get, because they belong to other hardware.
     """
 
-    given: Mapping[str, float]
+    values: Mapping[str, float]
     changed: Mapping[str, float]
     unused: tuple[str, ...] = ()
 
 
-def autopilot_parameters(
+def collect_arduplane_parameters(
     setup: FlightSetup, aircraft: Aircraft, servos: ServoMap, user_parameters: Mapping[str, float]
-) -> AutopilotParameters:
-    """Collect the parameters of a flight.
+) -> ArduPlaneFlightParameters:
+    """Collect the parameters of a flight of ArduPlane's program from the simulation, the aircraft and the user.
 
-    The mission's speed is the cruise speed, unless the user states one.  Raises ParameterError if a file is invalid.
+    AIRSPEED_CRUISE is the mission's airspeed, unless the user states a value.  Raises ParameterError if a file is
+    invalid.
     """
     battery = _MEASURED if aircraft.battery_voltage else _UNMEASURED
     base = SIMULATION | battery | servos.parameters() | load_aircraft_parameters(aircraft)
     base["AIRSPEED_CRUISE"] = setup.airspeed
     flight_values = {name: value for name, value in user_parameters.items() if name.startswith(FLYING)}
     changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
-    return AutopilotParameters(
+    return ArduPlaneFlightParameters(
         with_names_of_4_6(base | flight_values), changed, tuple(sorted(user_parameters.keys() - flight_values.keys()))
     )
 
@@ -144,15 +145,16 @@ def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
     return {name: entry.value for name, entry in read_parameter_file(aircraft.folder / AIRCRAFT_FILE).items()}
 
 
-def person_parameters(setup: FlightSetup) -> dict[str, float]:
-    """Return the parameters of the scenario's file, by present names and in their units.
+def load_user_parameters(setup: FlightSetup) -> dict[str, float]:
+    """Return the user's parameters, from the scenario's parameter file and RTL settings, by present names.
+
+    Leaves out older names and names that are too long for MAVLink; the RTL settings have priority over the file.
 
     Raises ParameterError, in one line, if the file cannot be read or states a value that is not allowed.
     """
     file, parameters = setup.scenario.flight.params, setup.autopilot.parameters
     scenario_values = {} if parameters is None else parameters.by_origin("file")
     if file is None:
-        # Settings of a scenario's RTL are taken as stated.
         return scenario_values
     old_names = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
     file_values = {

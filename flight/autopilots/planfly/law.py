@@ -15,7 +15,7 @@ from aircraft.tracking import density_factor
 from flight.dynamics.instructions import Code
 from flight.guidance.inner_loops import follow_roll, steer_elevator, step_roll_model
 from flight.guidance.lateral_reference_laws import (
-    WAYPOINT_RADIUS,
+    DEFAULT_ACCEPTANCE_RADIUS_M,
     field_course,
     has_l1_reached,
     l1_acceleration,
@@ -23,7 +23,7 @@ from flight.guidance.lateral_reference_laws import (
     l1_integrate,
     l1_length,
 )
-from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile
+from flight.guidance.path import find_on_path, max_curvature, mean_curvature, profile_at
 from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import NOT_A_NUMBER, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS, begin_tick, end_tick
 from world.arrays import Floats, Heights
@@ -44,11 +44,11 @@ _ENERGY_LAG_S = 1.0
 # Time constant of the airspeed without its gusts, s.
 _AIRSPEED_LAG_S = 2.0
 # Multiple of the stall speed with level wings below which speed has priority over altitude immediately.
-SAFE_SPEED = 1.2
-# The same multiple of the stall speed at the present bank; it gives the higher airspeed from 33 degrees of bank on.
+SAFE_SPEED_RATIO = 1.2
+# The same multiple of the stall speed at the current bank; it gives the higher airspeed above 33 degrees of bank.
 # The wing can then give 1.44 or 1.21 times the lift that it needs: a margin for gusts.  With 1.2 in turns as well, an
 # Aerosonde with 30 % more drag strayed 0.56 m instead of 0.16 m in one of 20 winds of moderate turbulence.
-SAFE_SPEED_BANKED = 1.1
+BANKED_SAFE_SPEED_RATIO = 1.1
 # Lower limit of the bank's cosine in the load factor, as in `steer_elevator`, which demands no more lift.
 _MIN_BANK_COSINE = 0.4
 # Time in which the climb limit restores a low airspeed, s.
@@ -60,9 +60,9 @@ _NOSE_LIMIT_RAD = math.radians(80.0)
 # The nose settles there with a time constant of V / (4 g), 0.4 s for the Zagi at 15 m/s, which rolls within 0.25 s.
 _BANK_PER_NOSE_ANGLE_RATIO = 4.0
 # Fraction of the lateral acceleration at maximum bank that an arc may require before the aircraft slows down for it.
-ARC_SHARE = 0.95
+ARC_ACCELERATION_FRACTION = 0.95
 # Longest tick for which the full lead of a correction is used, s.
-LEAD_TICK = 1.0 / 60.0
+FULL_LEAD_TICK_S = 1.0 / 60.0
 
 
 @compiled
@@ -159,11 +159,11 @@ def _cross_track_bank_command(
     speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     course_error = wrap(ground_course - course)
-    # The lift's horizontal part is perpendicular to the heading, the demanded acceleration to the course.
+    # The horizontal lift is perpendicular to the heading, but the demanded acceleration is perpendicular to the course.
     drift = wrap(ground_course - state.yaw)
     crab = max(0.5, math.cos(drift))
     piece, distance = memory.piece, memory.distance
-    # In a crosswind the turn changes the ground speed: predict its value for when the bank takes effect.
+    # In a crosswind the turn changes the ground speed: predict the ground speed at the time at which the bank acts.
     future_speed = speed + gains.turn_lead * GRAVITY * math.tan(memory.bank) * math.sin(drift)
     start = distance + speed * max(0.0, gains.turn_lead - 0.5 * gains.turn_smoothing)
     turn_acceleration = (
@@ -175,14 +175,16 @@ def _cross_track_bank_command(
     # oscillate in roll (45 degrees of bank at 30 Hz in moderate turbulence; 38 with half of it).
     correction_rate = (correction - memory.smoothed_correction) / gains.push_smoothing
     memory.smoothed_correction += correction_rate * min(dt, gains.push_smoothing)
-    correction += offset_correction + gains.push_lead * min(1.0, (LEAD_TICK / dt) ** 2) * correction_rate
+    correction += offset_correction + gains.push_lead * min(1.0, (FULL_LEAD_TICK_S / dt) ** 2) * correction_rate
     lift_acceleration = GRAVITY + memory.slope_acceleration
     bank_demand = math.atan((turn_acceleration + correction) / (lift_acceleration * crab))
     bank_demand = _limit_nose_angle(bank_demand, wrap(state.yaw - course), memory.max_bank)
     bank: float = min(memory.max_bank, max(-memory.max_bank, bank_demand))
     max_path_curvature = max_curvature(pieces, piece, distance, distance + speed * gains.arc_slowing_time)
-    memory.max_arc_speed = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory.max_bank) / max(1e-9, max_path_curvature))
-    # A limited skid adds the force that the bank limit withholds: its side force points into the turn.
+    memory.max_arc_speed = math.sqrt(
+        ARC_ACCELERATION_FRACTION * GRAVITY * math.tan(memory.max_bank) / max(1e-9, max_path_curvature)
+    )
+    # A limited skid, whose side force points into the turn, adds acceleration that the bank limit does not allow.
     missing_acceleration = lift_acceleration * (math.tan(bank_demand) - math.tan(bank))
     sideslip = missing_acceleration / max(1.0, gains.side_per_sideslip * _pressure_ratio(state, gains))
     memory.sideslip = -min(gains.sideslip_max, max(-gains.sideslip_max, sideslip))
@@ -195,8 +197,8 @@ def _cross_track_bank_command(
 def _limit_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) -> float:
     """Return the bank demand, reduced if it would turn the nose too far from the course, rad.
 
-    At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  Turning further would gain nothing against a
-    crosswind, and the aircraft would turn all the way round.  The result is continuous in both angles unless the nose
+    At `_NOSE_LIMIT_RAD` the nose is almost perpendicular to the course.  A larger angle would not help against a
+    crosswind, and the aircraft would turn through 360 degrees.  The result is continuous in both angles unless the nose
     points straight back.  A bank that already turns the nose back towards the course fast enough is not changed.
 
     nose_angle: angle from the course to the nose, positive clockwise, within +-pi rad.
@@ -213,8 +215,8 @@ def _correct_roll_offset(
 ) -> float:
     """Return the acceleration (m/s^2 to the right) that corrects the offset from rolling into arcs.
 
-    No aircraft can change its bank in one step, so ``memory.roll_offset`` is the planned offset from the path where the
-    curvature jumps.
+    No aircraft can change its bank in one step. ``memory.roll_offset`` is therefore the planned offset from the path
+    after a jump of the curvature.
 
     curvature: curvature of the path here, 1/m.
     turn_acceleration: acceleration to the right for the path ahead, m/s^2.
@@ -296,7 +298,7 @@ def _l1_bank_command(
     l1_distance = l1_length(speed, gains.l1_period, damping)
     leg = memory.l1_leg
     start, end = waypoints[leg], waypoints[leg + 1]
-    turn_distance = end.acceptance if end.acceptance > 0.0 else WAYPOINT_RADIUS
+    turn_distance = end.acceptance if end.acceptance > 0.0 else DEFAULT_ACCEPTANCE_RADIUS_M
     if leg + 2 < waypoints.shape[0] and has_l1_reached(estimated, start, end, l1_distance, turn_distance):
         leg += 1
         memory.l1_leg = leg
@@ -344,8 +346,8 @@ def steer_height(
     """Set the elevator to follow the altitude profile, and the throttle to hold the airspeed."""
     airspeed = max(8.0, state.airspeed)
     speed_along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
-    path_altitude, slope, _ = profile(nodes, memory.distance)
-    _, slope_ahead, slope_rate = profile(nodes, memory.distance + speed_along * gains.slope_lead)
+    path_altitude, slope, _ = profile_at(nodes, memory.distance)
+    _, slope_ahead, slope_rate = profile_at(nodes, memory.distance + speed_along * gains.slope_lead)
     height_error = estimated.up - path_altitude
     memory.height_error = height_error
     climb_rate = estimated.velocity_up
@@ -380,11 +382,12 @@ def _max_upward_acceleration(
 ) -> float:
     """Return the maximum upward acceleration that the energy allows, m/s^2.
 
-    The climb rate available at constant airspeed is the specific excess power now plus that of the unused throttle.
-    While the airspeed is above its minimum, the aircraft may climb faster than that; while it is below, the aircraft
-    must climb more slowly, or descend, to regain speed.  Near the stall the measured airspeed, gusts included, replaces
-    the filtered one, because a gust can bring the aircraft to the stall within a second.  In a steep turn this
-    protection starts at a higher airspeed, because the stall speed grows with the square root of the load factor.
+    The climb rate available at constant airspeed is the current specific excess power plus the excess power of the
+    unused throttle. While the airspeed is above its minimum, the aircraft may climb faster than at that rate; while the
+    airspeed is below its minimum, the aircraft must climb more slowly, or descend, to regain speed.  Near the stall the
+    measured airspeed, gusts included, replaces the filtered one, because a gust can bring the aircraft to the stall
+    within a second.  In a steep turn this protection starts at a higher airspeed, because the stall speed grows with
+    the square root of the load factor.
     """
     climb_rate = estimated.velocity_up
     if memory.last_airspeed < 0.0:
@@ -398,7 +401,7 @@ def _max_upward_acceleration(
     unused_climb = (1.0 - commands.throttle) / max(1e-3, gains.throttle_per_slope) * airspeed
     stall_speed = memory.stall_speed * density_factor(estimated.up)
     load_factor = 1.0 / max(_MIN_BANK_COSINE, math.cos(state.roll))
-    stall_multiple = max(SAFE_SPEED, SAFE_SPEED_BANKED * math.sqrt(load_factor))
+    stall_multiple = max(SAFE_SPEED_RATIO, BANKED_SAFE_SPEED_RATIO * math.sqrt(load_factor))
     safe_airspeed = min(memory.speed_command, stall_multiple * stall_speed)
     min_airspeed = max(safe_airspeed, memory.speed_command - gains.slow_margin)
     airspeed_excess = min(memory.filtered_airspeed - min_airspeed, airspeed - safe_airspeed)
@@ -428,7 +431,7 @@ def _set_throttle(
     feed_forward = memory.trim_throttle + gains.throttle_per_slope * slope_ahead * speed_along / airspeed
     throttle_demand = feed_forward + gains.speed_gain * airspeed_error + gains.speed_integral * memory.speed_integrator
     commands.throttle = min(1.0, max(0.0, throttle_demand))
-    # Below the throttle that gives thrust, which increases with airspeed, the integrator would wind up without effect.
+    # Below the throttle at which thrust begins, which increases with airspeed, the integrator would wind up.
     idle_throttle = gains.throttle_idle * airspeed / gains.reference_airspeed
     if (throttle_demand < 1.0 or airspeed_error < 0.0) and (throttle_demand > idle_throttle or airspeed_error > 0.0):
         memory.speed_integrator = min(60.0, max(-60.0, memory.speed_integrator + airspeed_error * dt))

@@ -23,7 +23,7 @@ from flight.autopilots.parts import (
     SpeedRules,
     TurnRules,
 )
-from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE
+from flight.autopilots.px4.lateral import MAX_SWITCH_DISTANCE_M
 from flight.autopilots.px4.law import PX4, px4_loop, px4_tick
 from flight.autopilots.px4.open_settings import describe_open_settings
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
@@ -304,7 +304,7 @@ class Px4(Autopilot):
             period = max(period, min_period)
         speed = parameters["FW_AIRSPD_TRIM"] * float(true_by_equivalent(amsl))
         switch_distance = parameters["NPFG_SW_DST_MLT"] * period * parameters["NPFG_DAMPING"] * speed
-        return max(parameters["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE, switch_distance), 6))
+        return max(parameters["NAV_ACC_RAD"], round(min(MAX_SWITCH_DISTANCE_M, switch_distance), 6))
 
     @property
     def speeds(self) -> SpeedRules:
@@ -336,7 +336,7 @@ class Px4(Autopilot):
         return ReturnRules(
             height=parameters["RTL_RETURN_ALT"],
             radius=parameters["RTL_LOITER_RAD"],
-            sink=parameters["FW_T_SINK_R_SP"],
+            max_sink_rate=parameters["FW_T_SINK_R_SP"],
             rally_limit=0.0,
             includes_home=return_type in (0, 3),
             holds_height=True,
@@ -358,8 +358,8 @@ class Px4(Autopilot):
             radius_name="NAV_LOITER_RAD",
             steers_to_center=True,
             holds_height=True,
-            climb=min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"]),
-            sink=min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"]),
+            max_climb_rate=min(parameters["FW_T_CLMB_R_SP"], parameters["FW_T_CLMB_MAX"]),
+            max_sink_rate=min(parameters["FW_T_SINK_R_SP"], parameters["FW_T_SINK_MAX"]),
             altitude_tolerance=parameters["NAV_FW_ALT_RAD"],
             ends_in_circle=True,
         )

@@ -5,7 +5,7 @@ fixed-wing aircraft in arbitrarily strong windfields" (ACC 2017), extended to an
 Backwards" (2019), in PX4's form (`src/lib/npfg/`): a course that closes in on the track and turns along it, the heading
 that flies this course in the wind, and a lateral acceleration proportional to the heading error.
 
-Tracks are flown over the ground: courses and headings are angles from the map's north, clockwise, and a signed error is
+A track is a path over the ground. Courses and headings are angles from the map's north, clockwise; a signed error is
 positive to the right.
 """
 
@@ -20,14 +20,16 @@ _AIRSPEED_BUFFER_MPS = 1.5
 # `AirspeedDirectionController`; PX4's main branch uses the parameters again since commit 89af91dbdb, March 2026).
 _HEADING_GAIN_PER_S = 0.8885
 # Upper limit of the switch distance before a waypoint, m.
-MAX_SWITCH_DISTANCE = 500.0
+MAX_SWITCH_DISTANCE_M = 500.0
 # Ground speed below which the bound of the track error is a parabola of the ground speed, m/s.
 _MIN_GROUND_SPEED_MPS = 1.0
 
 
 @inner
 def feasibility(airspeed: float, wind_cross_bearing: float, wind_dot_bearing: float) -> float:
-    """Return the feasibility of a course, from 1 with enough airspeed to 0 where the wind prevails.
+    """Return the feasibility of a course: 1 with enough airspeed, 0 if the wind is stronger than the airspeed.
+
+    Follows `bearingFeasibility`.
 
     wind_cross_bearing, wind_dot_bearing: wind components across and along the course, m/s.
     """
@@ -70,7 +72,8 @@ def switch_distance(ground_speed: float, parameters: Record) -> float:
     """
     time_constant = straight_track_period(parameters) * parameters.npfg_damping
     return min(
-        MAX_SWITCH_DISTANCE, parameters.npfg_switch_distance_multiplier * track_error_bound(ground_speed, time_constant)
+        MAX_SWITCH_DISTANCE_M,
+        parameters.npfg_switch_distance_multiplier * track_error_bound(ground_speed, time_constant),
     )
 
 
@@ -159,7 +162,7 @@ def guide_to_path(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Set ``memory.lateral_acceleration`` to lead the aircraft onto a track (`guideToPath`).
+    """Set ``memory.lateral_acceleration`` so that the aircraft joins and follows a track (`guideToPath`).
 
     estimated: a record of `flight.guidance.navigation_error.MOTION`.
     path_east, path_north: point of the track nearest to the aircraft, m.
@@ -186,7 +189,7 @@ def guide_to_path(
     error_bound = track_error_bound(ground_speed, period * damping)
     look_ahead_angle = 0.5 * math.pi * (1.0 - min(1.0, abs(track_error) / error_bound)) ** 2
     proximity = math.sin(look_ahead_angle) ** 2
-    # Towards the track at right angles: to the left of its direction if the aircraft is right of it.
+    # The bearing points to the track at a right angle far from it, and along the track on it.
     side = math.copysign(1.0, track_error)
     bearing_east = -math.cos(look_ahead_angle) * side * tangent_north + math.sin(look_ahead_angle) * tangent_east
     bearing_north = math.cos(look_ahead_angle) * side * tangent_east + math.sin(look_ahead_angle) * tangent_north
@@ -225,10 +228,10 @@ def follow_leg(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Follow the line from the leg's start to its end (m), or fly straight to one of the two points.
+    """Guide the aircraft onto the line from the leg's start to its end (m), or straight to one of these points.
 
     Before the start and further away than the switch distance, the aircraft flies to the start; past the end, it
-    flies back to the end (`navigateWaypoints`).  The other parameters are those of `guide_to_path`.
+    flies back to the end (`navigateWaypoints`).  Other arguments as for `guide_to_path`.
     """
     leg_east, leg_north = end_east - memory.from_east, end_north - memory.from_north
     length = math.hypot(leg_east, leg_north)
@@ -286,9 +289,10 @@ def follow_loiter(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Follow a loiter about a center, m (`navigateLoiter`).
+    """Guide the aircraft onto a loiter circle about a center, m (`navigateLoiter`).
 
-    radius: m, positive to the right.  The other parameters are those of `guide_to_path`.
+    radius: m, positive to the right.
+    Other arguments as for `guide_to_path`.
     """
     radial_east, radial_north = estimated.east - center_east, estimated.north - center_north
     distance = math.hypot(radial_east, radial_north)

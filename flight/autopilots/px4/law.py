@@ -1,7 +1,7 @@
 """Simulate PX4's fixed-wing controllers in compiled code: navigation, guidance, TECS and attitude, and their memory.
 
 Attitude control uses planfly's inner loops (`flight.guidance.inner_loops`) with the lags of PX4's controllers, whose
-gains are tuned to the aircraft and are no part of this model.
+gains are tuned to the aircraft and are not part of this model.
 """
 
 import math
@@ -15,7 +15,7 @@ from flight.autopilots.px4.tecs import update_tecs
 from flight.dynamics.instructions import Code
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.guidance.inner_loops import follow_roll, steer_elevator
-from flight.guidance.path import find_on_path, leave_sharp_corners, profile
+from flight.guidance.path import find_on_path, leave_sharp_corners, profile_at
 from flight.simulation.compiled_loop import advance_model, read_state
 from flight.simulation.tick import (
     NOT_A_NUMBER,
@@ -23,9 +23,9 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
-    end_around,
-    end_return,
     end_tick,
+    update_end_loiter,
+    update_rtl_loiter,
 )
 from world.arrays import Floats, Heights
 from world.kernels import Record, Records, compiled, inner, record_dtype
@@ -70,9 +70,9 @@ PX4_NUMBERS = PX4.itemsize // 8
 
 # Lag of the roll behind its setpoint, as a ratio to FW_R_TC.  From the overshoots of PX4's flights of the Aerosonde,
 # whose aileron feed-forward (FW_RR_FF) gives more than a roll rate needs.
-ROLL_LAG = 0.65
+ROLL_LAG_RATIO = 0.65
 # Lag of the pitch behind its setpoint, as a ratio to FW_P_TC.
-PITCH_LAG = 1.0
+PITCH_LAG_RATIO = 1.0
 # Timeout at a mission's end, s: to reach the last altitude, or to fly once around the last waypoint.
 MISSION_END_TIMEOUT_S = 300.0
 
@@ -155,12 +155,12 @@ def control_as_px4(
     guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     parameters: a record of `flight.autopilots.px4.parameters.PX4_PARAMETERS`.
     memory: a record of `flight.autopilots.px4.law.PX4_MEMORY`.
-    The other parameters are those of `flight.autopilots.planfly.law.guide`.
+    Other arguments as for `flight.autopilots.planfly.law.guide`.
 
     The path is only the reference against which the track is measured; PX4 does not use it.
     """
     find_on_path(estimated, pieces, guidance)
-    guidance.height_error = estimated.up - profile(nodes, guidance.distance)[0]
+    guidance.height_error = estimated.up - profile_at(nodes, guidance.distance)[0]
     eas_to_tas = true_by_equivalent(estimated.up)
     if not memory.is_initialised:
         _initialise_memory(state, estimated, waypoints, guidance, parameters, memory, eas_to_tas)
@@ -176,7 +176,7 @@ def control_as_px4(
     airspeed_setpoint = max(commanded_airspeed, memory.min_airspeed / airspeed_scale)
     guidance.speed_command = min(parameters.airspeed_max, airspeed_setpoint) * eas_to_tas
     if memory.is_in_rtl:
-        end_return(estimated, waypoints[memory.leg + 1], guidance, dt)
+        update_rtl_loiter(estimated, waypoints[memory.leg + 1], guidance, dt)
     elif find_target(waypoints, memory) + 1 >= waypoints.shape[0]:
         _end_mission(estimated, waypoints[waypoints.shape[0] - 1], guidance, parameters, memory, dt)
     max_roll_step = parameters.roll_slew_rate * dt
@@ -196,9 +196,8 @@ def _end_mission(
 ) -> None:
     """End the flight once the aircraft is past the last waypoint and at its altitude, or after a timeout.
 
-    At the mission's end PX4 loiters without end (`MissionBase::setEndOfMissionItems`): the flight joins that loiter
-    once around.  A circle that begins before the waypoint, and that the aircraft leaves at once because its altitude is
-    right, does not end the flight.
+    If PX4 loiters without end at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one
+    circle of that loiter.  A circle before the waypoint, which corrects the altitude, does not end the flight.
     """
     has_arrived = (
         memory.time_at_mission_end > 0.0 or guidance.is_finished or memory.is_loitering or memory.mission_finished
@@ -207,7 +206,7 @@ def _end_mission(
         return
     memory.time_at_mission_end += dt
     if memory.mission_finished:
-        end_around(estimated, guidance, dt)
+        update_end_loiter(estimated, guidance, dt)
         is_over = guidance.is_finished
     else:
         # An aircraft that loiters at the mission's end has not missed the route.
@@ -239,7 +238,7 @@ def _initialise_memory(
     memory.altitude_reference = estimated.up
     memory.tas = state.airspeed
     memory.tas_setpoint = state.airspeed
-    # Start with the trim of level flight here, as if the aircraft had been flying.
+    # Start with the trim of level flight, as after a long flight.
     memory.pitch_setpoint = state.alpha - parameters.pitch_trim
     memory.pitch_integrator = memory.pitch_setpoint
     memory.throttle_setpoint = guidance.trim_throttle
@@ -260,7 +259,7 @@ def _control_attitude(
 ) -> None:
     """Drive roll and pitch to their setpoints with the lags of PX4's controllers, and set the throttle."""
     previous_roll_rate = guidance.bank_rate
-    roll_rate = (memory.roll_setpoint - guidance.bank) / (ROLL_LAG * parameters.roll_time_constant)
+    roll_rate = (memory.roll_setpoint - guidance.bank) / (ROLL_LAG_RATIO * parameters.roll_time_constant)
     if parameters.roll_rate_max > 0.0:
         roll_rate = min(parameters.roll_rate_max, max(-parameters.roll_rate_max, roll_rate))
     roll_rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, roll_rate))
@@ -277,7 +276,7 @@ def _control_attitude(
         dt,
     )
     pitch_rate = (memory.pitch_setpoint + parameters.pitch_trim - state.pitch) / (
-        PITCH_LAG * parameters.pitch_time_constant
+        PITCH_LAG_RATIO * parameters.pitch_time_constant
     )
     pitch_rate = min(_MAX_PITCH_RATE_RADPS, max(-_MAX_PITCH_RATE_RADPS, pitch_rate))
     steer_elevator(state, gains, guidance, commands, estimated.velocity_up, state.airspeed * pitch_rate)

@@ -14,7 +14,7 @@ start; LOITER_TO_ALT demands the altitude at the start of its leg until the rim 
 
 At a gate (CONDITION_GATE) the aircraft flies to the waypoint after it.  A change of speed that the mission orders
 between them applies from where the aircraft crosses the plane through the gate.  Once the last waypoint is reached, PX4
-circles with NAV_LOITER_RAD: about that waypoint, up to 1.16 about the place where the aircraft then is
+circles with NAV_LOITER_RAD: about that waypoint, up to 1.16 about the aircraft's position at that time
 (`setEndOfMissionItems`).
 """
 
@@ -28,10 +28,11 @@ from world.kernels import Record, Records, inner
 # controller's turn.  At 33 waypoints of the stored flights it was 0.13 s on average, 0.02 to 0.26.  PX4 1.17 and 1.18,
 # which turn by the same rule, differ from each other by up to 5.9 m at the same waypoints; a simulation without that
 # delay is never closer than 3 m.
-SWITCH_DELAY = 0.13
-# Course tolerance for leaving a loiter on the course to what follows, rad (`kCosineExitCourseThreshold`).
+SWITCH_DELAY_S = 0.13
+# Course tolerance for leaving a loiter on the course to the next waypoint, rad (`kCosineExitCourseThreshold`).
 EXIT_COURSE_TOLERANCE_RAD = math.radians(5.0)
-# A place closer to the center than this, in radii, cannot be headed for from the loiter: no course is awaited.
+# Minimum distance of the next waypoint from the loiter's center, in radii, for an exit on course: the course of the
+# loiter never points to a closer waypoint.
 _MIN_EXIT_DISTANCE_RATIO = 1.05
 
 
@@ -48,8 +49,8 @@ def acceptance_radius_at(ground_speed: float, parameters: Record) -> float:
 def _altitude_acceptance_radius(target: Record, parameters: Record) -> float:
     """Return the altitude tolerance within which a waypoint or a loiter is accepted, m.
 
-    Follows `Navigator::get_altitude_acceptance_radius`: any altitude in a mission's landing (`setActiveMissionItems`),
-    NAV_FW_ALTL_RAD before a landing, or NAV_FW_ALT_RAD.
+    Follows `Navigator::get_altitude_acceptance_radius`: infinite in a landing sequence (`setActiveMissionItems`),
+    NAV_FW_ALTL_RAD before a landing, otherwise NAV_FW_ALT_RAD.
     """
     if target.ignores_altitude:
         return math.inf
@@ -146,7 +147,7 @@ def _navigate_waypoint(
     altitude_error = abs(estimated.up - target.up)
     is_off_altitude = altitude_error > parameters.altitude_acceptance_radius and not target.ignores_altitude
     is_accepted_altitude = altitude_error <= _altitude_acceptance_radius(target, parameters)
-    # A circle continues once begun, even if the aircraft is far outside it.
+    # A circle continues even if the aircraft drifts far outside it.
     memory.is_loitering = memory.mission_finished or (
         is_off_altitude and (memory.is_loitering or distance < turn_distance)
     )
@@ -172,7 +173,7 @@ def _navigate_waypoint(
         if memory.time_since_reached > 0.0 or (is_reached and is_accepted_altitude)
         else 0.0
     )
-    if memory.time_since_reached <= SWITCH_DELAY:
+    if memory.time_since_reached <= SWITCH_DELAY_S:
         return
     if is_end:
         if parameters.uses_switch_distance and not memory.mission_finished:
@@ -225,13 +226,13 @@ def _navigate_loiter(
     )
     exit_index = memory.leg + 2
     if math.isnan(loiter.loiter_time):
-        # A loiter by turns, which PX4 does not fly: it is left where the drawn route leaves it.
+        # PX4 refuses loiters by turns; leave it at the same point as the route.
         if exit_index < waypoints.shape[0] and is_on_rim and is_past_corner(estimated, loiter):
             begin_leg(estimated, waypoints, memory.leg + 1, memory)
         return
     while exit_index < waypoints.shape[0] and waypoints[exit_index].stop == loiter.stop:
         exit_index += 1
-    if exit_index >= waypoints.shape[0] or memory.time_since_reached <= loiter.loiter_time + SWITCH_DELAY:
+    if exit_index >= waypoints.shape[0] or memory.time_since_reached <= loiter.loiter_time + SWITCH_DELAY_S:
         return
     if not loiter.exits_on_course or _is_on_exit_course(estimated, waypoints[exit_index], loiter):
         begin_leg(estimated, waypoints, exit_index - 1, memory)
@@ -257,9 +258,9 @@ def _setpoint_position(waypoint: Record) -> tuple[float, float]:
 
 @inner
 def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record) -> bool:
-    """Return True if the ground course points to the setpoint after a loiter, within `COURSE_ACCEPTANCE`.
+    """Return True if the ground course points to the setpoint after a loiter, within `EXIT_COURSE_TOLERANCE_RAD`.
 
-    Also True for a setpoint so close to the loiter's center that the course can never point to it.
+    The result is also True for a setpoint so close to the loiter's center that the course can never point to it.
 
     next_waypoint: the waypoint after the loiter.
     """
@@ -313,7 +314,7 @@ def _navigate_rtl(
     distance = math.hypot(rtl.centre_east - estimated.east, rtl.centre_north - estimated.north)
     memory.is_loitering = memory.is_loitering or distance < abs(rtl.loiter_radius) + switch_distance(speed, parameters)
     memory.altitude_setpoint = rtl.up if memory.is_loitering else return_altitude
-    # The way is a loiter, too, which from afar leads straight to its center.
+    # The leg to the target is flown as a loiter, whose guidance leads straight to the center from a distance.
     follow_loiter(
         estimated,
         rtl.centre_east,
@@ -331,8 +332,8 @@ def _navigate_rtl(
 def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
     """Make ``leg`` the current leg, along the line between its two waypoints.
 
-    After a loiter the line starts at the loiter's center.  After a loiter by turns, which PX4 does not fly, the line
-    starts where the aircraft leaves the loiter.
+    After a loiter the line starts at the loiter's center.  After a loiter by turns, which PX4 refuses, the line starts
+    at the aircraft.
     """
     start, end = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg

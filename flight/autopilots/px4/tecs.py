@@ -13,8 +13,8 @@ from world.kernels import Record, inner
 _SPEED_RATE_FRACTION = 0.5
 # Maximum rate of the airspeed setpoint, m/s^2.
 _AIRSPEED_SLEW_MPS2 = 1.0
-# Distance below FW_AIRSPD_MIN at which underspeed begins, as a fraction of FW_AIRSPD_TRIM.  The underspeed ratio
-# rises from 0 to 1 over the same distance below that.
+# Airspeed difference below FW_AIRSPD_MIN at which underspeed begins, as a fraction of FW_AIRSPD_TRIM.  The underspeed
+# ratio rises from 0 to 1 over the same difference below that airspeed.
 _UNDERSPEED_FRACTION = 0.15
 
 
@@ -63,15 +63,16 @@ def update_tecs(
     eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Update the throttle and pitch setpoints of ``memory`` for its altitude setpoint and an airspeed.
+    """Update the throttle and pitch setpoints in ``memory`` for the altitude setpoint and an airspeed setpoint.
 
     Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
     `_calcAirspeedControlOutput`.  Rates of kinetic energy are demanded by the airspeed setpoint
     (`_calcSpecificEnergyRates`).
 
-    state: a record of `flight.dynamics.state.STATE`.  estimated: a record of
-    `flight.guidance.navigation_error.MOTION`.
-    airspeed_setpoint: equivalent airspeed, m/s.  eas_to_tas: ratio of true to equivalent airspeed.
+    state: a record of `flight.dynamics.state.STATE`.
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    airspeed_setpoint: equivalent airspeed, m/s.
+    eas_to_tas: ratio of true to equivalent airspeed.
     """
     update_altitude_reference(parameters, memory, dt)
     update_airspeed_filter(state.airspeed, parameters, memory, dt)
@@ -191,7 +192,7 @@ def _calc_throttle_control(
 
     Follows `TECSControl::_calcThrottleControlSteRate`, `_calcThrottleControlUpdate` and `_calcThrottleControlOutput`.
 
-    min_sink_rate: at idle throttle, m/s.
+    min_sink_rate: sink rate at idle throttle, m/s.
     """
     ste_rate_max, ste_rate_min = GRAVITY * parameters.max_climb_rate, -GRAVITY * min_sink_rate
     load_factor_correction = parameters.load_factor_correction * (1.0 / max(0.1, math.cos(state.roll)) - 1.0)

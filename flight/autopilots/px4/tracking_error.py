@@ -12,7 +12,7 @@ import numpy as np
 from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError
 from flight.autopilots.px4.lateral import roll_setpoint
-from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG
+from flight.autopilots.px4.law import PX4_MEMORY, ROLL_LAG_RATIO
 from flight.autopilots.px4.navigator import acceptance_radius_at, navigate
 from flight.autopilots.px4.parameters import Px4Parameters
 from flight.guidance.lateral_reference_laws import waypoint_column
@@ -185,7 +185,7 @@ def _fly_corner(
     memory.from_north, memory.min_distance_to_end = -_LEG_LENGTH_M, math.inf
     step_length = speed * _TIME_STEP_S
     estimated.north = -acceptance_radius_at(speed, parameters) - _RUN_IN_M
-    lag = ROLL_LAG * parameters.roll_time_constant
+    lag = ROLL_LAG_RATIO * parameters.roll_time_constant
     decay = math.exp(-_TIME_STEP_S / lag)
     course, lateral_acceleration, time, excursion, settled_distance, distance_along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
     while distance_along < 0.75 * _LEG_LENGTH_M and time < 120.0:

@@ -36,7 +36,7 @@ class Px4Sitl(ProgramAutopilot, Px4):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return an empty list: PX4 requires only the servo map, which ArduPlane's program reports if missing."""
+        """Return an empty list: the only file that PX4 requires, the servo map, is reported for ArduPlane's program."""
         return []
 
     @property

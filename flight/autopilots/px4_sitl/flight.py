@@ -10,7 +10,7 @@ from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import AutopilotProgram
 from flight.autopilots.program import ProgramAutopilot
 from flight.autopilots.px4.autopilot import Px4
-from flight.autopilots.px4_sitl.parameters import GivenParameters, given_parameters
+from flight.autopilots.px4_sitl.parameters import Px4FlightParameters, collect_px4_parameters
 from flight.autopilots.px4_sitl.physics import HilLockstep, SimulatorPort
 from flight.autopilots.px4_sitl.preflight import Px4Preflight, version_text
 from flight.autopilots.px4_sitl.process import STARTED, px4_launch
@@ -52,14 +52,14 @@ class Px4Flight(SitlFlight):
         setup = replace(setup, autopilot=autopilot)
         digest = check_binary(binary, autopilot.title)
         servos = load_servo_map(aircraft)
-        parameters_given = given_parameters(setup, aircraft, parameters)
+        flight_parameters = collect_px4_parameters(setup, aircraft, parameters)
         super().__init__(setup, aircraft, binary)
         self._mode_start: Iterator[None] = iter(())
         with contextlib.ExitStack() as stack, self._errors_name_program():
             port = stack.enter_context(contextlib.closing(SimulatorPort()))
             link = stack.enter_context(contextlib.closing(UdpLink()))
             self._link = link
-            launch = px4_launch(binary, parameters_given.given, port.port, link.theirs, link.port)
+            launch = px4_launch(binary, flight_parameters.values, port.port, link.program_port, link.port)
             process = stack.enter_context(AutopilotProcess(binary, launch))
             self._process, port.watch = process, process.watch
             lockstep = HilLockstep(port, servos, self.fdm, self._workspace, self._mission.home, self._poll_link)
@@ -68,14 +68,14 @@ class Px4Flight(SitlFlight):
             self._apply_gnss_error()
             port.connect(_CONNECT_TIMEOUT_S)
             lockstep.boot(self._rail, partial(_has_started, process), _STALL_TIME_S, _STARTUP_TIMEOUT_S)
-            self._hold_during(self._preflight.meet(parameters_given.given))
+            self._hold_during(self._preflight.identify(flight_parameters.values))
             version: Px4Version = (
                 "1.16"
-                if (link.news.version or _FIRST_WITHOUT_ANTICIPATION) < _FIRST_WITHOUT_ANTICIPATION
+                if (link.reported.version or _FIRST_WITHOUT_ANTICIPATION) < _FIRST_WITHOUT_ANTICIPATION
                 else NEWEST_PX4
             )
             flown_autopilot = replace(
-                autopilot.of_release(version), program=_program_of_messages(link, digest, parameters_given)
+                autopilot.of_release(version), program=_program_of_messages(link, digest, flight_parameters)
             )
             self.setup = replace(setup, autopilot=flown_autopilot)
             self._stack = stack.pop_all()
@@ -89,7 +89,7 @@ class Px4Flight(SitlFlight):
     def _is_ending(self) -> bool:
         """True once PX4 has reached a last waypoint at which it circles; otherwise as in the base class."""
         ends_in_circle = self._workspace.path["waypoint"]["is_mission_end"][self.setup.route.legs]
-        return self._link.news.reached >= self.last_item if ends_in_circle else super()._is_ending
+        return self._link.reported.reached >= self.last_item if ends_in_circle else super()._is_ending
 
     def keep_log(self, target: Path) -> bool:
         """Make PX4 close its log (.ulg), end it, and move the log to a file; return True if there was a log."""
@@ -101,14 +101,14 @@ class Px4Flight(SitlFlight):
 
     def _prepare_program(self) -> None:
         self._hold_during(self._preflight.prepare(self._mission))
-        self._push(last=_MODE_START_FRACTION)
-        # PX4 answers while it flies on.
-        self._mode_start = self._preflight.set_out()
-        self._push(first=_MODE_START_FRACTION)
+        self._push(end_fraction=_MODE_START_FRACTION)
+        # PX4 confirms the mode while the aircraft moves on.
+        self._mode_start = self._preflight.start_mission()
+        self._push(start_fraction=_MODE_START_FRACTION)
 
     def _poll_link(self) -> None:
         super()._poll_link()
-        self._preflight.accompany()
+        self._preflight.send_periodic_messages()
         next(self._mode_start, None)
 
 
@@ -116,14 +116,16 @@ def _has_started(process: AutopilotProcess) -> bool:
     return any(STARTED in line for line in process.lines())
 
 
-def _program_of_messages(link: AutopilotLink, digest: str, parameters: GivenParameters) -> AutopilotProgram:
+def _program_of_messages(link: AutopilotLink, digest: str, parameters: Px4FlightParameters) -> AutopilotProgram:
     """Return the program that flew, from the messages on its link."""
-    news = link.news
-    unknown = parameters.changed.keys() - news.parameters.keys()
+    reported = link.reported
+    unknown = parameters.changed.keys() - reported.parameters.keys()
     return AutopilotProgram(
-        version=version_text(news.version),
+        version=version_text(reported.version),
         sha256=digest,
-        parameters={name: news.parameters[name] for name in sorted(parameters.given) if name in news.parameters},
+        parameters={
+            name: reported.parameters[name] for name in sorted(parameters.values) if name in reported.parameters
+        },
         changed={name: value for name, value in sorted(parameters.changed.items()) if name not in unknown},
         unused=tuple(sorted({*parameters.unused, *unknown})),
     )

@@ -37,7 +37,7 @@ SIMULATION = {
     "SENS_MAG_MODE": 1.0,
     "EKF2_GPS_DELAY": 0.0,
     "SENS_GPS0_DELAY": 0.0,
-    # It is held in MANUAL on the rail, with planfly as its joystick; no lost link ends a flight.
+    # PX4 is held in MANUAL on the rail, with planfly as its joystick; no lost link ends a flight.
     "COM_RC_IN_MODE": 1.0,
     "COM_RC_OVERRIDE": 0.0,
     "NAV_RCL_ACT": 0.0,
@@ -48,10 +48,10 @@ SIMULATION = {
     "COM_FLTT_LOW_ACT": 0.0,
     "FD_FAIL_R": 0.0,
     "FD_FAIL_P": 0.0,
-    # It starts and ends in the air.
+    # The mission starts and ends in the air.
     "MIS_TKO_LAND_REQ": 0.0,
     "MIS_DIST_1WP": 100_000.0,
-    # Its log lasts from arming to disarming.
+    # The log lasts from arming to disarming.
     "SDLOG_MODE": 0.0,
     "SDLOG_PROFILE": 1.0,
     # The rudder coordinates turns, and does little more.
@@ -64,23 +64,26 @@ FLYING = ("FW_", "NPFG_", "NAV_ACC_RAD", "NAV_FW_", "NAV_LOITER_RAD", "NAV_MIN_"
 
 
 @dataclass(frozen=True, slots=True)
-class GivenParameters:
-    """Parameters by name.
+class Px4FlightParameters:
+    """Parameters of a flight of PX4's program, by name.
 
-    given: all parameters that PX4 gets in addition to its own defaults.
-    changed: parameters of the user among them, if the aircraft has another value or no value.
-    unused: the user's parameters that belong to other hardware.
+    values: all parameters that replace PX4's own defaults.
+    changed: values that the user's file states and that differ from the aircraft's, or that the aircraft lacks.
+    unused: names in the user's file that PX4 does not get, because they belong to other hardware.
     """
 
-    given: Mapping[str, float]
+    values: Mapping[str, float]
     changed: Mapping[str, float]
     unused: tuple[str, ...] = ()
 
 
-def given_parameters(setup: FlightSetup, aircraft: Aircraft, law_parameters: Px4Parameters) -> GivenParameters:
-    """Collect the parameters of a flight.
+def collect_px4_parameters(
+    setup: FlightSetup, aircraft: Aircraft, law_parameters: Px4Parameters
+) -> Px4FlightParameters:
+    """Collect the parameters of a flight of PX4's program from the simulation, the aircraft and the user's file.
 
-    The mission's speed is the cruise speed, unless the user states one.  Raises ParameterError if a file is invalid.
+    FW_AIRSPD_TRIM is the mission's airspeed, unless the user states a value.  Raises ParameterError if a file is
+    invalid.
     """
     file = setup.scenario.flight.params
     user_values = {} if file is None else {name: entry.value for name, entry in read_parameter_file(Path(file)).items()}
@@ -93,4 +96,4 @@ def given_parameters(setup: FlightSetup, aircraft: Aircraft, law_parameters: Px4
         if name.startswith(FLYING) and name not in SIMULATION and len(name) <= LONGEST_NAME
     }
     changed = {name: value for name, value in flight_values.items() if base.get(name) != value}
-    return GivenParameters(base | flight_values, changed, tuple(sorted(user_values.keys() - flight_values.keys())))
+    return Px4FlightParameters(base | flight_values, changed, tuple(sorted(user_values.keys() - flight_values.keys())))

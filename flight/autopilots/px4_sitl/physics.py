@@ -1,7 +1,7 @@
 """Implement PX4's simulator link in lockstep, with sensor messages, socket and exchange.
 
-PX4 connects to the simulator by TCP with MAVLink.  Each HIL_SENSOR sets its clock and triggers a step; once its outputs
-run, it answers each with one HIL_ACTUATOR_CONTROLS.  Follows PX4's
+PX4 connects to the simulator by TCP with MAVLink.  Each HIL_SENSOR sets PX4's clock and triggers a step of PX4, which
+answers each step with one HIL_ACTUATOR_CONTROLS once its outputs run.  Follows PX4's
 `src/modules/simulation/simulator_mavlink/SimulatorMavlink.cpp` and docs.px4.io, "Simulator MAVLink API".
 """
 
@@ -18,11 +18,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from flight.autopilots.sitl.exchange import (
     FRAME_HZ,
     LOOPBACK,
-    SILENCE,
+    SILENCE_TIMEOUT_S,
     BodyMotion,
     Lockstep,
     RailEnd,
-    place_on_sphere,
+    position_on_sphere,
     to_body,
 )
 from flight.autopilots.sitl.servos import ServoMap
@@ -92,8 +92,8 @@ class Sensors:
         self._field = earth_field(home.lat_deg, home.lon_deg)
         self._random = random.Random(1)
 
-    def measured(self, motion: BodyMotion) -> Any:
-        """Return HIL_SENSOR, with inertial sensors, magnetometer, barometer and Pitot tube."""
+    def sensor_message(self, motion: BodyMotion) -> Any:
+        """Return HIL_SENSOR with the readings of inertial sensors, magnetometer, barometer and Pitot tube."""
         dither = self._random.uniform
         field = to_body((motion.roll, motion.pitch, motion.yaw), self._field)
         pressure, temperature, density = atmosphere(self._home[2] - motion.down)
@@ -116,9 +116,9 @@ class Sensors:
             0,
         )
 
-    def fix(self, motion: BodyMotion) -> Any:
-        """Return HIL_GPS."""
-        lat, lon = place_on_sphere(motion.north, motion.east, self._home[0], self._home[1])
+    def gnss_message(self, motion: BodyMotion) -> Any:
+        """Return HIL_GPS with position and velocity."""
+        lat, lon = position_on_sphere(motion.north, motion.east, self._home[0], self._home[1])
         north, east, down = motion.velocity_north, motion.velocity_east, motion.velocity_down
         return mavlink.MAVLink_hil_gps_message(
             round(motion.time * 1e6),
@@ -137,8 +137,8 @@ class Sensors:
         )
 
 
-def between(before: BodyMotion, after: BodyMotion) -> BodyMotion:
-    """Return the motion halfway between two motions, whose courses must differ by less than half a turn."""
+def halfway_motion(before: BodyMotion, after: BodyMotion) -> BodyMotion:
+    """Return the mean of two motions; the yaw is halfway along the shorter turn."""
     values = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
     middle_motion = BodyMotion(*values)
     return middle_motion._replace(yaw=before.yaw + 0.5 * math.remainder(after.yaw - before.yaw, 2.0 * math.pi))
@@ -156,7 +156,7 @@ _CHECK_INTERVAL_S = 0.25
 class SimulatorPort:
     """Socket to which PX4 connects.
 
-    port: its number.
+    port: number of the port.
     watch: function that is called while nothing arrives; it raises FlightError if the program has ended.
     """
 
@@ -200,12 +200,12 @@ class SimulatorPort:
         self._stream.setblocking(True)
         self._stream.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def packed(self, *messages: Any) -> bytes:
-        """Return messages packed together for sending."""
+    def pack(self, *messages: Any) -> bytes:
+        """Return the bytes of messages, for `send`."""
         return b"".join(message.pack(self._mav) for message in messages)
 
     def send(self, data: bytes) -> None:
-        """Send packed messages."""
+        """Send packed messages to PX4.  Raises ValueError before PX4 has connected."""
         if self._stream is None:
             raise ValueError("PX4 has not connected")
         try:
@@ -214,35 +214,35 @@ class SimulatorPort:
             # The program is gone: the next wait finds out why.
             return
 
-    def answer(self, patience: float) -> tuple[float, ...] | None:
-        """Return HIL_ACTUATOR_CONTROLS.controls (16,), or None if it does not arrive within `patience` s by the clock.
+    def receive_answer(self, timeout: float) -> tuple[float, ...] | None:
+        """Return HIL_ACTUATOR_CONTROLS.controls (16,), or None if it does not arrive within ``timeout`` s by the clock.
 
         Raises FlightError if the program ends.
         """
-        if not self._answers and not (self._receive_data(patience) and self._answers):
+        if not self._answers and not (self._receive_data(timeout) and self._answers):
             start = self._clock()
             while not self._answers:
-                if not self._receive_data(patience):
+                if not self._receive_data(timeout):
                     self.watch()
-                    if patience <= _CHECK_INTERVAL_S or self._clock() - start > patience:
+                    if timeout <= _CHECK_INTERVAL_S or self._clock() - start > timeout:
                         return None
         return self._answers.pop(0)
 
-    def awaited_answer(self) -> tuple[float, ...]:
-        """Wait for the answer of PX4 with running outputs, which answers every step, and return it.
+    def require_answer(self) -> tuple[float, ...]:
+        """Return PX4's answer to the last step, once its outputs run.
 
-        Raises FlightError if there is no answer.
+        Raises FlightError if no answer arrives within `SILENCE_TIMEOUT_S`.
         """
-        answer = self.answer(SILENCE)
+        answer = self.receive_answer(SILENCE_TIMEOUT_S)
         if answer is None:
-            raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="simulator")
+            raise FlightError(f"sent no outputs for {SILENCE_TIMEOUT_S:.0f} s; the flight is ended", field="simulator")
         return answer
 
-    def _receive_data(self, patience: float) -> bool:
-        """Read data for up to `patience` s, but at most `_CHECK_INTERVAL_S`, and return True if any arrived."""
+    def _receive_data(self, timeout: float) -> bool:
+        """Read data for up to ``timeout`` s, but at most `_CHECK_INTERVAL_S`, and return True if any arrived."""
         if self._stream is None:
             raise ValueError("PX4 has not connected")
-        wait = min(patience, _CHECK_INTERVAL_S)
+        wait = min(timeout, _CHECK_INTERVAL_S)
         if wait != self._wait:
             # The kernel's own timeout: one system call per answer.
             self._wait = wait
@@ -278,17 +278,18 @@ AILERON = 0
 ELEVATOR = 1
 RUDDER = 2
 THROTTLE = 3
-# Until its estimator runs PX4 answers about every fifth step; after this many answers in a row it answers each.
+# Until its estimator runs, PX4 answers about every fifth step; after this many answers in a row it answers every step.
 _RUNNING_ANSWER_COUNT = 50
-# Before that, a step without an answer in this time is followed by the next step, s by the clock.
+# Before that, the next step follows if no answer arrives within this time, s by the clock.
 _EARLY_ANSWER_TIMEOUT_S = 0.01
 
 
 class HilLockstep(Lockstep):
     """Exchange over a `SimulatorPort`, with two steps of PX4, which samples its sensors at 250 Hz, in each frame.
 
-    servos: outputs of the controls; the throw of each is PX4's -1..1 (throttle 0..1).  The other parameters are those
-    of `Lockstep`.
+    port: socket to which PX4 connects.
+    servos: servos of the controls; PX4's outputs of -1..1 (throttle 0..1) are fractions of their throw.
+    fdm, workspace, home, poll: see `Lockstep`.
     """
 
     def __init__(
@@ -319,55 +320,57 @@ class HilLockstep(Lockstep):
         """Return the answer to the last step; zeros before the first answer."""
         if self._awaits_answer:
             answer = (
-                self._port.awaited_answer() if self._answers_every_step else self._port.answer(_EARLY_ANSWER_TIMEOUT_S)
+                self._port.require_answer()
+                if self._answers_every_step
+                else self._port.receive_answer(_EARLY_ANSWER_TIMEOUT_S)
             )
             self._answer_count = 0 if answer is None else self._answer_count + 1
             self._last_answer, self._awaits_answer = answer or self._last_answer, False
         return self._last_answer
 
     def _send(self, data: bytes) -> None:
-        """Trigger a step of PX4."""
+        """Send packed sensor messages, which trigger a step of PX4."""
         self._port.send(data)
         self._awaits_answer = True
 
-    def boot(self, rail: RailEnd, has_started: Callable[[], bool], patience: float, startup_timeout: float) -> None:
-        """Start PX4 with its clock at rest, and trigger a step only when PX4 waits for one.
+    def boot(self, rail: RailEnd, has_started: Callable[[], bool], stall_time: float, startup_timeout: float) -> None:
+        """Wait for PX4's start-up script, and trigger a step only when PX4 waits for one.
 
-        has_started: function that returns True once its start-up script has ended.
-        patience: time without an answer before a step, s by the clock.
-        startup_timeout: timeout of the script, s by the clock.
+        has_started: function that returns True once the script has ended.
+        stall_time: time without an answer after which PX4 waits for a step, s by the clock.
+        startup_timeout: s by the clock.
 
-        Raises FlightError if the script does not end within that time.
+        Raises FlightError if the script does not end within ``startup_timeout``.
         """
         clock = RunningClock()
         start = clock()
         while not has_started():
             if clock() - start > startup_timeout:
                 raise FlightError(f"did not start up within {startup_timeout:.0f} s", field="start-up")
-            if self._port.answer(patience) is None:
+            if self._port.receive_answer(stall_time) is None:
                 self.hold(rail)
 
     def _receive_commands(self) -> Commands:
         outputs, servos = self._flown_outputs, self._servos
         return Commands(
-            servos.elevator.at_share(outputs[ELEVATOR]),
-            servos.aileron.at_share(outputs[AILERON]),
-            servos.rudder.at_share(outputs[RUDDER]),
-            servos.throttle.at_share(2.0 * outputs[THROTTLE] - 1.0),
+            servos.elevator.value_at_fraction(outputs[ELEVATOR]),
+            servos.aileron.value_at_fraction(outputs[AILERON]),
+            servos.rudder.value_at_fraction(outputs[RUDDER]),
+            servos.throttle.value_at_fraction(2.0 * outputs[THROTTLE] - 1.0),
         )
 
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
         current = BodyMotion(*motion)
         previous = self._last_motion or current._replace(time=current.time - 1.0 / FRAME_HZ)
         self._last_motion = current
-        data = self._port.packed(self._sensors.measured(between(previous, current)))
+        data = self._port.pack(self._sensors.sensor_message(halfway_motion(previous, current)))
         # PX4's second step of the previous frame, which it has computed while JSBSim made this frame.
         self._next_outputs()
         self._send(data)
         # Packed while PX4 computes that step.
-        messages = [self._sensors.measured(current)]
+        messages = [self._sensors.sensor_message(current)]
         if self._frame % _FIX_FRAMES == 0:
-            messages.append(self._sensors.fix(current))
-        data = self._port.packed(*messages)
+            messages.append(self._sensors.gnss_message(current))
+        data = self._port.pack(*messages)
         self._flown_outputs = self._next_outputs()
         self._send(data)

@@ -1,4 +1,4 @@
-"""Prepare PX4 before it flies, by parameters, mission, home, arming, and mission mode on the rail."""
+"""Prepare PX4 before a flight: read parameters, upload the mission, set home, arm, and start mission mode."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -31,23 +31,24 @@ _VERSION_TYPES = {0: " (development)", 64: " (alpha)", 128: " (beta)", 192: " (r
 
 
 class Px4Preflight(Conversation):
-    """Conversation with one PX4."""
+    """Conversation with one running PX4."""
 
-    def meet(self, parameters: Iterable[str]) -> Talk:
+    def identify(self, parameters: Iterable[str]) -> Talk:
         """Identify the autopilot, and read the named parameters that it has.
 
         Raises FlightError if the autopilot is not PX4.
         """
         yield from self._identify("PX4", _MESSAGE_INTERVALS_US, parameters)
-        if self._news.autopilot != mavlink.MAV_AUTOPILOT_PX4:
-            autopilot, allowed = self._news.autopilot, f"expected {mavlink.MAV_AUTOPILOT_PX4}, PX4"
-            message = f"is no PX4: its heartbeat says autopilot {autopilot}; {allowed}"
+        if self._reported.autopilot != mavlink.MAV_AUTOPILOT_PX4:
+            autopilot, allowed = self._reported.autopilot, f"expected {mavlink.MAV_AUTOPILOT_PX4}, PX4"
+            message = f"is not PX4: its heartbeat states autopilot {autopilot}; {allowed}"
             raise FlightError(message, field="autopilot", value=autopilot, allowed=allowed)
 
     def prepare(self, mission: UploadedMission) -> Talk:
         """Wait until PX4 has a position, upload the mission, and arm PX4 in MANUAL.
 
-        In any other mode its TECS would wind up on the rail.  Raises FlightError if PX4 finds no position, or refuses.
+        In any other mode PX4's TECS would integrate errors on the rail.  Raises FlightError if PX4 has no position
+        estimate, or refuses the mission, home, or arming.
         """
         estimator = mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS
         yield from self._wait_for_position(estimator, _MESSAGE_INTERVALS_US[estimator])
@@ -62,14 +63,14 @@ class Px4Preflight(Conversation):
             "arming",
         )
 
-    def set_out(self) -> Talk:
-        """Start mission mode. Raises FlightError if PX4 refuses."""
+    def start_mission(self) -> Talk:
+        """Switch PX4 to mission mode.  Raises FlightError if PX4 refuses."""
         yield from self._send_until_accepted(Command.DO_SET_MODE, lambda: self._set_mode(_AUTO, _MISSION), "MISSION")
-        mission_mode = Awaited("MISSION", REPLY_TIMEOUT_S, "is not in its mission mode, armed")
-        yield from self._wait_until(lambda: self._news.mode == MISSION_MODE and self._news.armed, mission_mode)
+        mission_mode = Awaited("MISSION", REPLY_TIMEOUT_S, "did not change to mission mode, armed,")
+        yield from self._wait_until(lambda: self._reported.mode == MISSION_MODE and self._reported.armed, mission_mode)
 
-    def accompany(self) -> None:
-        """Send a heartbeat, which PX4 answers, and neutral joystick inputs with closed throttle."""
+    def send_periodic_messages(self) -> None:
+        """Send a heartbeat, and neutral joystick inputs with closed throttle, as PX4 expects from a ground station."""
         self._send_heartbeat()
         self._link.send(mavlink.MAVLink_manual_control_message(SYSTEM, 0, 0, 0, 0, 0))
 
@@ -77,8 +78,8 @@ class Px4Preflight(Conversation):
         """Disarm PX4, which closes its log."""
         self._send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, _FORCE_DISARMING)
 
-    def _set_mode(self, main: int, sub: int) -> None:
-        self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main, sub)
+    def _set_mode(self, main_mode: int, sub_mode: int) -> None:
+        self._send_command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, main_mode, sub_mode)
 
 
 def counted_from_0(items: Iterable[MissionItem]) -> list[MissionItem]:

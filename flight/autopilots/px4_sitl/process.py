@@ -36,13 +36,14 @@ def px4_launch(
 
     parameters: values by name.
     simulator_port: port on this machine of the physics (TCP).
-    own_port, link_port: ports on which PX4 receives MAVLink, and to which it sends MAVLink (UDP).
+    own_port: port on which PX4 receives MAVLink (UDP).
+    link_port: port to which PX4 sends MAVLink (UDP).
 
     Raises FlightError if the program has no start-up files.
     """
     source = startup_files(binary)
     if source is None:
-        allowed = f"expected its start-up files next to it, in the folder {STARTUP} of its build"
+        allowed = f"expected PX4's start-up files next to the program, in the folder {STARTUP} of its build"
         raise FlightError(f"{binary}: {allowed}", file=binary, field=STARTUP, allowed=allowed)
 
     def prepare(folder: Path) -> Launch:
@@ -59,8 +60,8 @@ def px4_launch(
             f"simulator_mavlink start -c {simulator_port}",
         )
         _write(scripts / "px4-rc.mavlink", f"mavlink start -x -u {own_port} -o {link_port} -t {LOOPBACK} -r 4000000 -f")
-        # Each instance on a machine needs a number of its own; a port number is unique.
         environment = {"PX4_SYS_AUTOSTART": str(_AIRFRAME_ID), "PX4_SIM_MODEL": "planfly"}
+        # Each instance of PX4 on a machine needs its own number: the port number is unique.
         leaves = tuple(_TEMPORARY_FOLDER / f"{name}{simulator_port}" for name in _TEMPORARY_PREFIXES)
         return Launch(("-d", "-i", str(simulator_port), "-w", str(folder)), environment, "log/**/*.ulg", leaves)
 
@@ -68,5 +69,6 @@ def px4_launch(
 
 
 def _write(file: Path, *lines: str) -> None:
+    """Write a shell script of the given lines."""
     file.parent.mkdir(exist_ok=True)
     file.write_text("\n".join(("#!/bin/sh", *lines, "")), encoding="utf-8")

@@ -1,7 +1,7 @@
-"""Talk to a SITL autopilot before it flies, while the aircraft is held on its rail.
+"""Exchange MAVLink messages with a SITL autopilot before the flight, while the aircraft is held on its rail.
 
-A conversation is a generator.  Each time it is resumed, the autopilot's time has advanced, and the link has received
-the autopilot's new messages.
+Each step of the conversation is a generator.  When it is resumed, the autopilot's time has advanced, and the link has
+processed the messages that arrived in between.
 """
 
 import time
@@ -15,6 +15,7 @@ from flight.live.mission_server import MissionType, to_message
 from flight.mission.items import Command, Frame, Home, MissionItem, command_name
 from world.errors import FlightError
 
+# Part of a conversation; it is resumed after each interval of the exchange, until it returns.
 Talk = Generator[None, None, None]
 
 # MAVLink system id of the autopilot.
@@ -30,7 +31,7 @@ REPLY_TIMEOUT_S = 5.0
 # Timeout for the upload of a mission, s of the autopilot's time.
 UPLOAD_TIMEOUT_S = 30.0
 # Interval between repeated requests, s of the autopilot's time.
-AGAIN = 1.0
+RETRY_INTERVAL_S = 1.0
 # Minimum wait by the clock, s: messages take real time, however fast the autopilot's time runs.
 _MIN_REAL_TIME_S = 0.5
 # Number of parameters in one request: ArduPilot queues no more than some twenty requests.
@@ -46,14 +47,14 @@ _MISSION_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_M
 
 
 class _Stopwatch:
-    """Time since a given moment, both in the autopilot's time and by the clock."""
+    """Time since its construction, both in the autopilot's time and by the clock."""
 
     def __init__(self, now: Callable[[], float], clock: Callable[[], float]) -> None:
         self._now, self._clock = now, clock
         self._moments = now(), clock()
 
     def longer_than(self, seconds: float) -> bool:
-        """Return True if more than this time of the autopilot has passed, and enough time by the clock."""
+        """Return True if more than ``seconds`` of the autopilot's time and the minimum real time have passed."""
         start, clock_start = self._moments
         return self._now() - start > seconds and self._clock() - clock_start > min(seconds, _MIN_REAL_TIME_S)
 
@@ -61,14 +62,14 @@ class _Stopwatch:
 class Awaited(NamedTuple):
     """A state that an autopilot has to reach.
 
-    field: name of the state.
-    seconds: timeout, s.
-    failed: message after the timeout.
+    field: name of the state in the fields of the error.
+    timeout: s of the autopilot's time.
+    failure_text: beginning of the error message after the timeout.
     """
 
     field: str
-    seconds: float
-    failed: str
+    timeout: float
+    failure_text: str
 
 
 class Conversation:
@@ -83,24 +84,25 @@ class Conversation:
         self, link: AutopilotLink, now: Callable[[], float], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._link, self._now, self._clock = link, now, clock
-        self._news = link.news
+        self._reported = link.reported
 
     def _identify(self, kind: str, message_intervals: dict[int, int], parameters: Iterable[str]) -> Talk:
-        """Identify the autopilot, request messages, and read those of the given parameters that it has.
+        """Wait for the autopilot's heartbeat, request messages, and read the given parameters that the autopilot has.
 
         kind: name of the expected autopilot.
-        message_intervals: requested intervals, microseconds, by the number of the message.
+        message_intervals: requested intervals by the number of the message, microseconds.
+        parameters: names of parameters.
 
-        Raises FlightError if it is not a fixed wing.
+        Raises FlightError if no heartbeat arrives, or if its vehicle is not a fixed wing.
         """
-        news = self._news
-        awaited = Awaited("heartbeat", HEARTBEAT_TIMEOUT_S, "said nothing over MAVLink")
-        yield from self._wait_until(lambda: news.vehicle is not None, awaited, self._send_heartbeat)
-        if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
+        reported = self._reported
+        awaited = Awaited("heartbeat", HEARTBEAT_TIMEOUT_S, "sent no heartbeat over MAVLink")
+        yield from self._wait_until(lambda: reported.vehicle is not None, awaited, self._send_heartbeat)
+        if reported.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
-                f"is no {kind}: its heartbeat says vehicle type {news.vehicle}; expected 1, a fixed wing",
+                f"is not {kind}: its heartbeat states vehicle type {reported.vehicle}; expected 1, a fixed wing",
                 field="vehicle type",
-                value=news.vehicle,
+                value=reported.vehicle,
                 allowed="expected 1, a fixed wing",
             )
         for message, interval in message_intervals.items():
@@ -112,15 +114,15 @@ class Conversation:
             yield from self._read_parameters(names[first : first + _PARAMETERS_PER_REQUEST])
 
     def _wait_for_position(self, message: int, interval: int, excluding_flags: int = 0) -> Talk:
-        """Wait until its estimator has a position.
+        """Wait until the autopilot's estimator has a position.  Raises FlightError after a timeout.
 
-        message: number of the message that reports it, every ``interval`` us.
+        message: number of the message that reports the estimator's state, requested every ``interval`` us.
         excluding_flags: flags that exclude a position.
         """
-        news = self._news
+        reported = self._reported
         yield from self._wait_until(
-            lambda: news.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not news.ekf & excluding_flags,
-            Awaited("EKF", POSITION_TIMEOUT_S, "did not find its position (EKF)"),
+            lambda: reported.ekf & _REQUIRED_EKF_FLAGS == _REQUIRED_EKF_FLAGS and not reported.ekf & excluding_flags,
+            Awaited("EKF", POSITION_TIMEOUT_S, "had no position estimate (EKF)"),
             lambda: self._send_command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval),
         )
 
@@ -130,10 +132,10 @@ class Conversation:
         """Wait until a condition holds, repeating a request each second. Raises FlightError after a timeout."""
         stopwatch, last_request = self._start_stopwatch(), None
         while not is_done():
-            if stopwatch.longer_than(awaited.seconds):
-                message = f"{awaited.failed} within {awaited.seconds:.0f} s{self._last_status_text()}"
+            if stopwatch.longer_than(awaited.timeout):
+                message = f"{awaited.failure_text} within {awaited.timeout:.0f} s{self._last_status_text()}"
                 raise FlightError(message, field=awaited.field)
-            if request is not None and (last_request is None or last_request.longer_than(AGAIN)):
+            if request is not None and (last_request is None or last_request.longer_than(RETRY_INTERVAL_S)):
                 last_request = self._start_stopwatch()
                 request()
             yield
@@ -142,7 +144,7 @@ class Conversation:
         return _Stopwatch(self._now, self._clock)
 
     def _last_status_text(self) -> str:
-        return f"; it last said: {self._news.texts[-1]}" if self._news.texts else ""
+        return f"; its last message: {self._reported.texts[-1]}" if self._reported.texts else ""
 
     def _send_heartbeat(self) -> None:
         self._link.send(
@@ -156,7 +158,7 @@ class Conversation:
         self._link.send(mavlink.MAVLink_command_long_message(SYSTEM, COMPONENT, int(command), 0, *numbers))
 
     def _set_home(self, home: Home) -> None:
-        place = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
+        item = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
         self._link.send(
             mavlink.MAVLink_command_int_message(
                 SYSTEM,
@@ -169,40 +171,50 @@ class Conversation:
                 0.0,
                 0.0,
                 0.0,
-                place.x,
-                place.y,
+                item.x,
+                item.y,
                 home.alt,
             )
         )
 
     def _send_until_accepted(self, command: int, request: Callable[[], None], name: str) -> Talk:
-        acknowledged = self._news.acknowledged
+        """Call ``request`` each second until the autopilot accepts the command.  Raises FlightError after a timeout.
+
+        request: function that sends the command.
+        name: name of the command's effect, for messages.
+        """
+        acknowledged = self._reported.acknowledged
         acknowledged.pop(int(command), None)
         yield from self._wait_until(
             lambda: acknowledged.get(int(command)) == mavlink.MAV_RESULT_ACCEPTED,
-            Awaited(name, REPLY_TIMEOUT_S, f"refused {name} ({command_name(int(command))})"),
+            Awaited(name, REPLY_TIMEOUT_S, f"did not accept {name} ({command_name(int(command))})"),
             request,
         )
 
     def _read_parameters(self, names: list[str]) -> Talk:
-        """Read parameters; the autopilot does not answer for parameters that it does not have."""
+        """Request parameters, and wait up to a second: the autopilot does not answer for parameters it lacks."""
         for name in names:
             self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
-        stopwatch, parameters = self._start_stopwatch(), self._news.parameters
-        while not (parameters.keys() >= set(names) or stopwatch.longer_than(AGAIN)):
+        stopwatch, parameters = self._start_stopwatch(), self._reported.parameters
+        while not (parameters.keys() >= set(names) or stopwatch.longer_than(RETRY_INTERVAL_S)):
             yield
 
     def _upload(self, items: list[MissionItem], kind: MissionType) -> Talk:
-        """Upload a list (MAVLink mission protocol), and retry while the autopilot has no space for it yet."""
+        """Upload a mission or rally points (MAVLink mission protocol).
+
+        Retries for up to `UPLOAD_TIMEOUT_S` while the autopilot reports that it has no space.  Raises FlightError if
+        the
+        autopilot refuses the items or does not answer.
+        """
         stopwatch = self._start_stopwatch()
         list_name = "mission" if kind == MissionType.MISSION else "rally points"
         while True:
             yield from self._send_items(items, kind)
-            result = self._news.mission_result
+            result = self._reported.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
             if result != mavlink.MAV_MISSION_NO_SPACE or stopwatch.longer_than(UPLOAD_TIMEOUT_S):
-                requested_item = self._news.requested
+                requested_item = self._reported.requested
                 item_text = (
                     ""
                     if requested_item is None or requested_item >= len(items)
@@ -211,22 +223,25 @@ class Conversation:
                 result_name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
                 message = f"refused the {list_name}{item_text}: {result_name}{self._last_status_text()}"
                 raise FlightError(message, field=list_name, value=result_name)
-            yield from self._wait(AGAIN)
+            yield from self._wait(RETRY_INTERVAL_S)
 
     def _send_items(self, items: list[MissionItem], kind: MissionType) -> Talk:
         """Send the number of items and each requested item, until an acknowledgment or a timeout."""
-        news, link = self._news, self._link
-        news.requested = news.mission_result = None
+        reported, link = self._reported, self._link
+        reported.requested = reported.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
         last_item, stopwatch = None, self._start_stopwatch()
-        while news.mission_result is None and not stopwatch.longer_than(REPLY_TIMEOUT_S):
-            if news.requested is not None and (news.requested != last_item or stopwatch.longer_than(AGAIN)):
-                last_item, stopwatch = news.requested, self._start_stopwatch()
+        while reported.mission_result is None and not stopwatch.longer_than(REPLY_TIMEOUT_S):
+            if reported.requested is not None and (
+                reported.requested != last_item or stopwatch.longer_than(RETRY_INTERVAL_S)
+            ):
+                last_item, stopwatch = reported.requested, self._start_stopwatch()
                 if last_item < len(items):
                     link.send(to_message(items[last_item], target_component=COMPONENT, seq=last_item))
             yield
 
     def _wait(self, seconds: float) -> Talk:
+        """Wait for some time of the autopilot, s."""
         start = self._now()
         while self._now() - start < seconds:
             yield

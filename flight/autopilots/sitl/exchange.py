@@ -1,4 +1,4 @@
-"""Exchange data with an autopilot in lockstep: its outputs move the controls, and its sensors get the motion."""
+"""Exchange data with an autopilot in lockstep: it sends outputs to the controls, and receives the aircraft's motion."""
 
 import math
 import struct
@@ -16,20 +16,20 @@ from world.kernels import Record
 
 LOOPBACK = "127.0.0.1"
 # Timeout for new data from an autopilot, s by the clock.
-SILENCE = 10.0
+SILENCE_TIMEOUT_S = 10.0
 
 # Metres per degree of latitude in ArduPilot, which uses a spherical Earth.
-METRES_A_DEGREE = 111318.845
-_METRES_PER_RADIAN = math.degrees(METRES_A_DEGREE)
+METRES_PER_DEGREE = 111318.845
+_METRES_PER_RADIAN = math.degrees(METRES_PER_DEGREE)
 
 
 class BodyMotion(NamedTuple):
-    """Motion of the aircraft, as it is given to the autopilot's sensors.
+    """Motion of the aircraft, from which the autopilot's simulated sensors are computed.
 
-    time: s.
+    time: time since the start of the exchange, s.
     roll_rate..yaw_rate: rad/s about the body's axes.
     force_x..force_z: specific force along the body's axes, m/s^2; at rest 0, 0, -9.81.
-    north, east, down: m from the place that ArduPilot calls home, on its sphere.
+    north, east, down: position relative to the home of the exchange, m, by ArduPilot's spherical Earth.
     roll, pitch, yaw: rad, from true north.
     velocity_*: m/s over the ground.
     airspeed: m/s, true.
@@ -55,7 +55,7 @@ class BodyMotion(NamedTuple):
 
 
 def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """Return north and east (m) of a position from another (rad), with ArduPilot's conversion.
+    """Return north and east (m) of a position relative to another position (both rad), on ArduPilot's sphere.
 
     >>> north, east = offset_on_sphere(math.radians(36.01), -1.5, math.radians(36.0), -1.5)
     >>> round(north, 3), east
@@ -65,11 +65,11 @@ def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -
     return (lat - from_lat) * _METRES_PER_RADIAN, east * _METRES_PER_RADIAN
 
 
-def place_on_sphere(north: float, east: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """Return the position (rad) for which `offset_on_sphere` gives this offset (m) from another (rad).
+def position_on_sphere(north: float, east: float, from_lat: float, from_lon: float) -> tuple[float, float]:
+    """Return latitude and longitude (rad) at an offset (m) from a position (rad): the inverse of `offset_on_sphere`.
 
-    >>> place = place_on_sphere(*offset_on_sphere(0.63, -1.49, 0.62, -1.5), 0.62, -1.5)
-    >>> [round(angle, 12) for angle in place]
+    >>> position = position_on_sphere(*offset_on_sphere(0.63, -1.49, 0.62, -1.5), 0.62, -1.5)
+    >>> [round(angle, 12) for angle in position]
     [0.63, -1.49]
     """
     lat = from_lat + north / _METRES_PER_RADIAN
@@ -77,15 +77,15 @@ def place_on_sphere(north: float, east: float, from_lat: float, from_lon: float)
 
 
 # ----------------------------------------------------------------------
-# The rail on which an autopilot's flight starts: in the air, or the rail of a launch.
+# The rail on which an autopilot's flight starts: a rail in the air, or the rail of a launch.
 #
 # The autopilot's estimator has to settle with the aircraft at rest.  The aircraft therefore stands on a level rail, at
-# the attitude of its trimmed flight, until the autopilot is ready; then it is pushed along the rail to the speed of
-# that flight, and released.  For a take-off the rail is the catapult or the throwing hand, with
-# its incline and acceleration; on a runway the aircraft stands where it begins.
+# the attitude of trimmed flight, until the autopilot is ready.  Then the aircraft is accelerated along the rail to the
+# speed of trimmed flight, and released.  For a take-off the rail is the catapult or the throwing hand, with its incline
+# and acceleration; on a runway the aircraft stands at the start of its take-off run.
 
 # Acceleration along the rail, m/s^2.
-PUSH = 5.0
+PUSH_ACCELERATION_MPS2 = 5.0
 # Mean radius of the Earth.
 _EARTH_RADIUS_M = 6_371_000.0
 
@@ -101,7 +101,7 @@ class RailEnd:
     ground_speed: m/s.
     wind_north, wind_east: m/s.
     incline: slope of the rail above level, rad.
-    push: acceleration along the rail, m/s^2.
+    push_acceleration: acceleration along the rail, m/s^2.
     """
 
     lat: float
@@ -115,18 +115,19 @@ class RailEnd:
     wind_north: float
     wind_east: float
     incline: float = 0.0
-    push: float = PUSH
+    push_acceleration: float = PUSH_ACCELERATION_MPS2
 
     @property
     def push_time(self) -> float:
         """Duration of the push, s."""
-        return self.ground_speed / (math.cos(self.incline) * self.push)
+        return self.ground_speed / (math.cos(self.incline) * self.push_acceleration)
 
 
 def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
-    """Return the rail that leads to a trimmed flight.
+    """Return the level rail that ends in trimmed flight at a state.
 
-    state: a record of `flight.dynamics.state.STATE`.  wind: north, east, down, m/s.
+    state: a record of `flight.dynamics.state.STATE`.
+    wind: mean wind north, east and down, m/s.
     """
     return RailEnd(
         lat=float(state.latitude),
@@ -145,16 +146,17 @@ def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
 def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tuple[float, float, float]) -> BodyMotion:
     """Return the motion ``push_duration`` s after the start of the push, at ``time`` s of the exchange.
 
-    The aircraft is at rest if ``push_duration`` is 0 or less.
+    The aircraft is at rest at the start of the rail if ``push_duration`` is 0 or less, and remains at the end of the
+    rail after the push.
 
     origin: latitude and longitude (rad) and altitude (m) from which positions are measured.
     """
     push_duration = min(max(0.0, push_duration), end.push_time)
     cos_incline, sin_incline = math.cos(end.incline), math.sin(end.incline)
     direction_north, direction_east = cos_incline * math.cos(end.course), cos_incline * math.sin(end.course)
-    acceleration = end.push if 0.0 < push_duration < end.push_time else 0.0
-    speed = end.push * push_duration
-    remaining_distance = 0.5 * end.push * (end.push_time**2 - push_duration**2)
+    acceleration = end.push_acceleration if 0.0 < push_duration < end.push_time else 0.0
+    speed = end.push_acceleration * push_duration
+    remaining_distance = 0.5 * end.push_acceleration * (end.push_time**2 - push_duration**2)
     lat = end.lat - remaining_distance * direction_north / _EARTH_RADIUS_M
     lon = end.lon - remaining_distance * direction_east / (_EARTH_RADIUS_M * math.cos(end.lat))
     north, east = offset_on_sphere(lat, lon, origin[0], origin[1])
@@ -206,8 +208,8 @@ def to_body(attitude: tuple[float, float, float], vector: tuple[float, float, fl
 
 # Frame rate of JSBSim and of the autopilot's simulated sensors, Hz: one frame is one step.
 FRAME_HZ = 120.0
-# Frames between two polls of the link: a tenth of a second.
-LOOK_FRAMES = 12
+# Frames between two polls of the MAVLink connection: a tenth of a second.
+POLL_INTERVAL_FRAMES = 12
 _MOTION_FIELDS = (
     *("latitude", "longitude", "amsl", "velocity_north", "velocity_east", "velocity_down", "roll", "pitch", "yaw"),
     *("roll_rate", "pitch_rate", "yaw_rate", "airspeed"),
@@ -218,10 +220,10 @@ _NO_ERROR = (0.0,) * 6
 class Lockstep(ABC):
     """One aircraft's exchange with an autopilot, frame by frame.
 
-    home: origin of positions.
-    poll: function that is called every `LOOK_FRAMES` frames.
-    time: time of the exchange, s.
-    error: error of its GNSS receiver: north, east, up of the position, m, then of the velocity, m/s.
+    home: origin of the positions that the autopilot receives.
+    poll: function that reads the MAVLink messages; called every `POLL_INTERVAL_FRAMES` frames.
+    time: time since the start of the exchange, s.
+    error: GNSS error (6,): north, east, up of the position, m, and north, east, up of the velocity, m/s.
     """
 
     def __init__(self, fdm: Fdm, workspace: Workspace, home: Home, poll: Callable[[], None]) -> None:
@@ -239,7 +241,7 @@ class Lockstep(ABC):
 
     @property
     def time(self) -> float:
-        """Time of the exchange, s."""
+        """Time since the start of the exchange, s."""
         return self._frame / FRAME_HZ
 
     @abstractmethod
@@ -251,7 +253,7 @@ class Lockstep(ABC):
 
     @abstractmethod
     def _send_motion(self, motion: tuple[float, ...], battery: tuple[float, float] | None) -> None:
-        """Send the motion of the aircraft after that frame.
+        """Send the motion of the aircraft after the present frame.
 
         motion: numbers of a `BodyMotion`.
         battery: volts and amperes; None for an aircraft without a battery.
@@ -265,7 +267,7 @@ class Lockstep(ABC):
         return self._volts, current() * factor
 
     def hold(self, rail: RailEnd, push_duration: float = 0.0) -> None:
-        """Run one frame on the rail, ``push_duration`` s after the push began."""
+        """Run one frame with the aircraft on the rail, ``push_duration`` s after the start of the push."""
         self._workspace.commands[:] = self._receive_commands()
         motion = motion_on_rail(rail, self._next_time(), push_duration, self._home)
         north, east, up, velocity_north, velocity_east, velocity_up = self.error
@@ -310,10 +312,10 @@ class Lockstep(ABC):
     def make_loop(self, tick: Callable[[], int], steps: int, *, gusts: bool, ground: bool) -> Callable[[int], int]:
         """Return a function that flies up to a number of ticks and returns the last status.
 
-        It is used like the loop in `flight.simulation.simulate`.
+        `flight.simulation.simulate` uses it like the compiled loop of a control law.
 
         tick: `flight.autopilots.sitl.flight.autopilot_tick` on the workspace.
-        steps: frames of a tick.
+        steps: number of frames in a tick.
         gusts, ground: True to set the tick's gusts and ground in JSBSim.
         """
         workspace, fdm, receive_commands, step = self._workspace, self._fdm, self._receive_commands, self.step
@@ -348,12 +350,12 @@ class Lockstep(ABC):
         return fly
 
     def serve(self) -> None:
-        """Answer one more frame, with the controls that the autopilot commands."""
+        """Run one more frame: apply the autopilot's commands, and send it the motion."""
         self._fdm.write(self._receive_commands())
         self.step()
 
     def _next_time(self) -> float:
         self._frame += 1
-        if self._frame % LOOK_FRAMES == 0:
+        if self._frame % POLL_INTERVAL_FRAMES == 0:
             self._poll()
         return self._frame / FRAME_HZ

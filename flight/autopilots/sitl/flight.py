@@ -16,17 +16,24 @@ from aircraft.contacts import find_contacts
 from flight.autopilots.parts import Tick
 from flight.autopilots.program import ProgramFlight
 from flight.autopilots.sitl.conversation import Talk
-from flight.autopilots.sitl.exchange import FRAME_HZ, LOOK_FRAMES, PUSH, Lockstep, RailEnd, rail_end
+from flight.autopilots.sitl.exchange import (
+    FRAME_HZ,
+    POLL_INTERVAL_FRAMES,
+    PUSH_ACCELERATION_MPS2,
+    Lockstep,
+    RailEnd,
+    rail_end,
+)
 from flight.autopilots.sitl.link import AutopilotLink
 from flight.autopilots.sitl.mission import uploaded_mission
 from flight.autopilots.sitl.process import AutopilotProcess
 from flight.guidance.gains import load_gains
-from flight.guidance.path import profile, project
+from flight.guidance.path import profile_at, project
 from flight.mission.ground_ways import TakeOff
-from flight.mission.itinerary import UNLIMITED
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.simulation.local_map import Ground
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import GROUND_PATIENCE
+from flight.simulation.simulate import GROUND_TIME_ALLOWANCE_S
 from flight.simulation.start import Release, default_gear, find_release, release
 from flight.simulation.tick import (
     NOT_A_NUMBER,
@@ -36,9 +43,9 @@ from flight.simulation.tick import (
     WORKSPACE,
     WORKSPACE_NUMBERS,
     begin_tick,
-    end_around,
-    end_return,
     end_tick,
+    update_end_loiter,
+    update_rtl_loiter,
 )
 from world.arrays import Floats, Heights
 from world.errors import CrashError, FlightError
@@ -46,7 +53,7 @@ from world.frames import to_geo
 from world.kernels import Record, Records, compiled, inner
 
 # ----------------------------------------------------------------------
-# One tick of a flight under another program's control: find the state on the path, make the wind, fill a row.
+# One tick of a flight that an autopilot's program controls: wind, position along the path, and one row of the track.
 
 
 # Number of path pieces ahead, the current one included, on which the aircraft may be.
@@ -57,9 +64,9 @@ _SEARCHED_PIECES = 4
 def autopilot_tick(block: Floats, heights: Heights) -> int:
     """Run a tick on the block of a `flight.simulation.tick.Workspace`, as the tick of a control law does.
 
-    The autopilot's program has set the commands in the block.  The flight completes where it passes the end of the
-    path, once the program reports that only this end lies ahead; an RTL completes in its loiter, a loiter without end
-    after `UNLIMITED`, and a mission whose last waypoint is circled about completes after one lap.
+    The commands in the block are the program's.  Once the program reports that it flies to its last item, the flight
+    completes where the aircraft passes the end of the path; an RTL completes in its loiter, a loiter without end after
+    `ENDLESS_LOITER_TIME_S`, and a mission whose last waypoint is circled completes after one lap.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -71,13 +78,13 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
     last = path.waypoint[settings.waypoints - 1]
     previous = path.waypoint[settings.waypoints - 2]
     if last.is_rtl and settings.on_last_leg:
-        end_return(work.true, last, memory, work.timing.dt)
+        update_rtl_loiter(work.true, last, memory, work.timing.dt)
     elif settings.on_last_leg and previous.loiter_radius != 0.0 and previous.loiter_time == math.inf:
-        end_circling(work.true, previous, memory, work.timing.dt)
+        update_endless_loiter(work.true, previous, memory, work.timing.dt)
     elif settings.on_last_leg and last.is_mission_end:
-        end_around(work.true, memory, work.timing.dt)
+        update_end_loiter(work.true, memory, work.timing.dt)
     elif settings.on_last_leg:
-        cross_track, distance_past = beyond_end(work.true, path.waypoint[: settings.waypoints])
+        cross_track, distance_past = distances_from_route_end(work.true, path.waypoint[: settings.waypoints])
         memory.is_finished = distance_past >= 0.0
         # An aircraft that loiters at the mission's end, however wide, has not missed the route.
         memory.is_in_rtl = previous.loiter_radius != 0.0 and previous.stop == last.stop
@@ -88,10 +95,10 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
 
 @inner
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
-    """Fill leg, distance, cross-track and altitude error of the memory from the nearest path piece.
+    """Set leg, distance, cross-track and altitude error in the memory from the nearest path piece.
 
-    The search starts at the last piece.  It skips pieces against the direction of flight, because both directions of an
-    out-and-back leg lie on one line.
+    The search starts at the piece of the previous tick.  It skips later pieces that the aircraft flies against, because
+    both directions of an out-and-back leg lie on one line.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     """
@@ -112,19 +119,19 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
     memory.distance = distance
     memory.cross_track = cross_track
     memory.leg = pieces[nearest_piece].leg + (1 if distance > pieces[nearest_piece].leg_change else 0)
-    memory.height_error = true.up - profile(nodes, distance)[0]
+    memory.height_error = true.up - profile_at(nodes, distance)[0]
 
 
 @inner
-def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> None:
-    """Update the time on a loiter without end, and end the flight after `UNLIMITED`.
+def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: float) -> None:
+    """Add a tick to the time on a loiter without end, and finish the flight after `ENDLESS_LOITER_TIME_S`.
 
-    The time runs from where the aircraft, near the circle, first flies around its center in its direction faster than
-    towards it or away from it; from then on it runs however wide the circle is flown.
+    The time starts when the aircraft is near the circle, and its speed around the center, in the loiter's direction, is
+    higher than its speed towards or away from the center.  Once started, it does not depend on the radius flown.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `loiter_time` is the time, s.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `loiter_time` is that time, s.
     """
     offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
     distance = max(0.1, math.hypot(offset_east, offset_north))
@@ -138,12 +145,12 @@ def end_circling(true: Record, corner: Record, memory: Record, dt: float) -> Non
         memory.loiter_time += dt
     # An aircraft that loiters at the mission's end, however wide, has not missed it.
     memory.is_in_rtl = True
-    memory.is_finished = memory.loiter_time > UNLIMITED
+    memory.is_finished = memory.loiter_time > ENDLESS_LOITER_TIME_S
 
 
 @inner
-def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:
-    """Return the distance to the right of the last leg, and the distance past its end, m."""
+def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, float]:
+    """Return the aircraft's distances to the right of the last leg and past the end of the leg, m, signed."""
     a, b = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
     length = math.hypot(b.east - a.east, b.north - a.north)
     east, north = (b.east - a.east) / length, (b.north - a.north) / length
@@ -152,17 +159,18 @@ def beyond_end(true: Record, waypoints: Records) -> tuple[float, float]:
 
 
 # Minimum distance from the release to the first waypoint, m.
-RUN_IN = 500.0
-# Minimum time from the release to the first waypoint, s.  After the release the aircraft rises by 4 m and sinks by 6 m,
-# as TECS was wound up on the rail; after 20 s the stored flights reached the first waypoint up to 2.2 m low or high
-# (the higher and the windier the more), and were within 0.5 m of their law another 5 s later.
-RUN_IN_SECONDS = 40.0
-# Timeout of the run-in, s beyond twice that time: then the flight is judged from where the aircraft is.
+MIN_RUN_IN_DISTANCE_M = 500.0
+# Minimum time from the release to the first waypoint, s.  After the release the aircraft rises by 4 m and then sinks by
+# 6 m, because TECS integrated errors on the rail.  In the stored flights the altitude error was up to 2.2 m 20 s after
+# the release, more at higher altitudes and in stronger winds, and the flights agreed with the simulated control law to
+# 0.5 m 5 s later.
+MIN_RUN_IN_TIME_S = 40.0
+# The run-in ends after twice the minimum time and this time, s: the flight is then judged from the aircraft's position.
 _RUN_IN_TIMEOUT_S = 40.0
 
 
 def launch_rail(release_state: Release, take_off: TakeOff) -> RailEnd:
-    """Return the rail of a launch, or a rail of no length on a runway."""
+    """Return the rail of a launch; on a runway, where the release has no speed, the rail has no length."""
     north, east, _ = release_state.velocity
     roll, pitch, yaw = release_state.attitude
     lat, lon = (math.radians(value) for value in release_state.position[:2])
@@ -180,22 +188,23 @@ def launch_rail(release_state: Release, take_off: TakeOff) -> RailEnd:
             release_state.wind[1],
         ),
         incline=take_off.launch.incline,
-        push=take_off.acceleration or PUSH,
+        push_acceleration=take_off.acceleration or PUSH_ACCELERATION_MPS2,
     )
 
 
 class SitlFlight(ProgramFlight):
     """One flight of an autopilot's program; a context manager that ends it and removes its files.
 
-    binary: the program.
+    binary: file of the program.
 
-    The track begins where the aircraft passes the first waypoint, and the turbulence with it, as in planfly's own
-    flights.  Before that it flies `RUN_IN` m straight and level in the mean wind, and before that it stands on a
-    rail.  A flight from the ground begins at the end of the launch, or at rest on the runway, and the mission is
-    uploaded unchanged.  Its GNSS position has the error of the setup's navigation.
+    A flight that starts in the air stands on a rail until the autopilot is ready, then flies at least
+    `MIN_RUN_IN_DISTANCE_M` straight and level in the mean wind.  The track and the turbulence begin where the aircraft
+    passes the first waypoint, as in planfly's own flights.  The track of a flight from the ground begins at the end of
+    the launch, or at rest on the runway, and its mission is uploaded unchanged.  The GNSS position has the error of the
+    setup's navigation.
 
-    Raises FlightError, in one line that names the program, if the program does not start, does not understand the
-    exchange, finds no position, refuses the mission, or ends.
+    Raises FlightError, in one line that names the program, if the program does not start, uses another version of the
+    physics interface, has no position estimate, refuses the mission, or ends.
     """
 
     _link: AutopilotLink
@@ -215,7 +224,7 @@ class SitlFlight(ProgramFlight):
         self._start_disturbances(setup)
         self._mission = uploaded_mission(setup)
         if self._law is not None:
-            self.max_ticks += int(GROUND_PATIENCE / self.dt)
+            self.max_ticks += int(GROUND_TIME_ALLOWANCE_S / self.dt)
             self._law.initialise(self.memory, self._workspace.own)
         # Compiled here, while no autopilot waits for it.
         tick = self._ground_tick if self._ground_phases else autopilot_tick
@@ -223,8 +232,11 @@ class SitlFlight(ProgramFlight):
 
     @property
     def _ground_tick(self) -> Tick:
-        """Compiled function for one tick of a flight from the ground; only if the program flies one."""
-        raise ValueError(f"{self.setup.autopilot.title} is put into the air on a rail")
+        """Compiled function for one tick of a flight from the ground.
+
+        Raises ValueError if the program flies no take-off.
+        """
+        raise ValueError(f"the program of {self.setup.autopilot.title} flies no take-off: its flights start in the air")
 
     @property
     @abstractmethod
@@ -233,12 +245,12 @@ class SitlFlight(ProgramFlight):
 
     @property
     def _is_ending(self) -> bool:
-        """True if the program reports that only the end of its mission lies ahead."""
-        return self._link.news.mission_item >= self.last_item
+        """True if the program reports that it flies to the last item of its mission."""
+        return self._link.reported.mission_item >= self.last_item
 
     @abstractmethod
     def _prepare_program(self) -> None:
-        """Make the program settle and accept the mission; the aircraft is on the rail, and finally at its end."""
+        """Upload and start the mission with the aircraft on the rail, and push the aircraft to the end of the rail."""
 
     def __enter__(self) -> Self:
         """Return the flight itself."""
@@ -249,14 +261,14 @@ class SitlFlight(ProgramFlight):
         self._stack.close()
 
     @property
-    def exchanged(self) -> float:
+    def autopilot_time(self) -> float:
         """Autopilot time since its boot, s."""
         return self._lockstep.time
 
     def prepare(self) -> None:
-        """Let the autopilot settle and accept the mission, and fly the aircraft to the first waypoint.
+        """Upload and start the mission, and fly the aircraft to the first waypoint, or launch it for a take-off.
 
-        For a take-off, launch the aircraft instead. Raises FlightError, see the class.
+        Raises FlightError, see the class.
         """
         with self._errors_name_program():
             self._prepare_program()
@@ -266,10 +278,10 @@ class SitlFlight(ProgramFlight):
             else:
                 self._begin_at_release(self._release)
 
-    def _push(self, first: float = 0.0, last: float = 1.0) -> None:
-        """Push the aircraft along the rail, from one fraction of the push time to another."""
+    def _push(self, start_fraction: float = 0.0, end_fraction: float = 1.0) -> None:
+        """Accelerate the aircraft along the rail, from one fraction of the push time to another."""
         frames = math.ceil(self._rail.push_time * FRAME_HZ)
-        for k in range(math.ceil(first * frames) + 1, math.ceil(last * frames) + 1):
+        for k in range(math.ceil(start_fraction * frames) + 1, math.ceil(end_fraction * frames) + 1):
             self._lockstep.hold(self._rail, k / FRAME_HZ)
 
     def keep_log(self, target: Path) -> bool:
@@ -279,7 +291,7 @@ class SitlFlight(ProgramFlight):
 
     @contextlib.contextmanager
     def _errors_name_program(self, error_class: type[FlightError] = FlightError) -> Iterator[None]:
-        """Raise errors of the program in this context as errors of one kind that name the program."""
+        """Raise FlightErrors of this context again as an ``error_class`` that names the program's file."""
         try:
             yield
         except FlightError as error:
@@ -299,7 +311,7 @@ class SitlFlight(ProgramFlight):
             return launch_rail(self._release, self._ground_phases.take_off)
         first_leg = points[1, :2] - points[0, :2]
         release_position = points[0, :2] - first_leg / np.hypot(*first_leg) * max(
-            RUN_IN, RUN_IN_SECONDS * start.airspeed
+            MIN_RUN_IN_DISTANCE_M, MIN_RUN_IN_TIME_S * start.airspeed
         )
         lat, lon = (float(value) for value in to_geo(setup.scenario.origin, *release_position))
         release_start = replace(start, lat_deg=lat, lon_deg=lon, slope=0.0, ground=min(0.0, start.amsl - 1000.0))
@@ -309,7 +321,7 @@ class SitlFlight(ProgramFlight):
     def _hold_during(self, talk: Talk) -> None:
         """Hold the aircraft at rest during a conversation."""
         while True:
-            for _ in range(LOOK_FRAMES):
+            for _ in range(POLL_INTERVAL_FRAMES):
                 self._lockstep.hold(self._rail)
             try:
                 next(talk)
@@ -317,19 +329,19 @@ class SitlFlight(ProgramFlight):
                 return
 
     def _poll_link(self) -> None:
-        """Read the autopilot's messages, and update whether its last leg is flown."""
+        """Read the autopilot's messages, and tell the tick whether the program flies its last leg."""
         self._link.poll()
         self._workspace.on_last_leg[0] = self._is_ending
 
     def _apply_gnss_error(self) -> None:
-        """Set the GNSS position error of the start."""
+        """Set the GNSS position error that the autopilot has on the rail."""
         settings, navigation = self._work.settings, self._work.navigation
         scale = settings.navigation_sigma * math.sqrt(2.0)
         east, north, up = (scale * navigation.second).tolist()
         self._lockstep.error = (north, east, up, 0.0, 0.0, 0.0)
 
     def _begin_at_release(self, release_state: Release) -> None:
-        """Begin at the end of the rail or the throw, with the program's controls, or at rest on a runway."""
+        """Release the aircraft, with the program's controls, at the end of the launch or at rest on the runway."""
         self._set_unit_factors()
         commands = tuple(float(command) for command in self._workspace.commands)
         self._work.commands = release(self.fdm, release_state, (commands[0], commands[1], commands[2], commands[3]))
@@ -337,12 +349,13 @@ class SitlFlight(ProgramFlight):
         self._make_loop(self._ground_tick)
 
     def _set_unit_factors(self) -> None:
+        """Copy the factors from JSBSim's units to SI into the block, for the ticks."""
         access = self.fdm.loop_access()
         self._work.state_factors = access.factors[0]
         self._work.scale_above, self._work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
 
     def _make_loop(self, tick: Tick) -> None:
-        """Continue the flight with a tick that is recorded, over the terrain."""
+        """Continue the flight over the terrain, with a compiled tick that records the track."""
         bound_tick = partial(tick, self._workspace.block, self._ground.heights)
         tick_with_gnss_error = partial(self._tick, bound_tick, bool(self._work.settings.navigation_sigma))
         self._loop = self._lockstep.make_loop(
@@ -350,14 +363,17 @@ class SitlFlight(ProgramFlight):
         )
 
     def _fly_to_first_waypoint(self) -> None:
-        """Fly to the first waypoint in the mean wind, without ground; an end of the flight ends the run-in early."""
+        """Fly to the first waypoint in the mean wind, without turbulence and without ground.
+
+        A tick that ends the flight, or the timeout, ends the run-in before the waypoint.
+        """
         work, timing, steps = self._work, self._work.timing, self._steps
         self._set_unit_factors()
         tick = partial(autopilot_tick, self._workspace.block, Ground(None).heights)
         loop = self._lockstep.make_loop(tick, steps, gusts=self._windy, ground=False)
         saved_settings = work.wind.w20, work.settings.navigation_sigma
         work.wind.w20 = work.settings.navigation_sigma = 0.0
-        for _ in range(round((2.0 * RUN_IN_SECONDS + _RUN_IN_TIMEOUT_S) / self.dt)):
+        for _ in range(round((2.0 * MIN_RUN_IN_TIME_S + _RUN_IN_TIMEOUT_S) / self.dt)):
             timing.row = 0
             if loop(1) or self.memory.distance >= 0.0:
                 break

@@ -1,4 +1,4 @@
-"""Connect to an autopilot's program by MAVLink: send messages, and collect its state from its messages."""
+"""Connect to an autopilot's program by MAVLink: send messages to it, and collect the state that it reports."""
 
 import socket
 import struct
@@ -18,19 +18,19 @@ _MAX_RECEIVE_BYTES = 65536
 
 
 @dataclass(slots=True)
-class AutopilotNews:
-    """State of an autopilot from its messages; None or empty for what it has not sent.
+class ReportedState:
+    """State that an autopilot has reported by MAVLink; None, -1 or empty until it sends the message concerned.
 
     vehicle: MAV_TYPE.
     autopilot: MAV_AUTOPILOT.
-    mode: number that the autopilot gives its mode.
+    mode: custom_mode of the heartbeat, the autopilot's own number of its flight mode.
     ekf: flags of EKF_STATUS_REPORT or ESTIMATOR_STATUS.
     mission_item: number of the item being flown.
     reached: number of the last item reached.
-    texts: STATUSTEXT, in order.
-    parameters: its parameters by name.
+    texts: texts of STATUSTEXT, in the order of their arrival.
+    parameters: values of the received parameters by name.
     acknowledged: MAV_RESULT by command.
-    requested: number of the mission item that it requested last.
+    requested: number of the mission item that the autopilot requested last.
     mission_result: MAV_MISSION_RESULT of the upload.
     version: AUTOPILOT_VERSION.flight_sw_version.
     """
@@ -62,16 +62,16 @@ _INTEGER_FORMATS = {
 
 
 class AutopilotLink(ABC):
-    """A connection to the autopilot's program, on this machine.
+    """MAVLink connection to the autopilot's program on this machine.
 
-    port: port of this end.
-    news: state from the received messages.
+    port: planfly's port of the connection.
+    reported: state that the autopilot has reported.
     """
 
     port: int
 
     def __init__(self) -> None:
-        self.news = AutopilotNews()
+        self.reported = ReportedState()
         self._mav = mavlink.MAVLink(None, _SYSTEM, _COMPONENT)
         self._mav.robust_parsing = True
         self._handlers = {
@@ -122,43 +122,43 @@ class AutopilotLink(ABC):
     def _on_heartbeat(self, message: Any) -> None:
         if message.get_srcComponent() != mavlink.MAV_COMP_ID_AUTOPILOT1:
             return
-        self.news.vehicle, self.news.autopilot = int(message.type), int(message.autopilot)
-        self.news.mode = int(message.custom_mode)
-        self.news.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        self.reported.vehicle, self.reported.autopilot = int(message.type), int(message.autopilot)
+        self.reported.mode = int(message.custom_mode)
+        self.reported.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
 
     def _on_text(self, message: Any) -> None:
-        self.news.texts.append(str(message.text))
+        self.reported.texts.append(str(message.text))
 
     def _on_ekf(self, message: Any) -> None:
-        self.news.ekf = int(message.flags)
+        self.reported.ekf = int(message.flags)
 
     def _on_mission_current(self, message: Any) -> None:
-        self.news.mission_item = int(message.seq)
+        self.reported.mission_item = int(message.seq)
 
     def _on_mission_item_reached(self, message: Any) -> None:
-        self.news.reached = int(message.seq)
+        self.reported.reached = int(message.seq)
 
     def _on_parameter(self, message: Any) -> None:
         value, integer_format = float(message.param_value), _INTEGER_FORMATS.get(message.param_type)
-        if integer_format is not None and self.news.autopilot == mavlink.MAV_AUTOPILOT_PX4:
+        if integer_format is not None and self.reported.autopilot == mavlink.MAV_AUTOPILOT_PX4:
             (value,) = struct.unpack(integer_format, struct.pack("<f", value))
-        self.news.parameters[str(message.param_id)] = float(value)
+        self.reported.parameters[str(message.param_id)] = float(value)
 
     def _on_command_ack(self, message: Any) -> None:
-        self.news.acknowledged[int(message.command)] = int(message.result)
+        self.reported.acknowledged[int(message.command)] = int(message.result)
 
     def _on_mission_request(self, message: Any) -> None:
-        self.news.requested = int(message.seq)
+        self.reported.requested = int(message.seq)
 
     def _on_mission_ack(self, message: Any) -> None:
-        self.news.mission_result = int(message.type)
+        self.reported.mission_result = int(message.type)
 
     def _on_version(self, message: Any) -> None:
-        self.news.version = int(message.flight_sw_version)
+        self.reported.version = int(message.flight_sw_version)
 
 
 class TcpLink(AutopilotLink):
-    """A socket that the program connects to."""
+    """MAVLink connection by TCP: the program connects to planfly's port."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -200,9 +200,9 @@ class TcpLink(AutopilotLink):
 
 
 class UdpLink(AutopilotLink):
-    """A socket to which the program sends.
+    """MAVLink connection by UDP: the program sends to planfly's port, and listens on its own.
 
-    theirs: port on which the program will listen.
+    program_port: port on which the program is to listen.
     """
 
     def __init__(self) -> None:
@@ -211,7 +211,7 @@ class UdpLink(AutopilotLink):
         self._socket.bind((LOOPBACK, 0))
         self._socket.setblocking(False)
         self.port = int(self._socket.getsockname()[1])
-        (self.theirs,) = free_ports(1)
+        (self.program_port,) = free_ports(1)
 
     def close(self) -> None:
         """Close the socket."""
@@ -223,20 +223,17 @@ class UdpLink(AutopilotLink):
         except (BlockingIOError, ConnectionRefusedError):
             return b""
         # Datagrams from other senders are ignored.
-        return data if sender == (LOOPBACK, self.theirs) else b""
+        return data if sender == (LOOPBACK, self.program_port) else b""
 
     def _transmit(self, data: bytes) -> None:
         try:
-            self._socket.sendto(data, (LOOPBACK, self.theirs))
+            self._socket.sendto(data, (LOOPBACK, self.program_port))
         except OSError:
             return
 
 
 def free_ports(count: int) -> list[int]:
-    """Return UDP ports that are free now.
-
-    The program opens sockets on them to which nothing connects.
-    """
+    """Return numbers of UDP ports that are free now, on which a program may listen."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for udp_socket in sockets:

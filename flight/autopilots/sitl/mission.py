@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.ground_ways import GroundPhases
-from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, on_grid
+from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, round_to_grid
 from flight.mission.itinerary import loiter_of
 from flight.mission.route import Route, ends_at_plain_waypoint
 from flight.simulation.setup import FlightSetup
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 
-# Distance from the end of the route to the extra waypoint, m.
-STRAIGHT_ON = 1000.0
+# Distance from the end of the route to the extra waypoint after it, m.
+EXTRA_WAYPOINT_DISTANCE_M = 1000.0
 # Height of the start above home, m, if the mission has no home, or a home near the start's altitude.
 _HOME_BELOW_START_M = 100.0
 # Minimum altitude difference between the start and home, m: within 10 m of home ArduPlane limits the throttle, as
@@ -57,20 +57,20 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
         return _unchanged_mission(setup, setup.ground_phases)
     route, origin = setup.route, setup.scenario.origin
     items: list[MissionItem] = []
-    has_landing = route.return_from >= 0 and route.return_until <= route.legs
+    has_landing = route.rtl_start >= 0 and route.rtl_end <= route.legs
     for item in setup.mission.items:
         waypoint_indices = np.flatnonzero(route.items == item.seq)
         if item.command == Command.NAV_RETURN_TO_LAUNCH:
             items += [item] if waypoint_indices.size else []
         elif waypoint_indices.size:
-            items.append(_place_item(item, route, waypoint_indices, origin, items))
+            items.append(_item_with_position(item, route, waypoint_indices, origin, items))
         elif item.command in _KEPT_COMMANDS or (has_landing and item.command == Command.DO_LAND_START):
             items.append(item)
     if not any(item.has_position for item in items):
         items = _route_items(route, origin)
     elif route.items[-1] == -1 and items[-1].command != Command.NAV_LOITER_UNLIM:
         items.append(_make_waypoint(items[-1].seq + 1, route.waypoints[-1], 0.0, origin))
-    if (route.return_from >= 0 and not has_landing) or items[-1].command == Command.NAV_LOITER_UNLIM:
+    if (route.rtl_start >= 0 and not has_landing) or items[-1].command == Command.NAV_LOITER_UNLIM:
         return UploadedMission(_home_for_upload(setup), _renumber(items), setup.mission.rally)
     if setup.autopilot.loiters.ends_in_circle and ends_at_plain_waypoint(route, setup.mission):
         return UploadedMission(_home_for_upload(setup), _renumber(items))
@@ -93,10 +93,14 @@ def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> Uploa
     return UploadedMission(home, _renumber(items), mission.rally, last)
 
 
-def _place_item(
+def _item_with_position(
     item: MissionItem, route: Route, waypoint_indices: NDArray[np.intp], origin: GeoOrigin, earlier: list[MissionItem]
 ) -> MissionItem:
-    """Return the item of a place, which is a loiter about its own center, or a waypoint at the route's position."""
+    """Return a navigation item for the upload: a loiter keeps its parameters, anything else becomes a waypoint.
+
+    waypoint_indices: waypoints of the route that belong to the item.
+    earlier: uploaded items before it; a loiter without a position is about the position of the last of them.
+    """
     position = route.waypoints[waypoint_indices[-1]]
     loiter = loiter_of(item)
     if loiter is None:
@@ -107,14 +111,14 @@ def _place_item(
         return replace(waypoint, params=(hold, waypoint.params[1], pass_by, yaw))
     lat, lon = item.lat_deg, item.lon_deg
     if not item.has_position:
-        center_item = next(place for place in reversed(earlier) if place.has_position and is_navigation(place.command))
+        center_item = next(other for other in reversed(earlier) if other.has_position and is_navigation(other.command))
         lat, lon = center_item.lat_deg, center_item.lon_deg
     p1, p2, p3, p4 = (0.0 if math.isnan(value) else value for value in item.params)
     return MissionItem(item.seq, int(item.command), int(Frame.GLOBAL), (p1, p2, p3, p4), lat, lon, float(position[2]))
 
 
 def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
-    """Return the items of a route without a mission, which are its waypoints and its changes of speed."""
+    """Return waypoints and changes of speed for a route whose mission has no items with positions."""
     items: list[MissionItem] = []
     speed = math.nan
     for index, point in enumerate(route.waypoints):
@@ -130,13 +134,14 @@ def _route_items(route: Route, origin: GeoOrigin) -> list[MissionItem]:
 
 def _make_waypoint(seq: int, point: Floats, acceptance: float, origin: GeoOrigin) -> MissionItem:
     lat, lon = to_geo(origin, point[0], point[1])
-    place = (on_grid(float(lat)), on_grid(float(lon)), float(point[2]))
-    return MissionItem(seq, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0, acceptance, 0.0, 0.0), *place)
+    position = (round_to_grid(float(lat)), round_to_grid(float(lon)), float(point[2]))
+    return MissionItem(seq, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0, acceptance, 0.0, 0.0), *position)
 
 
 def _extra_point(route: Route) -> Floats:
+    """Return the position (3,) of the extra waypoint, m: straight on after the last leg, at its final altitude."""
     east, north, _ = route.waypoints[-1] - route.waypoints[-2]
-    scale = STRAIGHT_ON / math.hypot(east, north)
+    scale = EXTRA_WAYPOINT_DISTANCE_M / math.hypot(east, north)
     return route.waypoints[-1] + np.array([scale * east, scale * north, 0.0])
 
 
@@ -158,14 +163,15 @@ def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
 def _home_for_upload(setup: FlightSetup) -> Home:
     """Return the mission's home, or the start's position, at an altitude that lets the motor run.
 
-    An RTL measures its altitudes from home: there the mission's home is used.
+    Near home's altitude ArduPlane would limit the throttle as before a take-off.  A mission with an RTL, which measures
+    its altitudes from home, keeps its own home.
     """
     start = setup.route.waypoints[0]
     home = setup.mission.home
     if home is None:
         lat, lon = to_geo(setup.scenario.origin, start[0], start[1])
-        home = Home(on_grid(float(lat)), on_grid(float(lon)), math.nan)
-    if setup.route.return_to is not None and not math.isnan(home.alt):
+        home = Home(round_to_grid(float(lat)), round_to_grid(float(lon)), math.nan)
+    if setup.route.rtl_loiter is not None and not math.isnan(home.alt):
         return home
     is_near = math.isnan(home.alt) or abs(home.alt - start[2]) < _MIN_HOME_DISTANCE_M
     return replace(home, alt=float(start[2]) - _HOME_BELOW_START_M) if is_near else home

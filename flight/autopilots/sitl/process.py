@@ -37,14 +37,12 @@ def check_binary(binary: Path, kind: str) -> str:
     ...     check_binary(Path("missing/arduplane"), "ArduPlane")
     ... except FlightError as error:
     ...     print(error)
-    missing/arduplane: no such file; expected the program of ArduPlane for software in the loop
+    missing/arduplane: no such file; expected the SITL program of ArduPlane
     """
     if not binary.exists():
-        raise FlightError(
-            f"{binary}: no such file; expected the program of {kind} for software in the loop", file=binary
-        )
+        raise FlightError(f"{binary}: no such file; expected the SITL program of {kind}", file=binary)
     if not binary.is_file():
-        raise FlightError(f"{binary}: not a file; expected the program of {kind}", file=binary)
+        raise FlightError(f"{binary}: not a file; expected the SITL program of {kind}", file=binary)
     if not os.access(binary, os.X_OK):
         raise FlightError(f"{binary}: not executable (chmod +x)", file=binary)
     try:
@@ -57,10 +55,10 @@ def check_binary(binary: Path, kind: str) -> str:
 class Launch:
     """Command line and environment of a program.
 
-    arguments: arguments after its name.
+    arguments: arguments after the program's name.
     environment: variables in addition to this process's environment.
-    logs: pattern of its own logs below its folder.
-    leaves: files that it leaves behind outside of that folder.
+    logs: pattern of the program's own logs, relative to its folder.
+    leaves: files that the program leaves behind outside its folder.
     """
 
     arguments: tuple[str, ...]
@@ -70,14 +68,15 @@ class Launch:
 
 
 class AutopilotProcess:
-    """The running program as a context manager; leaving it removes the program, its children and its folder.
+    """Running program of an autopilot, as a context manager.
 
-    A guard does the same if planfly is killed.
+    Leaving the context kills the program and its children, and removes the program's folder.  A guard process does the
+    same if planfly is killed.
 
-    binary: its file, checked by `check_binary`.
+    binary: file of the program, checked by `check_binary`.
     prepare: function that prepares the program's folder, and returns the command line.
 
-    Raises FlightError if it cannot be started.
+    Raises FlightError if the program cannot be started.
     """
 
     def __init__(self, binary: Path, prepare: Callable[[Path], Launch]) -> None:
@@ -138,7 +137,7 @@ class AutopilotProcess:
         self._resources.close()
 
     def watch(self) -> None:
-        """Raise FlightError if the program has panicked or ended, with its last output."""
+        """Raise FlightError, with the last line of the program's output, if the program has panicked or ended."""
         panic = self._panic_text()
         if panic:
             raise FlightError(f"panicked: {panic}", file=self.binary)
@@ -173,9 +172,9 @@ class AutopilotProcess:
         return True
 
     def _signal(self, number: int) -> bool:
-        """Send a signal to the program and its children, 0 for none; return True if any of them exists.
+        """Send a signal to the program and its children (0: only check); return True if any of these processes exists.
 
-        No signal is sent to a group that is gone: its number may belong to another group by then.
+        After the process group has ended, no signal is sent: its number may belong to another group by then.
         """
         if not self._ended:
             try:
@@ -185,7 +184,7 @@ class AutopilotProcess:
         return not self._ended
 
     def _is_alive(self) -> bool:
-        """Return True if the program or its children run; an ended program that was not waited for does not count."""
+        """Return True if the program or one of its children runs."""
         self._process.poll()
         return self._signal(0)
 
@@ -195,7 +194,7 @@ class AutopilotProcess:
         self._process.wait()
 
     def lines(self) -> list[str]:
-        """Return the lines of its output, without blank ones."""
+        """Return the lines of the program's output, without blank lines."""
         try:
             text = (self._folder / _OUTPUT_FILE).read_text(encoding="utf-8", errors="replace")
         except OSError:

@@ -21,11 +21,11 @@ _MAX_OUTPUT = 32
 
 @dataclass(frozen=True, slots=True)
 class ServoOutput:
-    """One control's servo: the value is linear in the pulse between its knots, and constant beyond them.
+    """One servo of a control: the control is linear in the pulse between the knots, and constant beyond them.
 
     number: number of the output, from 1.
     pulses: (k,) microseconds, increasing.
-    values: (k,) the control at these pulses: rad as in `flight.dynamics.state.Commands`, or 0..1 of the throttle.
+    values: (k,) control at these pulses, in the units of `flight.dynamics.state.Commands`: rad, or throttle 0..1.
     """
 
     number: int
@@ -33,18 +33,18 @@ class ServoOutput:
     values: tuple[float, ...]
 
     @property
-    def rest(self) -> float:
-        """Pulse at the center of the throw: the knot with the value nearest to zero."""
+    def center_pulse(self) -> float:
+        """Pulse of the knot whose control value is nearest to zero, microseconds."""
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:
-        """Return the control at a pulse, microseconds; the rest value if there is no pulse (0).
+        """Return the control at a pulse, microseconds; the control at the center pulse if there is no pulse (0).
 
         >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value(1700)
         -0.25
         """
         if pulse <= 0.0:
-            pulse = self.rest
+            pulse = self.center_pulse
         pulses, values = self.pulses, self.values
         if pulse <= pulses[0]:
             return values[0]
@@ -54,14 +54,17 @@ class ServoOutput:
                 return values[knot - 1] + fraction * (values[knot] - values[knot - 1])
         return values[-1]
 
-    def at_share(self, fraction: float) -> float:
-        """Return the control at a fraction of the throw, from -1 and 1 at the end pulses to 0 at the center.
+    def value_at_fraction(self, fraction: float) -> float:
+        """Return the control at a fraction of the servo's throw: -1 and 1 at the end pulses, 0 at the center pulse.
 
-        >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).at_share(0.5)
+        The center of a servo with only two knots is halfway between its end pulses.
+
+        >>> ServoOutput(2, (1100.0, 1500.0, 1900.0), (0.5, 0.0, -0.5)).value_at_fraction(0.5)
         -0.25
         """
-        rest = self.rest if len(self.pulses) > 2 else 0.5 * (self.pulses[0] + self.pulses[-1])
-        return self.value(rest + fraction * (self.pulses[-1] - rest if fraction > 0.0 else rest - self.pulses[0]))
+        first, last = self.pulses[0], self.pulses[-1]
+        center = self.center_pulse if len(self.pulses) > 2 else 0.5 * (first + last)
+        return self.value(center + fraction * (last - center if fraction > 0.0 else center - first))
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +94,7 @@ class ServoMap:
             prefix = f"SERVO{output.number}_"
             parameters[f"{prefix}FUNCTION"] = float(function)
             parameters[f"{prefix}MIN"], parameters[f"{prefix}MAX"] = output.pulses[0], output.pulses[-1]
-            parameters[f"{prefix}TRIM"] = output.rest
+            parameters[f"{prefix}TRIM"] = output.center_pulse
         return parameters
 
 
@@ -110,13 +113,16 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
         table = read_toml(file, "servos")
     except OSError as error:
         raise FlightError(
-            f"{file}: {error.strerror}; a real autopilot needs to know what each servo of {aircraft.name} moves",
+            f"{file}: {error.strerror}; the autopilot's program needs this file, which states the control that each"
+            f" servo of {aircraft.name} moves",
             file=file,
         ) from error
     except ValueError as error:
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from error
     if set(table) != set(FUNCTIONS):
-        raise FlightError(f"{file}: tables {', '.join(sorted(table))}: expected {', '.join(FUNCTIONS)}", file=file)
+        raise FlightError(
+            f"{file}: tables {', '.join(sorted(table))}: expected the tables {', '.join(FUNCTIONS)}", file=file
+        )
     try:
         outputs = {name: _parse_output(name, entry) for name, entry in table.items()}
     except ValueError as error:
@@ -125,6 +131,7 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
 
 
 def _parse_output(name: str, entry: Any) -> ServoOutput:
+    """Return the servo of the named control from its table in the file.  Raises ValueError with the entry's name."""
     unit = _UNITS[name]
     key = f"value_{unit}" if unit else "value"
     if not isinstance(entry, dict) or set(entry) != {"output", "pulse_us", key}:

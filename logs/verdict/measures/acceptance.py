@@ -58,7 +58,7 @@ def acceptance_condition(requirements: RouteRequirements, i: int) -> AcceptanceC
     if mission_radius > 0.0:
         return AcceptanceCondition(mission_radius, "mission", tolerance)
     if not setup.autopilot.turns.follows_path:
-        is_inner = 0 < i < requirements.legs and i != setup.route.return_from
+        is_inner = 0 < i < requirements.legs and i != setup.route.rtl_start
         turn = abs(float(requirements.turns[i])) if is_inner else math.pi
         return AcceptanceCondition(
             setup.autopilot.turns.distance(turn, float(requirements.points[i, 2])), "autopilot", tolerance

@@ -18,7 +18,7 @@ def returns_after_last_item(setup: FlightSetup) -> bool:
     there.
     """
     route, mission, scenario = setup.route, setup.mission, setup.scenario
-    ends_in_flight = route.return_from < 0 and route.endless < 0 and mission.home is not None
+    ends_in_flight = route.rtl_start < 0 and route.endless_jump < 0 and mission.home is not None
     if setup.source is not None or setup.autopilot.checks.dialect != "ardupilot" or not ends_in_flight:
         return False
     last_seq = next((seq for seq in reversed(route.items.tolist()) if seq >= 0), -1)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from flight.guidance.path import FlyByPath, arc_point, profile
+from flight.guidance.path import FlyByPath, arc_point, profile_at
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from world.arrays import Floats, Heights
@@ -84,7 +84,7 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
         for first, last in pairwise(cuts.tolist()):
             middle, half_length = 0.5 * (first + last), 0.5 * (last - first)
             # Evaluated at the piece's midpoint: at its ends another parabola, or another leg, may begin.
-            height, slope, bend = profile(nodes, middle)
+            height, slope, bend = profile_at(nodes, middle)
             east, north = arc_point(piece, first - start)
             course = piece.course + piece.curvature * (first - start)
             up = height - slope * half_length + 0.5 * bend * half_length * half_length

@@ -148,7 +148,7 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
     """Return the center of a loiter's corners, and the radius within which the loiter is flown, m."""
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     reach_radius = float(np.hypot(*(corners - center).T).max()) + _LOITER_MARGIN_M
-    if 0 <= route.return_from < first < route.return_until:
+    if 0 <= route.rtl_start < first < route.rtl_end:
         reach_radius = max(reach_radius, RTL_ARRIVAL_RADIUS_M, RTL_ARRIVAL_LOITER_RADII * radius)
     return center, reach_radius
 

@@ -155,10 +155,10 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
         max(float(offset) + FINAL_WAYPOINT_TOLERANCE_M, acceptance_condition(requirements, i).radius)
         for i, offset in enumerate(offsets)
     ]
-    first_return = route.return_from
+    first_return = route.rtl_start
     if first_return >= 0:
         # A return ends anywhere on its loiter, which is not where the loiter is drawn, nor where the drawn loiter ends.
-        end_return, loiter = route.return_until, route.return_to
+        end_return, loiter = route.rtl_end, route.rtl_loiter
         loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
         anywhere = max(RTL_ARRIVAL_RADIUS_M, (1.0 + RTL_ARRIVAL_LOITER_RADII) * loiter_radius)
         radii[first_return + 1 : end_return] = [

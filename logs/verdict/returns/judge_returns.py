@@ -337,7 +337,7 @@ class ReturnWorld:
             "autoland": any(cause.does == "autoland" for cause in self.causes),
             "return path": int(self.parameters.rtl_autoland) == 4 and _has_return_path(self.setup),
             "landing": any(ending != "circle" for ending in self.endings)
-            and any(landing.lands for landing in self.landings),
+            and any(landing.is_landing for landing in self.landings),
         }
         return tuple(name for name, applies in reasons.items() if applies)
 
@@ -347,9 +347,9 @@ class ReturnWorld:
         position = (float(row["east"]), float(row["north"]), float(row["up"]))
         ending = ending or self.ending
         if ending == "straight to land" and (landing := nearest_landing_sequence(position, self.landings)) is not None:
-            distance = math.dist(position[:2], landing.place[:2])
+            distance = math.dist(position[:2], landing.position[:2])
             name, reason = f"the landing sequence at item {landing.item}", self._choice_reason(landing)
-            return ReturnTarget(landing.place, name, reason, distance, landing=landing, straight=True)
+            return ReturnTarget(landing.position, name, reason, distance, landing=landing, straight=True)
         target = choose_target(rules, position, self.home, self.rally)
         return self.with_landing(target) if ending == "on to land" else target
 
@@ -517,7 +517,7 @@ def simulate_returns(
         None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
     ]
     # A landing is not simulated: a return that would begin with the landing ends where it would go on to it.
-    landings = [target.landing if target.landing and not target.landing.lands else None for target in targets]
+    landings = [target.landing if target.landing and not target.landing.is_landing else None for target in targets]
     keep_paths = keep_paths or bool(world.airspace.zones)
     result = fly_returns(
         starts.rows,

@@ -65,8 +65,8 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
     (True, 0.0, True)
     """
     is_usable = np.isfinite(track.position).all(axis=1) & np.isfinite(track.time)
-    if setup.route.return_from >= 0 and setup.source is None:
-        is_usable &= track.leg < setup.route.return_from
+    if setup.route.rtl_start >= 0 and setup.source is None:
+        is_usable &= track.leg < setup.route.rtl_start
     usable_rows = np.flatnonzero(is_usable)
     if not usable_rows.size:
         return _empty_starts(is_flown=True)
@@ -123,7 +123,7 @@ def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
     (True, False)
     """
     route = setup.route
-    last_leg = route.return_from - 1 if route.return_from >= 0 else route.legs - 1
+    last_leg = route.rtl_start - 1 if route.rtl_start >= 0 else route.legs - 1
     moves = path_moves(setup.path, _ground_speeds(setup), 0, last_leg)
     moves = moves[moves["leg"] <= last_leg]
     if not len(moves):

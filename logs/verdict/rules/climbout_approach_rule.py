@@ -17,7 +17,7 @@ from itertools import groupby
 from typing import NamedTuple
 
 from flight.mission.items import Command
-from flight.mission.placing import SAME_PLACE
+from flight.mission.placing import SAME_POSITION_DISTANCE_M
 from logs.verdict.findings import GROUND_PATH, Finding, Message, make_finding, message
 from logs.verdict.measures.ground_paths import (
     GroundPath,
@@ -122,7 +122,7 @@ def climbout_findings(
             math.atan2(first_point[0] - start[0], first_point[1] - start[1]),
             math.dist(first_point[:2], start),
         )
-        if distance < SAME_PLACE:
+        if distance < SAME_POSITION_DISTANCE_M:
             return []
     if math.isnan(ground_altitude):
         return [

@@ -135,7 +135,7 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
         else:
             faults.append(message(ending, f": {count_text}"))
     unknown_texts += [
-        f"the path to item {stop.item} is not judged, because it is not laid out" for stop in setup.route.unjoined
+        f"the path to item {stop.item} is not judged, because it is not laid out" for stop in setup.route.unjoined_stops
     ]
     notes += _gaps_text(stretches)
     return make_finding(

@@ -42,7 +42,7 @@ def energy_findings(
     setup = requirements.setup
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
     planned_energy, peak_current = predicted_energy(requirements)
-    faults = [_endless_jump_message(requirements, limit)] if setup.route.endless >= 0 else []
+    faults = [_endless_jump_message(requirements, limit)] if setup.route.endless_jump >= 0 else []
     is_guessed = setup.envelope.battery_guessed and setup.scenario.flight.battery_wh is None
     energy, max_current = (planned_energy, peak_current) if geometric else _flown_energy(requirements, aligned)
     is_measured = setup.source is not None and not geometric
@@ -107,7 +107,7 @@ def _endless_jump_message(requirements: RouteRequirements, usable_energy: float)
         sum(leg_energies(requirements)[0][start:]) if route.items[start] == route.items[last_waypoint] else math.nan
     )
     duration_text = f": the energy lasts for {usable_energy / round_energy:.0f} rounds" if round_energy > 0.0 else ""
-    return message(f"the jump of item {route.endless} has no end{duration_text}")
+    return message(f"the jump of item {route.endless_jump} has no end{duration_text}")
 
 
 def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:

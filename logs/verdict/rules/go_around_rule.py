@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.autopilots.arduplane.go_around_point_mass import aborted_at, climb_rows, fly_go_arounds
+from flight.autopilots.arduplane.go_around_point_mass import abort_start, climb_rows, fly_go_arounds
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
 from flight.autopilots.parts import LandingGlide
 from flight.mission.ground_ways import climb_pitch
@@ -343,7 +343,7 @@ def _simulate_go_arounds(
         return []
     start_records: Records = np.concatenate(
         [
-            aborted_at(place, landing.course, landing.glide.slope, landing.airspeed, world.aircraft)
+            abort_start(place, landing.course, landing.glide.slope, landing.airspeed, world.aircraft)
             for _, place, _ in airborne
         ]
     )
@@ -395,7 +395,7 @@ def _judge_go_around(
         is_lost=end_status == RETURN_TIMEOUT,
         unknown_part_text=_unknown_part_text(end_status, has_climbed=rows < len(positions)),
     )
-    if destination.lands and rows < len(positions):
+    if destination.is_landing and rows < len(positions):
         # Its path on a glide that may begin anywhere is unknown; the path before the glide is known.
         positions, end_status = positions[: rows + 1], 0
         go_around = go_around._replace(
@@ -456,7 +456,7 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
     Near a destination that is lower than `GO_AROUND_CLEARANCE_M`, the destination's own height is required.
     """
     required = np.full(len(points), GO_AROUND_CLEARANCE_M)
-    for east, north, up in (start.place for start in (destination, *destination.next_stops)):
+    for east, north, up in (start.position for start in (destination, *destination.next_stops)):
         height = up - float(terrain.height(east, north))
         is_near = np.hypot(points[:, 0] - east, points[:, 1] - north) <= LINE_UP_DISTANCE_M
         if height < GO_AROUND_CLEARANCE_M:

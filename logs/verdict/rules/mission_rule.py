@@ -19,7 +19,7 @@ import numpy as np
 
 from aircraft.catalog import find_logged_aircraft
 from flight.autopilots.parts import FeasibilityLimits, MissionParts
-from flight.mission.commands import PASSED_OVER, Treatment, support_of
+from flight.mission.commands import SKIPPED_REASON, Treatment, support_of
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
     FENCES,
@@ -75,7 +75,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     return [
         *findings,
         *_arduplane_refusals(setup),
-        *([_unjoined_finding(setup)] if setup.route.unjoined else []),
+        *([_unjoined_finding(setup)] if setup.route.unjoined_stops else []),
         *_unreached_findings(setup),
         *_unflown_findings(setup),
     ]
@@ -139,7 +139,7 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     For an imported flight this is undecided, not a fault; see
     `logs.verdict.rules.completion_rule.imported_completion_finding`.
     """
-    first_stop, *other_stops = setup.route.unjoined
+    first_stop, *other_stops = setup.route.unjoined_stops
     autopilot = setup.autopilot.title
     if first_stop.is_circle:
         reason = f"no tangent joins its circle to that of item {first_stop.circle}"
@@ -181,7 +181,7 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     itinerary = make_itinerary(setup.mission, resets_jump_counters=setup.autopilot.checks.resets_jump_counters)
     last = next((k for k, item in enumerate(items) if item.seq == itinerary.stops[-1].item), -1)
     end = items[last]
-    if itinerary.endless >= 0 or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
+    if itinerary.endless_jump >= 0 or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
         return []
     behind = itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[last + 1 :])
     unreached = [item for item in behind if item.seq in itinerary.unreached and is_navigation(item.command)]
@@ -311,7 +311,7 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
         if support.px4 == Treatment.REFUSED:
             arduplane_accepts = support.arduplane != Treatment.REFUSED
             autopilot = "ArduPlane accepts it" if arduplane_accepts else "ArduPlane rejects it, too"
-            autopilot = "ArduPlane skips it" if support.reason == PASSED_OVER else autopilot
+            autopilot = "ArduPlane skips it" if support.reason == SKIPPED_REASON else autopilot
             yield REFUSED if arduplane_accepts else False, item.seq, f"unsupported command {name}; {autopilot}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (

@@ -14,8 +14,8 @@ import numpy as np
 
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.mission.items import Command
-from flight.mission.itinerary import UNLIMITED
-from flight.mission.return_path import RETURN_NOT_FLOWN_ON
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
+from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
 from logs.verdict.measures.mission_ends import returns_after_last_item
@@ -60,7 +60,7 @@ def return_findings(
     if requirements.setup.source is None:
         return []
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
-    goes_on_to_land = requirements.setup.route.return_until <= requirements.legs
+    goes_on_to_land = requirements.setup.route.rtl_end <= requirements.legs
     return _flown_rtl_findings(
         requirements,
         has_passed_end
@@ -203,9 +203,9 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
     """Return True if a track contains at least one lap of the RTL loiter and the loiter's full duration.
 
     The time starts when the aircraft is near the center and at the loiter's altitude, as for a simulated flight
-    (`flight.simulation.tick.end_return`).
+    (`flight.simulation.tick.update_rtl_loiter`).
     """
-    loiter = requirements.setup.route.return_to
+    loiter = requirements.setup.route.rtl_loiter
     if loiter is None:
         return False
     track = aligned.track
@@ -220,7 +220,7 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
     first = int(np.argmax(at_loiter))
     bearing = np.unwrap(np.arctan2(east[first:], north[first:]))
     has_circled = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
-    return has_circled and float(track.time[-1] - track.time[first]) >= UNLIMITED
+    return has_circled and float(track.time[-1] - track.time[first]) >= ENDLESS_LOITER_TIME_S
 
 
 def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
@@ -239,12 +239,12 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     outcome: text on how far the RTL was flown.
     """
     route = requirements.setup.route
-    if route.return_from < 0:
+    if route.rtl_start < 0:
         return []
     name = f"{Command.NAV_RETURN_TO_LAUNCH.name}: "
     note_text = next((note.partition(name)[2] for note in route.notes if name in note), "")
     reason = f"by the simulated {requirements.setup.autopilot.title}: {note_text}; {outcome}"
-    unknown_reason = next((note.partition(": ")[2] for note in route.notes if RETURN_NOT_FLOWN_ON in note), "")
+    unknown_reason = next((note.partition(": ")[2] for note in route.notes if RTL_NOT_CONTINUED_TEXT in note), "")
     faults = []
     if unknown_reason and requirements.setup.source is None:
         # The path flown instead does not show where the autopilot flies.
@@ -253,7 +253,7 @@ def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str
     return [
         make_finding(
             "return",
-            requirements.waypoint(route.return_from + 1),
+            requirements.waypoint(route.rtl_start + 1),
             ok=ok,
             reason=reason,
             faults=faults,
@@ -270,11 +270,11 @@ def without_path_following_findings(
 
     findings: all findings, including the finding on the RTL itself.
     """
-    first_leg = requirements.setup.route.return_from
+    first_leg = requirements.setup.route.rtl_start
     if first_leg < 0:
         return tuple(findings)
     # The corner where the return begins belongs to the return; the waypoint there belongs to the mission.
-    end_waypoint = requirements.setup.route.return_until
+    end_waypoint = requirements.setup.route.rtl_end
     legs = range(first_leg, min(end_waypoint, requirements.legs))
     return_points = {requirements.waypoint(i) for i in range(first_leg + 1, min(end_waypoint, requirements.legs + 1))}
     return_points |= {requirements.leg(i) for i in legs}

@@ -10,7 +10,7 @@ undecided.
 import math
 
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
-from flight.mission.return_path import RETURN_NOT_FLOWN_ON
+from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
 from logs.verdict.findings import GROUND_PATH, Finding, make_finding, message
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -102,13 +102,13 @@ def landing_findings(
             return []
         reason = f"{command_name(items[-1].command)} has no position of its own on the route"
         route = requirements.setup.route
-        if route.return_from >= 0:
-            reason = RETURN_NOT_FLOWN_ON
+        if route.rtl_start >= 0:
+            reason = RTL_NOT_CONTINUED_TEXT
         end_waypoint, return_flown_on = (
             requirements.waypoint(requirements.legs),
-            RETURN_NOT_FLOWN_ON in " ".join(route.notes),
+            RTL_NOT_CONTINUED_TEXT in " ".join(route.notes),
         )
-        if route.return_from >= 0 and not return_flown_on:
+        if route.rtl_start >= 0 and not return_flown_on:
             # The return ends the mission; the landing after it is not flown.
             return [make_finding("landing", end_waypoint, ok=None, reason=reason, unit="deg")]
         return [_unjudged_finding("landing", end_waypoint, reason)]

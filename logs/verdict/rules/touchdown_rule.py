@@ -115,8 +115,8 @@ def _measure_landing(
 ) -> _Landing:
     """Measure a landing that touches down at row `touchdown_row`; the field `point_height` stays unset."""
     position = np.asarray(track.position, dtype=np.float64)
-    along, lateral_offset = _as_floats(approach.place(position[touchdown_row]))
-    touch, stop = (_as_floats(approach.on_strip(position[row])) for row in (touchdown_row, -1))
+    along, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
+    touch, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))
     sink, ground_sink = _sink_rates(track, terrain, approach, touchdown_row)
     return _Landing(
         along=along,
@@ -212,7 +212,7 @@ def _final_clearance(requirements: RouteRequirements, position: Floats, terrain:
         approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
     )
     flare_distance = glide.flare_distance + max(0.0, FLARE_HEIGHT_MARGIN_M - glide.flare_height) / glide.slope
-    is_near = approach.place(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flare_distance)
+    is_near = approach.distances_from_landing_point(position)[0] > -max(EARLY_TOUCHDOWN_DISTANCE_M, flare_distance)
     end_row = int(np.argmax(is_near)) if is_near.any() else len(position)
     if end_row < 2:
         return math.inf

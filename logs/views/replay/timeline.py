@@ -157,9 +157,7 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
         if len(group) > 1:
             item, radius = int(route.items[leg]), route.arcs[leg]
             item_text = (
-                f"return of item {item}"
-                if 0 <= route.return_from <= leg < route.return_until
-                else f"loiter of item {item}"
+                f"return of item {item}" if 0 <= route.rtl_start <= leg < route.rtl_end else f"loiter of item {item}"
             )
             text = f"{item_text}: leg {route.leg_numbers[leg]} goes on around its circle, radius {radius:.0f} m"
             entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
-from flight.guidance.navigation_error import ERRORS, MOTION, NAVIGATION_LAGS, navigate, start_navigation
+from flight.guidance.navigation_error import ERRORS, MOTION, NAVIGATION_LAGS, estimate_motion, start_navigation
 from flight.simulation.simulate import Flight, fly_to_end
 from tests.setups import MakeSetup
 from tests.soak import scaled
@@ -23,7 +23,7 @@ def test_navigation_errors_have_their_size_and_their_rate() -> None:
         found = np.empty((count, 6))
         noise = random.standard_normal((count, 3))
         for k in range(count):
-            navigate(true, estimated, lags, noise[k], sigma, time_constant, dt)
+            estimate_motion(true, estimated, lags, noise[k], sigma, time_constant, dt)
             found[k] = estimated.tolist()
         assert np.sqrt((found[:, :3] ** 2).mean()) == pytest.approx(sigma, rel=0.25)
         # Of this process the rate's deviation is sigma / T, and the velocity's error is the rate of the position's.

@@ -20,7 +20,7 @@ from flight.guidance.path import (
     arc_point,
     fly_by_path,
     mean_curvature,
-    profile,
+    profile_at,
     project,
     waypoint_records,
 )
@@ -117,7 +117,7 @@ def _smooth_profile(path: FlyByPath) -> None:
     """Height and slope have no step."""
     nodes = path.nodes
     at = np.linspace(0.0, path.length, 1500)
-    height, slope, _ = np.array([profile(nodes, float(s)) for s in at]).T
+    height, slope, _ = np.array([profile_at(nodes, float(s)) for s in at]).T
     step = at[1]
     slopes, half = nodes["slope"], nodes["half_length"]
     change = np.abs(np.diff(slopes, prepend=slopes[0]))
@@ -171,8 +171,8 @@ def test_any_route_with_long_legs_is_whole_smooth_and_at_the_bank_limit(make_set
     ]
     assert 1 / np.abs(arcs["curvature"]) == pytest.approx(wanted, rel=1e-6)
     # The profile meets the ends, and each corner's height halfway on its arc but for the arc's own blend.
-    assert profile(path.nodes, 0.0)[0] == pytest.approx(points[0][2])
-    assert profile(path.nodes, path.length)[0] == pytest.approx(points[-1][2], abs=1e-6)
+    assert profile_at(path.nodes, 0.0)[0] == pytest.approx(points[0][2])
+    assert profile_at(path.nodes, path.length)[0] == pytest.approx(points[-1][2], abs=1e-6)
 
 
 @settings(deadline=None, max_examples=scaled(40, 20), suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -213,7 +213,7 @@ def test_collinear_u_turn_and_fly_over(make_setup: MakeSetup) -> None:
     _whole(path, straight)
     assert len(path.pieces) == 2
     assert not path.pieces["curvature"].any()
-    assert profile(path.nodes, 700.0)[0] == pytest.approx(550.0, abs=3.0)
+    assert profile_at(path.nodes, 700.0)[0] == pytest.approx(550.0, abs=3.0)
     _smooth_profile(path)
 
     back = make_setup([[0, 0, 500], [0, 2000, 500], [0, 50, 500]])
@@ -243,7 +243,7 @@ def test_collinear_u_turn_and_fly_over(make_setup: MakeSetup) -> None:
     assert (path.pieces[4].east, path.pieces[4].north) == pytest.approx((RADIUS * (1.0 + math.sqrt(3.0)), 1000.0))
     _whole(path, over)
     # As the reference of an autopilot that turns by a law of its own, the corner stays sharp.
-    sharp = fly_by_path(over.route, over.limits, swing="none")
+    sharp = fly_by_path(over.route, over.limits, fly_over_turn="none")
     assert sharp.pieces["length"][0] == 1000.0
     _whole(sharp, over, corners=1)
 
@@ -275,7 +275,7 @@ def test_one_leg_and_a_leg_of_a_metre(make_setup: MakeSetup) -> None:
 
 def test_slope_blends_take_the_stated_acceleration(make_setup: MakeSetup) -> None:
     setup = make_setup([[0, 0, 500], [0, 2000, 500], [0, 4000, 700]])
-    _, slope, bend = np.array([profile(_path(setup).nodes, float(s)) for s in np.arange(1900.0, 2100.0, 0.5)]).T
+    _, slope, bend = np.array([profile_at(_path(setup).nodes, float(s)) for s in np.arange(1900.0, 2100.0, 0.5)]).T
     assert np.abs(bend).max() * 25.0**2 == pytest.approx(1.0)  # m/s^2
     assert slope[0] == 0.0
     assert slope[-1] == pytest.approx(0.1)
@@ -337,4 +337,4 @@ def test_profile_by_hand() -> None:
         (1101.0, (510.1, 0.1, 0.0)),
         (2500.0, (650.0, 0.1, 0.0)),
     ):
-        assert profile(nodes, s) == pytest.approx(wanted, abs=1e-9)
+        assert profile_at(nodes, s) == pytest.approx(wanted, abs=1e-9)

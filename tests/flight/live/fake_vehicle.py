@@ -5,7 +5,7 @@ import multiprocessing
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.flight_process import JudgeMission, MissionJudged, send_event
-from flight.live.link import EPOCH, Access, Link
+from flight.live.link import SIGNING_EPOCH_S, Access, Link
 from flight.live.station_requests import vehicle_parameters
 from flight.live.telemetry import Snapshot
 from flight.live.vehicle import Standby, Vehicle
@@ -14,7 +14,7 @@ from flight.mission.items import Home
 LOCAL = Access(("127.0.0.1", 0), (("127.0.0.1", 9),))
 HEARTBEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
 KEY = bytes(range(32))
-WALL = EPOCH + 3e8
+WALL = SIGNING_EPOCH_S + 3e8
 
 
 def packed(message: object, system: int = 255, seq: int = 0) -> bytes:

@@ -8,10 +8,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.link import (
-    EPOCH,
     MAX_DATAGRAM_BYTES,
     MAX_PEERS,
-    SILENCE,
+    PEER_TIMEOUT_S,
+    SIGNING_EPOCH_S,
     Access,
     DropCounts,
     Link,
@@ -53,9 +53,9 @@ def test_pymavlink_accepts_our_signatures_and_we_its() -> None:
     """An independent implementation accepts ours, and ours accepts its."""
     ours, theirs = Signing(KEY, 3), mavlink.MAVLink(None, 255, 190)
     theirs.signing.secret_key, theirs.signing.sign_outgoing = KEY, True
-    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - EPOCH) * 1e5)
+    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - SIGNING_EPOCH_S) * 1e5)
     receiver = mavlink.MAVLink(None)
-    receiver.signing.secret_key, receiver.signing.timestamp = KEY, int((WALL - EPOCH) * 1e5)
+    receiver.signing.secret_key, receiver.signing.timestamp = KEY, int((WALL - SIGNING_EPOCH_S) * 1e5)
     message = receiver.decode(bytearray(ours.sign(packed(HEARTBEAT, 1), WALL)))
     assert message.get_type() == "HEARTBEAT"
     assert message.get_signed()
@@ -69,7 +69,7 @@ def test_a_vehicle_started_anew_after_its_clock_was_set_back_is_heard() -> None:
     """pymavlink, which ran on, drops its first frame as old; then it goes on from the station's time."""
     theirs = mavlink.MAVLink(None, 255, 190)
     theirs.signing.secret_key, theirs.signing.sign_outgoing = KEY, True
-    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - EPOCH) * 1e5)
+    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - SIGNING_EPOCH_S) * 1e5)
     assert theirs.decode(bytearray(Signing(KEY).sign(packed(HEARTBEAT, 1), WALL + 10.0))).get_signed()
     anew, back = Signing(KEY), WALL - 3600.0
     with pytest.raises(mavlink.MAVError, match="signature"):
@@ -166,7 +166,7 @@ def test_our_timestamps_never_overflow_their_six_bytes() -> None:
     """In the year 2104 and long after it frames are still signed, so that pymavlink can check them."""
     ours, receiver = Signing(KEY), mavlink.MAVLink(None)
     receiver.signing.secret_key = KEY
-    last = EPOCH + 2**48 / 1e5
+    last = SIGNING_EPOCH_S + 2**48 / 1e5
     assert receiver.decode(bytearray(ours.sign(packed(HEARTBEAT, 1), last - 1.0))).get_signed()
     for wall in (last, last + 1.0, 1e11, 1e18):
         assert ours.sign(packed(HEARTBEAT, 1), wall)[-12:-6] == bytes([0xFF] * 6)
@@ -246,7 +246,7 @@ def test_who_asks_the_vehicle_on_this_machine_needs_no_heartbeat(link: Link) -> 
         assert [message.get_type() for message, _ in link.decode_datagram(ask, ("127.0.0.1", 6))] == [
             "MISSION_REQUEST_LIST"
         ]
-        link.clock.now += 0.6 * SILENCE
+        link.clock.now += 0.6 * PEER_TIMEOUT_S
     assert list(link.peers) == [("127.0.0.1", 6)]
 
 
@@ -254,7 +254,7 @@ def test_the_table_of_stations_is_bounded_and_forgets(link: Link) -> None:
     for port in range(1000):
         link.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", port))
     assert len(link.peers) == MAX_PEERS
-    link.clock.now += SILENCE + 1.0
+    link.clock.now += PEER_TIMEOUT_S + 1.0
     link.decode_datagram(packed(HEARTBEAT), ("127.0.0.1", 5000))
     assert list(link.peers) == [("127.0.0.1", 5000)]
 
@@ -270,7 +270,7 @@ def test_a_sleeping_laptop_loses_no_station_and_none_of_its_wishes() -> None:
         made.remove_silent_peers()
         assert made.peers["127.0.0.1", 5].periods["ATTITUDE"] == 0.02
         # Awake and silent it is forgotten as ever.
-        for _ in range(int(SILENCE)):
+        for _ in range(int(PEER_TIMEOUT_S)):
             real.now += 1.0
             made.remove_silent_peers()
         assert made.peers == {}
@@ -285,7 +285,7 @@ def test_a_clock_set_back_cuts_no_signed_link() -> None:
     station.settimeout(1.0)
     theirs = mavlink.MAVLink(None, 255, 190)
     theirs.signing.secret_key, theirs.signing.sign_outgoing = KEY, True
-    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - EPOCH) * 1e5)
+    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - SIGNING_EPOCH_S) * 1e5)
     wall = Clock()
     made = Link(Access(("127.0.0.1", 0), (station.getsockname(),), key=KEY), Clock(), wall)
     try:

@@ -6,11 +6,11 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.mission_server import (
-    CONFIRM,
-    CONFIRMATIONS,
-    LOCK,
-    MAX_UPLOADED,
-    UPLOAD_TIMEOUT,
+    CONFIRMATION_COUNT,
+    CONFIRMATION_PERIOD_S,
+    LOCK_TIMEOUT_S,
+    MAX_UPLOADED_ITEMS,
+    UPLOAD_TIMEOUT_S,
     MissionServer,
     MissionType,
     Station,
@@ -168,15 +168,15 @@ def test_half_an_upload_changes_nothing_and_the_lock_expires() -> None:
     before = server.lists[MissionType.MISSION]
     send(server, mavlink.MAVLink_mission_count_message(1, 1, 9, 0), ONE, 10.0)
     send(server, item(0, 1, 1, 5.0), ONE, 10.0)
-    denied = send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), TWO, 10.0 + 0.9 * LOCK)
+    denied = send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), TWO, 10.0 + 0.9 * LOCK_TIMEOUT_S)
     assert denied[0].message.type == mavlink.MAV_MISSION_DENIED
     assert "system 255" in denied[0].text
     assert server.lists[MissionType.MISSION] == before
-    taken = send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), TWO, 10.0 + 1.1 * LOCK)
+    taken = send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), TWO, 10.0 + 1.1 * LOCK_TIMEOUT_S)
     assert taken[0].message.get_type() == "MISSION_REQUEST_INT"
-    late = 10.0 + 1.1 * LOCK + UPLOAD_TIMEOUT + 0.1
+    late = 10.0 + 1.1 * LOCK_TIMEOUT_S + UPLOAD_TIMEOUT_S + 0.1
     assert server.tick(late)[0].message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED
-    assert server.tick(late + 2.0 * UPLOAD_TIMEOUT) == []  # no upload is in progress any longer
+    assert server.tick(late + 2.0 * UPLOAD_TIMEOUT_S) == []  # no upload is in progress any longer
     assert server.lists[MissionType.MISSION] == before
 
 
@@ -236,8 +236,8 @@ def test_only_a_station_on_a_bad_link_that_is_silent_is_asked_again() -> None:
     assert confirmations(server, 11.2) == 0
     upload(server, items, 20.0, late=0.06)
     # Within the 2.5 s that MAVSDK waits.
-    assert confirmations(server, 20.2) == CONFIRMATIONS
-    assert CONFIRMATIONS * CONFIRM < 2.5
+    assert confirmations(server, 20.2) == CONFIRMATION_COUNT
+    assert CONFIRMATION_COUNT * CONFIRMATION_PERIOD_S < 2.5
 
 
 def test_a_duplicate_of_the_last_item_gets_no_second_ack() -> None:
@@ -340,7 +340,7 @@ def test_a_locked_or_too_large_upload_is_denied() -> None:
         send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 2), ONE, 9.0)[0].message.get_type().endswith("INT")
     )
     server.locked = ""
-    big = send(server, mavlink.MAVLink_mission_count_message(1, 1, MAX_UPLOADED + 1, 0), ONE, 20.0)
+    big = send(server, mavlink.MAVLink_mission_count_message(1, 1, MAX_UPLOADED_ITEMS + 1, 0), ONE, 20.0)
     assert big[0].message.type == mavlink.MAV_MISSION_NO_SPACE
     assert len(server.lists[MissionType.MISSION]) == 3
     assert send(server, mavlink.MAVLink_mission_clear_all_message(1, 1, 255), ONE, 40.0)[0].message.type == 0

@@ -65,13 +65,13 @@ def test_a_jump_to_what_is_deleted_leads_to_what_follows() -> None:
 
 
 def test_two_places_are_kept() -> None:
-    with pytest.raises(MissionError, match="at least two places"):
+    with pytest.raises(MissionError, match="at least two positions"):
         edits.delete_item(mission(item(1), item(2)), 0)
 
 
 @pytest.mark.parametrize(
     ("index", "words"),
-    [(3, "item 4: 177: expected a command with a place on the map"), (9, "expected 0..5"), (-1, "expected 0..5")],
+    [(3, "item 4: 177: expected a command with a position"), (9, "expected 0..5"), (-1, "expected 0..5")],
 )
 def test_what_is_no_place_is_not_moved(index: int, words: str) -> None:
     with pytest.raises(MissionError, match=words):
@@ -98,6 +98,6 @@ def test_the_last_leg_needs_no_speed_after_it() -> None:
 
 
 def test_a_mission_has_its_most_items() -> None:
-    full = mission(*(item(k) for k in range(1, edits.MAX_EDITED + 1)))
+    full = mission(*(item(k) for k in range(1, edits.MAX_EDITED_ITEMS + 1)))
     with pytest.raises(MissionError, match="the most that can be edited"):
         edits.insert_waypoint(full, 0, 46.0, 8.0)

@@ -55,7 +55,7 @@ def test_the_landing_is_that_of_the_last_leg_and_its_wind() -> None:
     assert approach.length == pytest.approx(600.0, abs=0.05)
     # From 60 degrees at 5 m/s, to the west: cos 30 of it from behind.
     assert approach.tail_wind == pytest.approx(4.33, abs=0.01)
-    along, aside = approach.place(np.array([[450.0, 610.0, 0.0], [520.0, 595.0, 0.0]]))
+    along, aside = approach.distances_from_landing_point(np.array([[450.0, 610.0, 0.0], [520.0, 595.0, 0.0]]))
     assert along == pytest.approx([50.0, -20.0], abs=0.1)
     assert aside == pytest.approx([10.0, -5.0], abs=0.1)
 
@@ -80,7 +80,7 @@ def test_what_a_mission_does_not_hold_is_not_flown_and_says_why() -> None:
     assert no_landing.approach is None
     assert "a NAV_LAND at a third" in no_landing.notes[0]
     low = with_items(setup, takeoff, *way[:-1], replace(way[-1], alt=-5.0), land)
-    assert "no higher than the landing point" in low.ground_phases.notes[0]
+    assert "does not begin above the landing point" in low.ground_phases.notes[0]
     homeless = make_ground_setup(setup.scenario, Mission(None, setup.mission.items))
     assert homeless.ground_phases.take_off is None
 

@@ -37,7 +37,7 @@ LEGS = {
 
 def _legs(route: Route) -> int:
     """Legs with all that stands for a way back counted as one."""
-    return route.legs if route.return_from < 0 else route.return_from + 1
+    return route.legs if route.rtl_start < 0 else route.rtl_start + 1
 
 
 # Those that need ground to count heights from.
@@ -54,7 +54,7 @@ def test_samples_fly_over_the_tile(name: str) -> None:
     assert _legs(flown) == legs
     assert [item for item, _ in groupby(flown.items.tolist())] == items
     # A way back is drawn as it is flown: its turns begin at the last place of the mission, and it comes down.
-    last = None if flown.return_from < 0 else flown.return_from + 1
+    last = None if flown.rtl_start < 0 else flown.rtl_start + 1
     there, circling = flown.waypoints[:last], flown.arcs[:last] > 0.0
     assert leg_runs(there)[~(circling[1:] | circling[:-1])].min() >= 600.0
     assert np.degrees(turning_angles(flown.waypoints)).max() < 105.0

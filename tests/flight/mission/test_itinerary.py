@@ -136,7 +136,7 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 2, 3, 2, 3]
     assert endless.notes == ("item 4: DO_JUMP has no end: it is flown once, and the flight ends there",)
-    assert (endless.endless, route(*corners, "2 177 2 2 0 0 0 0 0").endless) == (4, -1)
+    assert (endless.endless_jump, route(*corners, "2 177 2 2 0 0 0 0 0").endless_jump) == (4, -1)
     # What follows a jump without end is never flown.
     beyond = route(*corners, "2 177 2 -1 0 0 0 0 0", wp(0, 0))
     assert beyond.items.tolist() == [1, 2, 3, 2, 3]
@@ -178,14 +178,14 @@ def test_a_jump_flies_its_body_once_more_each_time(corners: int, repeats: int) -
 def test_jumps_to_nowhere_or_too_often_are_refused() -> None:
     assert "item 3: DO_JUMP p1 9: the mission has no item 9" in refusal(wp(0, 0), wp(0, 900), "2 177 9 1 0 0 0 0 0")
     assert "DO_JUMP p1 0" in refusal(wp(0, 0), wp(0, 900), "2 177 0 1 0 0 0 0 0")
-    assert "more than 10,000 places" in refusal(wp(0, 0), wp(0, 900), "2 177 1 9999 0 0 0 0 0")
+    assert "more than 10,000 positions to fly to" in refusal(wp(0, 0), wp(0, 900), "2 177 1 9999 0 0 0 0 0")
     assert "more than 200,000 items" in refusal(wp(0, 0), wp(0, 900), "2 177 3 999999 0 0 0 0 0")
 
 
 def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     home = route(wp(0, 500, 150), wp(0, 1500, 200), "0 20 0 0 0 0 0 0 0", wp(5, 5))
     # Home is at 300 m, and 100 m over it is where planfly's guidance comes home.
-    assert (home.return_from, home.return_to) == (1, pytest.approx((0.0, 0.0, 400.0, 80.0, 0.0), abs=0.01))
+    assert (home.rtl_start, home.rtl_loiter) == (1, pytest.approx((0.0, 0.0, 400.0, 80.0, 0.0), abs=0.01))
     assert home.notes == (
         "item 4: never reached",
         "item 3: NAV_RETURN_TO_LAUNCH: to home, 1.5 km away, sinking 100 m on a straight slope to 400 m AMSL;"

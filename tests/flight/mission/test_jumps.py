@@ -154,8 +154,8 @@ def test_a_home_that_is_set_counts_for_the_altitudes_and_the_return_behind_it() 
     made = route(wp(0, 0, 100), wp(0, 900, 100), "2 183 9 1500 0 0 0 0 0", over, wp(900, 900, 100), wp(900, 1800, 100))
     assert heights(made) == [400.0, 400.0, 400.0, 450.0]
     back = route(wp(0, 0, 100), wp(0, 900, 100), moved, "2 20 0 0 0 0 0 0 0")
-    assert back.return_to is not None
-    assert back.return_to[:2] == pytest.approx((600.0, 0.0), abs=0.02)
+    assert back.rtl_loiter is not None
+    assert back.rtl_loiter[:2] == pytest.approx((600.0, 0.0), abs=0.02)
     assert made.open_items == back.open_items == ()
     # PX4 takes no coordinates for it, and where it is flown otherwise the verdict is open.
     by_px4 = make_route(

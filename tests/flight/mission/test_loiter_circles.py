@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from aircraft.catalog import load_aircraft
 from flight.guidance.path import fly_by_path
-from flight.mission.itinerary import UNLIMITED
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.route import Route, RouteRules, make_route
 from flight.simulation.setup import FlightSetup
@@ -91,12 +91,12 @@ def test_loiters_last_as_long_as_asked() -> None:
     assert 90.0 <= abs(circled(timed, 2)[0]) * TURN * 200.0 / 25.0 < 90.0 + TURN * 200.0 / 25.0
     endless = route(wp(0, 0), wp(0, 2000, command=17, p="0 0 -150 0"), wp(3000, 2000))
     assert endless.items[-1] == 2
-    assert circled(endless, 2)[0] * TURN * -150.0 == pytest.approx(UNLIMITED * 25.0)
+    assert circled(endless, 2)[0] * TURN * -150.0 == pytest.approx(ENDLESS_LOITER_TIME_S * 25.0)
     assert any("item 2: NAV_LOITER_UNLIM: flown for 60 s; the mission ends there" in note for note in endless.notes)
     assert any("item 3: never reached" in note for note in endless.notes)
 
 
-def test_to_height_spirals_within_the_envelope() -> None:
+def test_loiter_to_altitude_spirals_within_the_envelope() -> None:
     flown = setup_of(wp(0, 0), wp(0, 1500, 600, command=31, p="1 150 0 0"), wp(3000, 1500, 600)).route
     at = flown.items == 2
     assert flown.waypoints[at, 2][-1] == pytest.approx(900.0, abs=0.01)
@@ -245,7 +245,7 @@ def test_a_loiter_without_a_radius_has_that_of_the_autopilots_parameter() -> Non
 
 def test_the_way_to_a_loiter_to_a_height_is_level_where_the_height_is_held() -> None:
     lines = wp(0, -1500), wp(0, 0, 250, 31, p="0 200 0 0"), wp(1500, 1500, 250)
-    held = laid_for(LoiterRules(holds_height=True, climb=2.5, altitude_tolerance=10.0), *lines)
+    held = laid_for(LoiterRules(holds_height=True, max_climb_rate=2.5, altitude_tolerance=10.0), *lines)
     corners = held.waypoints[held.items == 2, 2]
     assert (corners[0], corners[-1]) == (400.0, 550.0)
     # 140 m at 2.5 m/s and 25 m/s are 1,400 m, 1.11 of its circles.

@@ -62,7 +62,7 @@ def test_a_metre_straight_up_is_a_leg_where_such_legs_are_laid(rise: float, plac
     assert len(stops) == places
     if places == 3:
         # A centimetre on, on the course of the leg before: due north.
-        assert np.subtract(stops[2].place, stops[1].place) == pytest.approx([0.0, 0.01, rise], abs=1e-6)
+        assert np.subtract(stops[2].map_position, stops[1].map_position) == pytest.approx([0.0, 0.01, rise], abs=1e-6)
         with pytest.raises(MissionError, match=r"item 3: 1\.1 m straight above item 2"):
             placed(*lines)
 
@@ -71,7 +71,7 @@ def test_a_metre_straight_up_is_a_leg_where_such_legs_are_laid(rise: float, plac
 def test_heights_are_allowed_from_the_dead_sea_to_beyond_everest(amsl: float, allowed: bool) -> None:
     lines = wp(0, 0, 300, frame=0), wp(0, 900, amsl, frame=0)
     if allowed:
-        assert placed(*lines).stops[1].place[2] == pytest.approx(amsl)
+        assert placed(*lines).stops[1].map_position[2] == pytest.approx(amsl)
     else:
         with pytest.raises(MissionError, match=r"item 2: .* m AMSL: allowed -500\.\.9000"):
             placed(*lines)
@@ -81,4 +81,4 @@ def test_heights_are_allowed_from_the_dead_sea_to_beyond_everest(amsl: float, al
 def test_a_home_thirty_metres_off_the_ground_is_doubted(home_amsl: int, doubted: bool) -> None:
     found = placed(wp(0, 100), wp(0, 900), home=f"36.5 -84.2 {home_amsl}", terrain=ground(300.0))
     assert bool(found.notes) == doubted
-    assert found.stops[0].place[2] == pytest.approx(home_amsl + 100.0)
+    assert found.stops[0].map_position[2] == pytest.approx(home_amsl + 100.0)

@@ -9,7 +9,7 @@ import pytest
 
 from flight.mission.items import Mission
 from flight.mission.preflight_notes import preflight_notes
-from flight.mission.return_path import USUAL_RULES, ReturnRules
+from flight.mission.return_path import DEFAULT_RETURN_RULES, ReturnRules
 from logs.verdict.findings import NOT_FLOWN
 from logs.verdict.rules.mission_rule import mission_findings
 from tests.mission_lines import ORIGIN, setup_of, wp
@@ -30,7 +30,7 @@ def rally(east: float, north: float, alt: float) -> str:
 
 def notes(
     *lines: str,
-    rules: ReturnRules = USUAL_RULES,
+    rules: ReturnRules = DEFAULT_RETURN_RULES,
     parameters: dict[str, float] | None = None,
     home: str = "36.5 -84.2 100",
     ground: Terrain | None = None,
@@ -47,7 +47,7 @@ def landed_on(ground: Terrain | None, wind: Wind, landing: LandingStrip | None =
     """The notes on where `WAY` lands."""
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     scenario = replace(setup.scenario, terrain=ground, wind=wind, landing=landing)
-    found = preflight_notes(setup.mission, setup.route, scenario, USUAL_RULES, {})
+    found = preflight_notes(setup.mission, setup.route, scenario, DEFAULT_RETURN_RULES, {})
     return [one for one in found if ": lands on " in one]
 
 
@@ -66,16 +66,20 @@ def test_a_landing_without_a_strip_tells_its_course_wind_and_ground() -> None:
     """Landed to the east: what rises to the north falls to the right."""
     (said,) = landed_on(sloped(0.03, 0.02), Wind(4.0, math.radians(90.0)))
     assert said == (
-        "item 4: lands on 90°, against 4.0 m/s of wind; over 200 m around its point the ground rises by 3.0% along it, "
-        "and falls by 2.0% to the right; no [landing] states its strip, so touch-down and roll-out are not judged"
+        "item 4: lands on 90°, against 4.0 m/s of wind; over 200 m around the landing point the ground rises by 3.0% "
+        "in the landing direction, and falls by 2.0% to the right; the scenario has no [landing], so touch-down and "
+        "roll-out are not judged"
     )
-    assert "around its point the ground is level; no [landing]" in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
     assert (
-        "the ground rises by 3.0% along it, and is level to the right"
+        "around the landing point the ground is level; the scenario has no [landing]"
+        in landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0))[0]
+    )
+    assert (
+        "the ground rises by 3.0% in the landing direction, and is level to the right"
         in landed_on(sloped(0.03, 0.0), Wind(0.0, 0.0))[0]
     )
     (said,) = landed_on(None, Wind(4.0, math.radians(270.0)))
-    assert "with 4.0 m/s of tailwind; the terrain there is unknown; no [landing]" in said
+    assert "with 4.0 m/s of tailwind; the terrain there is unknown; the scenario has no [landing]" in said
     assert landed_on(sloped(0.0, 0.0), Wind(0.0, 0.0), LandingStrip(2500.0, 2000.0)) == []
 
 
@@ -129,16 +133,14 @@ def _home(east: float, north: float) -> str:
 def test_a_rally_point_in_the_ground(alt: float, told: bool) -> None:
     found = notes(*WAY, rally(300, 300, alt))
     assert bool(found) is told
-    assert all(one.startswith("rally point 1 is 0 m under the ground there: 100 m AMSL") for one in found)
+    assert all(one.startswith("rally point 1 is 0 m below the ground: 100 m AMSL") for one in found)
 
 
 @pytest.mark.parametrize(("east", "told"), [(-4990.0, False), (-5010.0, True)])
 def test_a_rally_point_that_no_return_flies_to(east: float, told: bool) -> None:
     found = notes(*WAY, rally(east, 1000, 100), rules=ReturnRules(rally_limit=5000.0))
     assert bool(found) is told
-    assert all(
-        "5.0 km from the mission or more, beyond RALLY_LIMIT_KM 5: no return flies to it" in one for one in found
-    )
+    assert all("at least 5.0 km from the mission, beyond RALLY_LIMIT_KM 5: no RTL flies to it" in one for one in found)
     # Without a limit none is too far.
     assert notes(*WAY, rally(east, 1000, 100), rules=ReturnRules(rally_limit=0.0)) == []
 
@@ -159,7 +161,10 @@ def hill(north: float, top: float) -> Terrain:
 def test_a_return_below_the_hills_about_home(north: float, top: float, told: bool) -> None:
     found = notes(*WAY, rules=ReturnRules(height=80.0), ground=hill(north, top))
     assert bool(found) is told
-    assert all(one.startswith("a return circles home 80 m over it, and the ground there is 8") for one in found)
+    assert all(
+        one.startswith("an RTL loiters 80 m above home, and within 260 m of home the ground rises to 8")
+        for one in found
+    )
 
 
 @pytest.mark.parametrize(("value", "told"), [(0.0, True), (1.0, False), (None, False)])

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Command
-from flight.mission.itinerary import UNLIMITED, RoutePoint
+from flight.mission.itinerary import ENDLESS_LOITER_TIME_S, RoutePoint
 from flight.mission.return_path import (
-    USUAL_RULES,
+    DEFAULT_RETURN_RULES,
     ReturnAbility,
     ReturnPoint,
     ReturnRules,
@@ -74,18 +74,18 @@ def test_why_it_goes_there_is_said() -> None:
         " 1.9), sinking 500 m on a straight slope to 400 m AMSL; circles for 60 s; the mission ends there"
     )
     climb = choose_target(ReturnRules(includes_home=True), (0.0, 1500.0, 380.0), HOME, RALLY)
-    told = rtl_note(climb, ReturnRules(climb_first=50.0), 380.0)
+    told = rtl_note(climb, ReturnRules(initial_climb=50.0), 380.0)
     assert "nearer than rally point 1, which is 2.5 km away (RALLY_INCL_HOME 1)" in told
     first = "banks no more than 5 degrees before it has climbed 50 m, even above that height;"
     assert f"climbing 20 m at once to 400 m AMSL; {first}" in told
     assert f"sinking 500 m on a straight slope to 400 m AMSL; {first}" in rtl_note(
-        climb, ReturnRules(climb_first=50.0), 900.0
+        climb, ReturnRules(initial_climb=50.0), 900.0
     )
-    assert "before it has climbed 20 m" in rtl_note(climb, ReturnRules(climb_first=math.inf), 380.0)
-    assert "banks" not in rtl_note(far, ReturnRules(climb_first=math.inf), 900.0)
+    assert "before it has climbed 20 m" in rtl_note(climb, ReturnRules(initial_climb=math.inf), 380.0)
+    assert "banks" not in rtl_note(far, ReturnRules(initial_climb=math.inf), 900.0)
     # At its height already, give or take what a height is known to: how long it banks little is anybody's guess.
     for up in (399.6, 400.0, 400.4):
-        level = rtl_note(climb, ReturnRules(climb_first=math.inf), up)
+        level = rtl_note(climb, ReturnRules(initial_climb=math.inf), up)
         assert "at 400 m AMSL; banks no more than 5 degrees until it is above that height;" in level
 
 
@@ -94,7 +94,7 @@ def test_why_it_goes_there_is_said() -> None:
 
 
 def laid(
-    course: float, target: tuple[float, float, float], rules: ReturnRules = USUAL_RULES, base: float = 0.0
+    course: float, target: tuple[float, float, float], rules: ReturnRules = DEFAULT_RETURN_RULES, base: float = 0.0
 ) -> tuple[np.ndarray, np.ndarray]:
     """Waypoints (n, 3) from 500 m up at the origin, flown to on a course (degrees), and their arcs (n,)."""
     back = math.radians(course)
@@ -104,7 +104,7 @@ def laid(
     ]
     there = ReturnTarget(target, "home", "", math.hypot(*target[:2]), base)
     points = rtl_waypoints(before, STOP, there, rules, ABLE)
-    return np.array([(0.0, 0.0, 500.0), *(p.place for p in points)]), np.array([0.0, *(p.arc for p in points)])
+    return np.array([(0.0, 0.0, 500.0), *(p.map_position for p in points)]), np.array([0.0, *(p.arc for p in points)])
 
 
 @pytest.mark.parametrize("course", [-170.0, -90.0, -30.0, -2.0, 0.0, 2.0, 30.0, 90.0, 170.0])
@@ -126,7 +126,7 @@ def test_the_turn_goes_the_short_way_and_touches_both_ends(course: float) -> Non
     assert np.allclose(out * math.cos(math.radians(22.5)), 120.0, rtol=0.02)
     around = np.diff(np.unwrap(np.arctan2(circle[:, 0], circle[:, 1] - 8000.0)))
     assert (around > 0.0).all()
-    assert around.sum() * 120.0 == pytest.approx(UNLIMITED * 25.0, rel=0.08)
+    assert around.sum() * 120.0 == pytest.approx(ENDLESS_LOITER_TIME_S * 25.0, rel=0.08)
 
 
 def test_a_radius_below_the_aircrafts_is_flown_as_its_own_and_to_its_side() -> None:
@@ -150,7 +150,7 @@ def test_a_descent_is_straight_in_distance_and_no_steeper_than_can_be_flown() ->
     assert way[-1, 2] == 100.0
     assert (np.diff(way[:, 2]) <= 0.0).all()
     # A sink rate of 1 m/s at 25 m/s is 0.04.
-    slow, _ = laid(0.0, (0.0, 2000.0, 100.0), ReturnRules(sink=1.0))
+    slow, _ = laid(0.0, (0.0, 2000.0, 100.0), ReturnRules(max_sink_rate=1.0))
     assert (-np.diff(slow[:, 2]) <= 0.04 * np.hypot(*np.diff(slow[:, :2], axis=0).T) + 1e-9).all()
 
 
@@ -179,7 +179,7 @@ def test_the_slope_to_a_rally_point_holds_the_height_first() -> None:
 def test_a_climb_before_the_turn_is_a_wide_arc() -> None:
     wide = 100.0 * math.tan(math.radians(30.0)) / math.tan(math.radians(5.0))
     # 30 m at a slope of 0.1: 300 m of it.
-    way, arcs = laid(180.0, (0.0, 8000.0, 700.0), ReturnRules(climb_first=30.0))
+    way, arcs = laid(180.0, (0.0, 8000.0, 700.0), ReturnRules(initial_climb=30.0))
     gentle = np.isclose(arcs, wide)
     assert gentle.any()
     end = int(np.flatnonzero(gentle)[-1]) + 1
@@ -187,16 +187,16 @@ def test_a_climb_before_the_turn_is_a_wide_arc() -> None:
     assert angle * wide == pytest.approx(300.0, abs=1.0)
     assert (arcs == 100.0).any()
     # All that is missing, 200 m, is 2 km of it: most of the turn.
-    assert not (laid(90.0, (0.0, 8000.0, 700.0), ReturnRules(climb_first=math.inf))[1] == 100.0).any()
+    assert not (laid(90.0, (0.0, 8000.0, 700.0), ReturnRules(initial_climb=math.inf))[1] == 100.0).any()
     # Nothing is climbed on the way down to a height that is below already.
-    assert not np.isclose(laid(90.0, (0.0, 8000.0, 300.0), ReturnRules(climb_first=math.inf))[1], wide).any()
+    assert not np.isclose(laid(90.0, (0.0, 8000.0, 300.0), ReturnRules(initial_climb=math.inf))[1], wide).any()
 
 
 @pytest.mark.parametrize("target", [510.0, 300.0])
 @pytest.mark.parametrize("course", [90.0, 3.0])
 def test_a_climb_before_the_turn_is_flown_to_a_lower_target_too(course: float, target: float) -> None:
     """ArduPlane demands RTL_CLIMB_MIN and 10 m above its start (`Plane::update_alt`), and turns from there as usual."""
-    way, arcs = laid(course, (0.0, 8000.0, target), ReturnRules(climb_first=30.0))
+    way, arcs = laid(course, (0.0, 8000.0, target), ReturnRules(initial_climb=30.0))
     flown = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))])
     top = int(np.argmax(way[:, 2]))
     assert way[top, 2] == pytest.approx(530.0, abs=0.1)
@@ -228,7 +228,11 @@ def test_a_small_fall_is_a_step_at_once() -> None:
     assert down[1] == pytest.approx(14.0 / 0.08, abs=20.0)
     # What counts is the slope that is drawn.
     lower = ReturnRules(min_slope_height=10.0)
-    for up, rules, base in ((484.0, USUAL_RULES, 0.0), (486.0, lower, 0.0), (486.0, USUAL_RULES, 5.0)):
+    for up, rules, base in (
+        (484.0, DEFAULT_RETURN_RULES, 0.0),
+        (486.0, lower, 0.0),
+        (486.0, DEFAULT_RETURN_RULES, 5.0),
+    ):
         slope, _ = laid(0.0, (0.0, 8000.0, up), rules, base)
         assert not ((slope[:, 1] < 7000.0) & (slope[:, 2] < up + 2.0)).any()
     step = choose_target(ReturnRules(), (0.0, 6000.0, 414.0), HOME, [])
@@ -249,9 +253,9 @@ RTL = "0 20 0 0 0 0 0 0 0"
 
 def test_a_route_goes_back_where_its_rules_say() -> None:
     flown = route(wp(0, 3000, 400), wp(2000, 3000, 400), RTL)
-    assert (flown.return_from, flown.items.tolist()[:3]) == (1, [1, 2, 3])
-    assert flown.return_to is not None
-    assert flown.return_to[:4] == pytest.approx((0.0, 0.0, 400.0, 80.0), abs=0.01)
+    assert (flown.rtl_start, flown.items.tolist()[:3]) == (1, [1, 2, 3])
+    assert flown.rtl_loiter is not None
+    assert flown.rtl_loiter[:4] == pytest.approx((0.0, 0.0, 400.0, 80.0), abs=0.01)
     assert flown.waypoints[-1, 2] == pytest.approx(400.0, abs=0.01)
 
 
@@ -272,7 +276,7 @@ def test_a_speed_that_was_set_does_not_count_on_the_way_back() -> None:
 
 def test_a_return_from_over_home_is_flown() -> None:
     flown = route(wp(0, 0, 300), wp(0, 900, 300), wp(0, 0, 300), RTL)
-    assert flown.return_from == 2
+    assert flown.rtl_start == 2
     assert flown.waypoints[-1, 2] == pytest.approx(400.0, abs=0.01)
 
 
@@ -284,8 +288,8 @@ def test_a_height_that_is_never_flown_is_refused() -> None:
 def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
     rules = ReturnRules(holds_height=True)
     begin = [STOP.at((0.0, 9000.0, 900.0)), STOP.at((0.0, 8000.0, 900.0))]
-    target = choose_target(rules, begin[-1].place, HOME, ())
-    ups = [point.place[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
+    target = choose_target(rules, begin[-1].map_position, HOME, ())
+    ups = [point.map_position[2] for point in rtl_waypoints(begin, STOP, target, rules, ABLE)]
     # Level until the circle about home, down to 100 m over it there.
     assert (ups[0], ups[-1]) == (900.0, 400.0)
     assert rtl_note(target, rules, 900.0).startswith(
@@ -297,7 +301,9 @@ def test_a_return_that_holds_its_height_comes_down_over_its_target() -> None:
 
 def test_a_landing_that_counts_as_a_place_to_return_to_is_noted() -> None:
     lines = wp(0, 3000), wp(2000, 3000), RTL, wp(0, 0, 0, command=21)
-    told = "item 3: the mission's landing is also a place to return to, which is not simulated: the return is to home"
+    told = (
+        "item 3: the autopilot may also return to the mission's landing, which is not simulated: the RTL goes to home"
+    )
 
     def notes(rules: ReturnRules, *items: str) -> tuple[str, ...]:
         return make_route(mission(*items), ORIGIN, None, 25.0, False, rules=RouteRules(rules)).notes

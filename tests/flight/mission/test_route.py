@@ -15,7 +15,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import (
-    END_LEG_LENGTH,
+    END_LEG_LENGTH_M,
     Route,
     RouteRules,
     fly_over_waypoints,
@@ -152,7 +152,7 @@ def test_the_route_starts_on_the_course_far_enough_for_the_turn(turn_deg: float)
     assert float(leg_courses(longer.waypoints)[0]) == pytest.approx(course, abs=1e-4)
     assert longer.waypoints[0, 2] == route.waypoints[0, 2]
     # R = 625 / (9.80665 tan 30) = 110.39 m; the tangent of a sharp turn counts as two radii at most.
-    length = 110.39 * min(math.tan(abs(course) / 2.0), 2.0) + END_LEG_LENGTH
+    length = 110.39 * min(math.tan(abs(course) / 2.0), 2.0) + END_LEG_LENGTH_M
     assert math.dist(longer.waypoints[0], longer.waypoints[1]) == pytest.approx(length, abs=0.1)
     assert longer.items.tolist() == [-1, *route.items.tolist()]
     assert f"from a lead-in leg of {length:.0f} m" in longer.started
@@ -160,10 +160,10 @@ def test_the_route_starts_on_the_course_far_enough_for_the_turn(turn_deg: float)
 
 def test_a_return_stays_where_it_began_behind_a_lead_in_leg() -> None:
     route, scenario = ends(start_course=1.0)
-    back = replace(route, return_from=1, return_to=ReturnCircle(0.0, 0.0, 400.0, 80.0))
+    back = replace(route, rtl_start=1, rtl_loiter=ReturnCircle(0.0, 0.0, 400.0, 80.0))
     longer = with_end_courses(back, scenario, SETUP.limits)
-    assert (longer.return_from, longer.return_to) == (2, back.return_to)
-    assert with_end_courses(route, scenario, SETUP.limits).return_from == -1
+    assert (longer.rtl_start, longer.rtl_loiter) == (2, back.rtl_loiter)
+    assert with_end_courses(route, scenario, SETUP.limits).rtl_start == -1
 
 
 def test_the_route_ends_on_the_course() -> None:
@@ -194,7 +194,7 @@ def test_heights_over_an_unknown_home_count_from_sea_level() -> None:
     scenario = implied_scenario(mission, None).scenario
     route = make_route(mission, scenario.origin, None, 25.0, False)
     assert route.waypoints[0, 2] == mission.items[0].alt
-    assert any("taken from 0 m AMSL" in note for note in route.notes)
+    assert any("measured from 0 m AMSL" in note for note in route.notes)
 
 
 def test_a_route_starts_at_the_first_position_or_over_home() -> None:
@@ -221,7 +221,7 @@ def test_a_take_off_without_home_starts_at_the_first_position() -> None:
     assert flown.items.tolist() == [1, 2]
     assert flown.waypoints[0] == pytest.approx([0.0, 700.0, 380.0], abs=0.01)
     assert "over the first position, as there is no home" in flown.started
-    assert "no home height: taken as the ground at 36.506" in flown.notes[-1]
+    assert "home has no altitude: taken as the ground at 36.506" in flown.notes[-1]
 
 
 def test_heights_of_every_frame_are_amsl() -> None:
@@ -253,14 +253,14 @@ def test_cruise_speed_is_no_command() -> None:
 def test_stops_at_one_position_are_merged() -> None:
     flown = route(wp(0, 0), wp(0, 900), wp(0.3, 900.3), wp(0, 900), wp(900, 900))
     assert flown.items.tolist() == [1, 2, 5]
-    assert flown.notes == ("items 3-4: at the place of item 2: merged with it",)
+    assert flown.notes == ("items 3-4: at the position of item 2: merged with it",)
     assert "item 3: 150.0 m straight above item 2" in refusal(wp(0, 0), wp(0, 900), wp(0, 900, 250), wp(900, 900))
 
 
 def test_refusals_name_the_item() -> None:
     assert "no item has a position" in refusal("2 178 0 25 -1 0 0 0 0")
-    assert "1 place to fly to" in refusal(wp(0, 0))
-    assert "1 place to fly to" in refusal(wp(0, 0), wp(0, 0))
+    assert "1 position to fly to" in refusal(wp(0, 0))
+    assert "1 position to fly to" in refusal(wp(0, 0), wp(0, 0))
     assert "item 1: height above terrain (frame 10): no terrain" in refusal(wp(0, 0, frame=10), wp(0, 900))
     assert "has no data there" in refusal(wp(0, 0), wp(0, 9000, frame=10), terrain=ground())
     assert "item 2: 9400.0 m AMSL: allowed -500..9000" in refusal(wp(0, 0), wp(0, 900, 9100))

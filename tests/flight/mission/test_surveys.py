@@ -530,4 +530,4 @@ def test_a_mission_that_jumps_keeps_its_layout() -> None:
     assert Command.DO_JUMP in {item.command for item in read.items}
     found = find_surveys(route, camera_spacing(read, route))
     assert with_layout(read, route, found[0], SurveyLayout(50.0), ORIGIN) is None
-    assert layout_obstacle(read, route, found[0]) == "the mission jumps"
+    assert layout_obstacle(read, route, found[0]) == "the mission contains jumps"

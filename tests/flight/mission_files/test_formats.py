@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, is_located, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, is_located, round_to_grid
 from flight.mission_files.formats import mission_text, parse_mission, read_mission
 from flight.mission_files.wpl import fence_text, rally_text
 from tests.soak import scaled
@@ -153,8 +153,8 @@ def test_other_readers_get_the_same_integers(mission: Mission, tmp_path_factory:
 
 @given(st.floats(-180.0, 180.0))
 def test_grid_rounds_and_never_truncates(degrees: float) -> None:
-    assert abs(on_grid(degrees) - degrees) <= 0.5e-7 * (1 + 1e-6)
-    assert on_grid(on_grid(degrees)) == on_grid(degrees)
+    assert abs(round_to_grid(degrees) - degrees) <= 0.5e-7 * (1 + 1e-6)
+    assert round_to_grid(round_to_grid(degrees)) == round_to_grid(degrees)
 
 
 def test_what_is_written_to_the_byte() -> None:

@@ -214,7 +214,8 @@ def test_a_height_that_is_counted_from_the_terrain_and_not_calculated_is_above_t
     mission = parse_mission(plan_with(simple(1, 36.4), late, done), "a.plan")
     assert [(item.frame, item.alt) for item in mission.items] == [(3, 100.0), (10, 150.0), (0, 100.0)]
     assert mission.warnings == (
-        "a.plan: mission.items.1: its height is not calculated yet and is taken as 150 m above the terrain there",
+        "a.plan: mission.items.1: QGroundControl has not calculated its altitude: taken as 150 m above the terrain"
+        " there",
     )
 
 

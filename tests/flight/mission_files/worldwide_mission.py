@@ -3,7 +3,7 @@
 import random
 
 from flight.mission.fences import number_items
-from flight.mission.items import Home, Mission, MissionItem, on_grid
+from flight.mission.items import Home, Mission, MissionItem, round_to_grid
 
 
 def some_mission(count: int, seed: int = 1) -> Mission:
@@ -11,7 +11,7 @@ def some_mission(count: int, seed: int = 1) -> Mission:
     dice = random.Random(seed)
     items = []
     for k in range(count):
-        lat, lon = on_grid(dice.uniform(-89.9, 89.9)), on_grid(dice.uniform(-179.9, 179.9))
+        lat, lon = round_to_grid(dice.uniform(-89.9, 89.9)), round_to_grid(dice.uniform(-179.9, 179.9))
         command = dice.choice([16, 16, 16, 17, 18, 19, 31])
         items.append(MissionItem(k + 1, command, 3, (1.0, 30.0, 120.0, 0.0), lat, lon, round(dice.uniform(50, 900), 3)))
     place = [items[0].lat_deg, items[0].lon_deg]

@@ -60,7 +60,7 @@ def test_a_flight_may_take_its_length_at_its_slowest_ground_speed_and_more() -> 
 
 def test_a_return_may_take_five_minutes_more_for_its_circles() -> None:
     setup = MAKE([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]])
-    back = replace(setup, route=replace(setup.route, return_from=0, return_to=ReturnCircle(0.0, 3000.0, 500.0, 80.0)))
+    back = replace(setup, route=replace(setup.route, rtl_start=0, rtl_loiter=ReturnCircle(0.0, 3000.0, 500.0, 80.0)))
     plain, longer = (Gliding(one, AEROSONDE, load_gains(AEROSONDE)) for one in (setup, back))
     assert (longer.max_ticks - plain.max_ticks) * plain.dt == pytest.approx(300.0, abs=1.0)
 
@@ -70,7 +70,7 @@ def test_a_returns_circles_are_as_wide_as_its_height_makes_them() -> None:
     setup, gains = MAKE([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]]), load_gains(AEROSONDE)
     plain = Gliding(setup, AEROSONDE, gains).max_ticks
     low, high = (
-        Gliding(replace(setup, route=replace(setup.route, return_from=0, return_to=circle)), AEROSONDE, gains).max_ticks
+        Gliding(replace(setup, route=replace(setup.route, rtl_start=0, rtl_loiter=circle)), AEROSONDE, gains).max_ticks
         for circle in (ReturnCircle(0.0, 3000.0, up, 2000.0) for up in (0.0, 3000.0))
     )
     assert (high - plain) / (low - plain) == pytest.approx(1.225 / 0.9091, rel=1e-3)

@@ -16,7 +16,7 @@ import pytest
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import BANK_RESERVE, Flight, fly_to_end, join_blocks, make_loop, simulate
+from flight.simulation.simulate import BANK_RESERVE_RAD, Flight, fly_to_end, join_blocks, make_loop, simulate
 from flight.simulation.tick import OUTPUT, READ_FIELDS, Workspace
 from flight.simulation.track import COLUMNS, Track
 from tests.flight.simulation.hand_made import make_workspace
@@ -135,7 +135,7 @@ def test_calm(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     assert set(track.leg.tolist()) == set(range(9))
     assert np.abs(track.airspeed - 25.0).max() < 1.25
     # Guidance may go beyond the planned bank by its reserve, and the roll loop over its command by next to nothing.
-    assert math.degrees(np.abs(track.attitude[:, 0]).max()) < 30.0 + math.degrees(BANK_RESERVE) + 0.5
+    assert math.degrees(np.abs(track.attitude[:, 0]).max()) < 30.0 + math.degrees(BANK_RESERVE_RAD) + 0.5
     assert track.position[-1] == pytest.approx(WAY[-1], abs=1.0)
     assert track.position[0] == pytest.approx(WAY[0], abs=1e-3)
 

@@ -27,8 +27,8 @@ from flight.simulation.tick import (
     READ_FIELDS,
     STALLED,
     Workspace,
-    end_around,
-    end_return,
+    update_end_loiter,
+    update_rtl_loiter,
 )
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE
 from tests.flight.simulation.hand_made import (
@@ -230,7 +230,7 @@ def ended(memory: Record, away: float, up: float, ticks: int = 1, turning: float
     for k in range(ticks):
         motion.east = away * math.sin(math.radians(turning * k))
         motion.north = away * math.cos(math.radians(turning * k))
-        end_return(motion, b, memory, 1.0)
+        update_rtl_loiter(motion, b, memory, 1.0)
     return bool(memory.is_finished)
 
 
@@ -256,7 +256,7 @@ def test_a_mission_that_ends_in_a_circle_ends_once_its_course_has_turned_once_an
             assert not memory.is_finished, second
             motion.velocity_east = 25.0 * math.sin(math.radians(170.0 + turning * second))
             motion.velocity_north = 25.0 * math.cos(math.radians(170.0 + turning * second))
-            end_around(motion, memory, 1.0)
+            update_end_loiter(motion, memory, 1.0)
         # 450 degrees at 10.1 a second, from the second in which it came there.
         assert memory.is_finished
         assert memory.is_in_rtl

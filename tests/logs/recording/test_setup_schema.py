@@ -68,17 +68,17 @@ def test_an_unknown_height_is_null() -> None:
 
 def test_a_return_comes_back_with_its_circle() -> None:
     circle = ReturnCircle(1.5, -2.0, 435.1, -80.0, 335.0)
-    back = replace(SETUP.route, return_from=2, return_to=circle)
+    back = replace(SETUP.route, rtl_start=2, rtl_loiter=circle)
     table = through_json(RouteTable.from_dataclass(back))
     assert table["return_from_waypoint"] == 2
     assert table["return_to_east_north_amsl_radius_slope_base_m"] == [1.5, -2.0, 435.1, -80.0, 335.0]
     made = RouteTable.model_validate(table).route("x")
     same(made, back)
-    assert made.return_to is not None
-    assert made.return_to.radius == -80.0
+    assert made.rtl_loiter is not None
+    assert made.rtl_loiter.radius == -80.0
     # A log of before there were returns says nothing of them.
     old = {key: value for key, value in ROUTE.items() if not key.startswith("return")}
-    assert RouteTable.model_validate(old).route("x").return_from == -1
+    assert RouteTable.model_validate(old).route("x").rtl_start == -1
 
 
 def test_numbers_stand_under_the_unit_that_they_have() -> None:

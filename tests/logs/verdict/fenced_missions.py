@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_grid
 from flight.simulation.setup import FlightSetup
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
@@ -260,7 +260,8 @@ def turned_table(table: dict[str, Any], turn: Floats) -> dict[str, Any]:
 def mission_of(draft: Draft, points: Floats, turn: Floats, origin: GeoOrigin) -> Mission:
     lat, lon = to_geo(origin, points[:, 0], points[:, 1])
     places = [
-        (on_grid(float(a)), on_grid(float(o)), float(up)) for a, o, up in zip(lat, lon, points[:, 2], strict=True)
+        (round_to_grid(float(a)), round_to_grid(float(o)), float(up))
+        for a, o, up in zip(lat, lon, points[:, 2], strict=True)
     ]
     way = draft.items or [(k, Command.NAV_WAYPOINT, ()) for k in range(len(points))]
     items = []
@@ -275,7 +276,9 @@ def mission_of(draft: Draft, points: Floats, turn: Floats, origin: GeoOrigin) ->
         lats, lons = to_geo(origin, easts, norths)
         size = (float(len(polygon)), 0.0, 0.0, 0.0)
         for a, o in zip(lats.tolist(), lons.tolist(), strict=True):
-            fence.append(MissionItem(len(fence), int(command), int(Frame.GLOBAL), size, on_grid(a), on_grid(o), 0.0))
+            fence.append(
+                MissionItem(len(fence), int(command), int(Frame.GLOBAL), size, round_to_grid(a), round_to_grid(o), 0.0)
+            )
     return Mission(None, tuple(items), tuple(fence), source="made mission")
 
 

@@ -32,7 +32,7 @@ NOT_FLYABLE = {"endless.waypoints": "energy", "qgc.waypoints": "mission"}
 OPEN = {
     "mission_planner.waypoints": "the take-off at waypoint 0 (item 1) is not judged",
     "qgc_takeoff.plan": "the take-off climbs 180 m in 800 m, 12.7°",
-    "qgc_amsl.plan": "item 2: NAV_WAYPOINT without a position, which means the place where the aircraft is: not flown",
+    "qgc_amsl.plan": "item 2: NAV_WAYPOINT without a position, which means the aircraft's current position: not flown",
 }
 ABOVE_TERRAIN = {"mavproxy_terrain.txt"}
 # One is flown without terrain, one over it, and in make soak all that can be: their items are flown in tests of
@@ -77,7 +77,7 @@ def flies_all_legs(log: Path, name: str) -> None:
     flown = read_log(log)
     route = flown.setup.route
     # All that stands for a way back counts as one leg.
-    assert (route.legs if route.return_from < 0 else route.return_from + 1) == LEGS[name]
+    assert (route.legs if route.rtl_start < 0 else route.rtl_start + 1) == LEGS[name]
     assert set(np.minimum(flown.track.leg, LEGS[name] - 1)) == set(range(LEGS[name]))
 
 

@@ -5,7 +5,7 @@ from functools import cache
 
 import numpy as np
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from planfly.flight_options import MissionOptions
 from planfly.studio.documents import Document
 from planfly.studio.session import Session
@@ -33,7 +33,7 @@ def draw_mission(rng: np.random.Generator, count: int, scenario: Scenario, *, ju
     here, course = middle + rng.uniform(-0.2, 0.2, 2) * (east - west), rng.uniform(0.0, 2.0 * math.pi)
     base = float(scenario.terrain.height(*middle))
     lat, lon = to_geo(scenario.origin, *middle)
-    home = Home(on_grid(float(lat)), on_grid(float(lon)), round(base, 3))
+    home = Home(round_to_grid(float(lat)), round_to_grid(float(lon)), round(base, 3))
     items: list[MissionItem] = []
     for _ in range(count):
         if items and rng.random() < 0.08:
@@ -50,7 +50,7 @@ def draw_mission(rng: np.random.Generator, count: int, scenario: Scenario, *, ju
         above = float(rng.uniform(90.0, 320.0))
         alt = {Frame.GLOBAL: ground + above, Frame.GLOBAL_RELATIVE_ALT: ground + above - base}.get(frame, above)
         lat, lon = to_geo(scenario.origin, *here)
-        place = on_grid(float(lat)), on_grid(float(lon)), round(alt, 3)
+        place = round_to_grid(float(lat)), round_to_grid(float(lon)), round(alt, 3)
         items.append(MissionItem(len(items) + 1, int(kind), int(frame), params, *place))
         if jumps and len(items) > 4 and rng.random() < 0.04:
             target = float(rng.integers(2, len(items)))

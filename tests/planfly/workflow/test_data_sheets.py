@@ -35,7 +35,7 @@ def foam(tmp_path_factory: pytest.TempPathFactory) -> Aircraft:
 
 def test_the_model_does_what_the_sheet_says(foam: Aircraft) -> None:
     assert {file.name for file in foam.folder.iterdir()} == FILES
-    fdm = Fdm(foam, tried=True)
+    fdm = Fdm(foam, is_tested=True)
     climb, fast, slow = (
         full_throttle_climb(fdm, 15.0, 500.0),
         fastest_level_flight(fdm, 500.0),
@@ -78,7 +78,7 @@ def test_its_intervals_are_those_of_its_draws(foam: Aircraft) -> None:
     draws = read_draws(foam.folder / "draws.csv")
     angles, tops, powers = [], [], []
     for seed in range(40):
-        fdm = Fdm(foam, tried=True, variation=Variation(properties=draws.properties(seed)))
+        fdm = Fdm(foam, is_tested=True, variation=Variation(properties=draws.properties(seed)))
         climb = full_throttle_climb(fdm, 15.0, 500.0)
         assert climb is not None
         angles.append(math.degrees(climb.climb))
@@ -109,7 +109,7 @@ def test_a_stated_climb_is_known_well(tmp_path: Path) -> None:
     climbs = []
     for seed in range(20):
         climb = full_throttle_climb(
-            Fdm(made, tried=True, variation=Variation(properties=draws.properties(seed))), 15.0, 500.0
+            Fdm(made, is_tested=True, variation=Variation(properties=draws.properties(seed))), 15.0, 500.0
         )
         assert climb is not None
         climbs.append(math.degrees(climb.climb))
@@ -141,7 +141,7 @@ def test_parameters_are_data(tmp_path: Path) -> None:
     made = make_data_sheet_folder(tmp_path / "mine", DataSheet(2.1, 1.6, 0.0, 0.0), file)
     assert (made.airspeed, made.stall_speed) == (16.0, 10.0)
     assert math.degrees(made.max_bank) == pytest.approx(30.0)
-    climb = full_throttle_climb(Fdm(made, tried=True), 16.0, 500.0)
+    climb = full_throttle_climb(Fdm(made, is_tested=True), 16.0, 500.0)
     assert climb is not None
     # 4 m/s at 16 m/s.
     assert climb.climb == pytest.approx(math.asin(0.25), abs=math.radians(0.4))
@@ -187,7 +187,7 @@ def test_fuel_and_a_tail(tmp_path: Path) -> None:
     made = make_data_sheet_folder(tmp_path / "petrol", DataSheet(12.0, 2.8, 24.0, 16.0, fuel=1.5))
     assert made.battery_voltage == 0.0
     assert made.battery_energy == pytest.approx(1.5 * 43.5e6)
-    fdm = Fdm(made, tried=True)
+    fdm = Fdm(made, is_tested=True)
     level = steady_flight(fdm, 24.0, 500.0)
     assert level is not None
     fdm.balance(level.vector())

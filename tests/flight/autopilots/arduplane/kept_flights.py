@@ -10,7 +10,7 @@ import numpy as np
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, round_to_grid
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
@@ -80,7 +80,7 @@ class Flown:
 def _item(
     seq: int, command: int, place: tuple[float, float, float], frame: int = 0, radius: float = 0.0
 ) -> MissionItem:
-    lat, lon = (on_grid(float(value)) for value in to_geo(jacksboro().origin, place[0], place[1]))
+    lat, lon = (round_to_grid(float(value)) for value in to_geo(jacksboro().origin, place[0], place[1]))
     return MissionItem(seq, command, frame, (0.0, radius, 0.0, 0.0), lat, lon, place[2])
 
 
@@ -101,7 +101,7 @@ def return_mission(flight: str) -> Mission:
         MissionItem(3, int(Command.NAV_RETURN_TO_LAUNCH), int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0),
     )
     points = [_item(k, Command.NAV_RALLY_POINT, point, 3) for k, point in enumerate(rally(flight))]
-    lat, lon = (on_grid(float(value)) for value in to_geo(jacksboro().origin, *HOME[:2]))
+    lat, lon = (round_to_grid(float(value)) for value in to_geo(jacksboro().origin, *HOME[:2]))
     return Mission(Home(lat, lon, HOME[2]), items, rally=tuple(points), source=f"{flight}.waypoints")
 
 
@@ -128,7 +128,7 @@ def flown_return(flight: str) -> Flown:
 
 
 def _measured(setup: FlightSetup, flight: str, track: Track, ended: str) -> Flown:
-    row, target = KEPT[flight], setup.route.return_to
+    row, target = KEPT[flight], setup.route.rtl_loiter
     assert target is not None
     begin = np.array([float(row["east_m"]), float(row["north_m"])])
     # The first minute holds the way to where it begins.

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flight.autopilots.arduplane.rtl_point_mass import RETURN_ARRIVED, RETURN_GROUND_IMPACT, SwiftReturns, fly_returns
+from flight.autopilots.arduplane.rtl_point_mass import (
+    RETURN_ARRIVED,
+    RETURN_GROUND_IMPACT,
+    SimulatedReturns,
+    fly_returns,
+)
 from flight.mission.return_path import LandingStart, ReturnCircle
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde, around, flat, parameters, start
@@ -39,7 +44,7 @@ def glide_track(flight: str) -> NDArray[np.float64]:
 
 
 @functools.cache
-def glided(flight: str) -> SwiftReturns:
+def glided(flight: str) -> SimulatedReturns:
     row = {name: float(value) for name, value in GLIDES[flight].items() if name not in ("flight", "mode")}
     velocity = {f"velocity_{way}": row[f"velocity_{way}_mps"] for way in ("east", "north", "up")}
     begin = start(east=row["east_m"], north=row["north_m"], up=row["amsl_m"], **velocity)

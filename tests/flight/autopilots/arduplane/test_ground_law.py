@@ -80,10 +80,10 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
         approach.start_altitude - approach.point[2], approach.length, approach.tail_wind, float(approach.point[2])
     )
     assert flown.flight.ended == "completed"
-    along, aside = approach.place(np.stack([real["east_m"], real["north_m"]], axis=1))
+    along, aside = approach.distances_from_landing_point(np.stack([real["east_m"], real["north_m"]], axis=1))
     over = real["amsl_m"] - approach.point[2]
     final = (along < -glide.flare_distance - 10.0) & (along > -approach.length + 100.0)
-    way, off = approach.place(np.asarray(track.position, dtype=np.float64))
+    way, off = approach.distances_from_landing_point(np.asarray(track.position, dtype=np.float64))
     if flight != "d":  # where the last descent was too steep to be flown straight
         # As far before the point as ArduPlane's is kept.
         own = (way < -glide.flare_distance - 10.0) & (way > along[final][0]) & (np.abs(off) < 20.0)
@@ -95,14 +95,14 @@ def test_landings_are_those_of_arduplane(flight: str) -> None:
     # As fast as it may be closed, for a fifth of a second.
     closing = track.commands[12:, 3] < track.commands[:-12, 3] - 0.19
     k = int(np.argmax((track.time[:-12] > 60.0) & (way[:-12] > -200.0) & closing))
-    began = float(approach.place(np.asarray(track.position[k], dtype=np.float64))[0])
+    began = float(approach.distances_from_landing_point(np.asarray(track.position[k], dtype=np.float64))[0])
     assert -began == pytest.approx(glide.flare_distance, abs=25.0)
     assert track.position[k, 2] - approach.point[2] == pytest.approx(glide.flare_height, abs=2.0)
-    mine = approach.place(np.asarray(track.position[touch(flown)], dtype=np.float64))
+    mine = approach.distances_from_landing_point(np.asarray(track.position[touch(flown)], dtype=np.float64))
     down = int(np.argmax(real["amsl_m"] - real["ground_m"] < 0.35))
     assert -16.0 * (flight == "d") < float(mine[0]) - along[down] < LATER_M
     assert float(mine[1]) == pytest.approx(aside[down], abs=1.0)
-    rest = approach.place(np.asarray(track.position[-1], dtype=np.float64))
+    rest = approach.distances_from_landing_point(np.asarray(track.position[-1], dtype=np.float64))
     assert -20.0 < float(rest[0]) - along[-1] < LATER_M
 
 
@@ -149,7 +149,7 @@ def test_small_aircraft_are_thrown_and_land(aircraft: str, speed: float | None) 
     hand = Launch("hand", math.radians(90.0), speed, None, math.radians(10.0))
     flown = fly(circuit(hand, STRIP, wind=(2.0, 60.0), aircraft=aircraft))
     assert flown.flight.ended == "completed"
-    along, aside = flown.approach.place(np.asarray(flown.track.position[-1], dtype=np.float64))
+    along, aside = flown.approach.distances_from_landing_point(np.asarray(flown.track.position[-1], dtype=np.float64))
     assert abs(float(along)) < 150.0
     assert abs(float(aside)) < 15.0
 

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.arduplane.go_around_point_mass import aborted_at, fly_go_arounds
+from flight.autopilots.arduplane.go_around_point_mass import abort_start, fly_go_arounds
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_START
 from flight.mission.ground_ways import Approach
 from flight.mission.placing import landing_sequence
@@ -55,10 +55,10 @@ def test_returns_touch_down_where_arduplane_does(flight: str) -> None:
     flown, real = flown_sequence(flight), kept_sequence(flight)
     approach, track = flown.approach, flown.track
     there = np.stack([real["east_m"], real["north_m"]], axis=1)
-    along, aside = approach.place(there)
+    along, aside = approach.distances_from_landing_point(there)
     down = int(np.argmax((real["amsl_m"] - real["ground_m"] < 0.35) & (along > -200.0)))
     touched = int(np.argmax((track.time > 60.0) & (track.clearance < track.clearance[-1] + 0.02)))
-    mine = approach.place(np.asarray(track.position[touched], dtype=np.float64))
+    mine = approach.distances_from_landing_point(np.asarray(track.position[touched], dtype=np.float64))
     assert 0.0 < float(mine[0]) - along[down] < LATER_M
     assert float(mine[1]) == pytest.approx(aside[down], abs=1.0)
     slopes = [
@@ -70,7 +70,7 @@ def test_returns_touch_down_where_arduplane_does(flight: str) -> None:
 
 def on_glide(approach: Approach, places: Floats, up: Floats) -> float:
     """Slope of the straight part of a glide, degrees; places (n, 2) and heights (n,), m."""
-    along, aside = approach.place(places)
+    along, aside = approach.distances_from_landing_point(places)
     final = (along < -120.0) & (along > -approach.length + 100.0) & (np.abs(aside) < 20.0)
     return math.degrees(math.atan(-float(np.polyfit(along[final], up[final], 1)[0])))
 
@@ -81,20 +81,22 @@ def test_it_leaves_its_circle_for_the_landing_within_10_m_of_its_height_and_only
     assert np.hypot(*(one.track.position[3600:, :2] - home).T).min() < 200.0
     assert np.hypot(*(two.track.position[3600:, :2] - home).T).min() > 400.0
     route = one.setup.route
-    assert (route.return_to is not None, two.setup.route.return_to) == (True, None)
+    assert (route.rtl_loiter is not None, two.setup.route.rtl_loiter) == (True, None)
     # With a circle 100 m higher it climbs there first.
-    assert route.items[route.return_until] == 5
+    assert route.items[route.rtl_end] == 5
     high = kept_setup("autoland-1", RTL_ALTITUDE=200.0).route
-    assert high.waypoints[high.return_until - 1, 2] == pytest.approx(535.0, abs=1.0)
+    assert high.waypoints[high.rtl_end - 1, 2] == pytest.approx(535.0, abs=1.0)
 
 
 def test_without_autoland_a_return_ends_in_its_circle() -> None:
     for autoland in (0.0, 3.0, 4.0):
         route = kept_setup("autoland-1", RTL_AUTOLAND=autoland).route
-        assert route.return_until == len(route.waypoints)
+        assert route.rtl_end == len(route.waypoints)
         assert math.isnan(route.landing_ground)
         assert any("never reached" in note for note in route.notes)
-        assert any("not flown, it stays in its circle" in note for note in route.notes) is (autoland == 4.0)
+        assert any("this is not simulated, and the RTL ends in its loiter" in note for note in route.notes) is (
+            autoland == 4.0
+        )
 
 
 def aborted(pitch: float = math.radians(10.0), height: float = 50.0) -> tuple[Records, Floats]:
@@ -139,7 +141,7 @@ def test_an_abort_that_has_to_climb_holds_its_course_until_it_is_above_its_heigh
 def test_the_speed_where_it_is_aborted_is_the_glides_in_the_wind() -> None:
     world = return_world(kept_setup("abort"))
     real = kept_sequence("abort")
-    start = aborted_at((8333.66, -4151.17, 392.3), math.radians(240.0), 0.098, 22.9, world.aircraft)
+    start = abort_start((8333.66, -4151.17, 392.3), math.radians(240.0), 0.098, 22.9, world.aircraft)
     for name in ("east", "north"):
         assert float(start[f"velocity_{name}"][0]) == pytest.approx(real[f"velocity_{name}_mps"][0], abs=0.3)
     assert float(start["velocity_up"][0]) == pytest.approx(-1.75, abs=0.1)

@@ -15,7 +15,7 @@ from benchmarks.against_arduplane import BINARY, compare, flown_figures
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
-    ROLL_LAG,
+    ROLL_LAG_RATIO,
     control_attitude,
     update_height_demand,
 )
@@ -666,7 +666,7 @@ def test_bank_follows_its_demand_late(make_setup: MakeSetup, aerosonde: Aircraft
             break
         demanded.append(float(flight._workspace.own.memory.roll_demand))
         flown.append(float(rows["attitude"][-1][0]))
-    lag = round(ROLL_LAG * usual.roll_time * 60)
+    lag = round(ROLL_LAG_RATIO * usual.roll_time * 60)
 
     # A ramp is followed by its lag, and most of a turn is one.
     def apart(ticks: int) -> float:

@@ -203,7 +203,7 @@ def test_a_return_is_flown_in_one_leg_at_the_cruise_speed() -> None:
     assert records["turn"][1] == pytest.approx(0.5 * math.pi)
     assert records["is_rtl"].tolist() == [False, False, *[True] * (len(records) - 2)]
     assert set(records["centre_east"][2:].round()) == {9500.0}
-    assert setup.route.return_from == 1
+    assert setup.route.rtl_start == 1
     assert (setup.route.airspeed[1:] == setup.airspeed).all()
     own = memory(leg=0)
     assert navigated(own, flying(EAST, NORTH), back(100.0)).leg == 0
@@ -227,10 +227,10 @@ def test_the_turn_before_a_return_is_one_to_0_north_0_east() -> None:
 
 
 def test_the_parameters_decide_where_it_goes_and_how_high() -> None:
-    to = return_setup("rtl-rally5-04", RALLY_LIMIT_KM=2.0).route.return_to
+    to = return_setup("rtl-rally5-04", RALLY_LIMIT_KM=2.0).route.rtl_loiter
     assert to is not None
     assert (round(to.east), round(to.north), round(to.up)) == (9500, -5000, 435)
-    near = return_setup("rtl-def-00", RALLY_INCL_HOME=1.0, RTL_ALTITUDE=-1.0, RTL_RADIUS=-120.0).route.return_to
+    near = return_setup("rtl-def-00", RALLY_INCL_HOME=1.0, RTL_ALTITUDE=-1.0, RTL_RADIUS=-120.0).route.rtl_loiter
     assert near is not None
     # Where it began: 570.9 m, and the lead of its slope.
     assert (round(near.east), near.radius, near.up) == (9500, -120.0, pytest.approx(580.3, abs=0.1))
@@ -239,6 +239,6 @@ def test_the_parameters_decide_where_it_goes_and_how_high() -> None:
 
 def rally_base(flight: str) -> float:
     """By how much the slope to its rally point is drawn too low, m."""
-    to = return_setup(flight).route.return_to
+    to = return_setup(flight).route.rtl_loiter
     assert to is not None
     return to.slope_base

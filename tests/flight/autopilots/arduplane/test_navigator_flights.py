@@ -173,7 +173,7 @@ def test_the_course_on_which_arduplane_leaves_a_circle_before_a_return_is_said()
     for lines, said in (((around, back), True), ((around, onward, back), False), ((around, onward), False)):
         notes = setup_by_law(mission(wp(0, -2000, 500), *lines)).route.notes
         assert (
-            any(note.startswith("item 2: ArduPlane leaves its circle on the heading to 0° N 0° E") for note in notes)
+            any(note.startswith("item 2: ArduPlane leaves the loiter on the heading to 0° N 0° E") for note in notes)
             == said
         )
 

@@ -16,7 +16,7 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     RETURN_START,
     RETURN_TIMEOUT,
     ReturnEnvironment,
-    SwiftReturns,
+    SimulatedReturns,
     fly_returns,
     surroundings,
 )
@@ -70,7 +70,7 @@ def kind(flight: str) -> str:
 
 
 @functools.cache
-def swift(flight: str) -> tuple[str, SwiftReturns]:
+def swift(flight: str) -> tuple[str, SimulatedReturns]:
     """The target that the law chooses, and the return."""
     row = KEPT[flight]
     made = parameters(

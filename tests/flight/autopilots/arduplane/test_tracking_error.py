@@ -7,7 +7,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.tracking import SPEED_RATIOS, TURNS, TrackingError
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.tracking_error import MIN_ACCEPTANCE, WIND_SPREAD, tracking_error
+from flight.autopilots.arduplane.tracking_error import MIN_ACCEPTANCE_M, WIND_SPREAD, tracking_error
 from tests.soak import some
 from world.wind import Turbulence
 
@@ -110,6 +110,6 @@ def test_navigation_takes_room(parameters: ArduPilotParameters, error: TrackingE
 def test_a_fly_over_turns_at_its_waypoint(parameters: ArduPilotParameters, error: TrackingError) -> None:
     over = tracking_error(parameters, 25.0, "gnss", fly_over=True)
     assert (over.before == 0.0).all()
-    assert (over.acceptance == MIN_ACCEPTANCE).all()
+    assert (over.acceptance == MIN_ACCEPTANCE_M).all()
     assert (over.excursion[1:] > 1.5 * error.excursion[1:])[:5].all()
     assert over.excursion[2, 1] == pytest.approx(1.16 * furthest(math.radians(30.0), 0.0, 25.0), rel=0.15)

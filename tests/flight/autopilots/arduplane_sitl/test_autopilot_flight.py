@@ -94,18 +94,18 @@ def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp
         [
             (
                 "magic",
-                "speaks another version of the physics interface: a packet of 40 bytes that begins with 4711; allowed",
+                "uses another version of the physics interface: a packet of 40 bytes that begins with 4711; allowed",
             ),
-            ("deaf", "does not understand the physics it is sent: asked for frame 300 again for 1 s"),
-            ("silent", "silent for 1 s; ended"),
+            ("deaf", "does not understand planfly's answers: it requested frame 300 again for 1 s"),
+            ("silent", "sent no outputs for 1 s; the flight is ended"),
             ("crash", "ended with exit code 3: out of memory"),
             ("signal", "was ended by SIGSEGV"),
             ("panic", "panicked: Failed to load defaults"),
-            ("mute", "said nothing over MAVLink within 30 s"),
-            ("copter", "is no ArduPlane: its heartbeat says vehicle type 2"),
-            ("no-ekf", "did not find its position (EKF) within 60 s"),
+            ("mute", "sent no heartbeat over MAVLink within 30 s"),
+            ("copter", "is not ArduPlane: its heartbeat states vehicle type 2"),
+            ("no-ekf", "had no position estimate (EKF) within 60 s"),
             ("refuses", "refused the mission at item 2 (DO_CHANGE_SPEED): MAV_MISSION_UNSUPPORTED"),
-            ("will-not-arm", "refused arming (command 400) within 5 s; it last said: Arm: no will"),
+            ("will-not-arm", "did not accept arming (command 400) within 5 s; its last message: Arm: no will"),
             ("crash-in-air", "ended with exit code 1"),
             ("reboot", "restarted in the air: frame 1 after frame"),
         ],
@@ -117,7 +117,7 @@ def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
     fake_autopilot: MakeFake, monkeypatch: pytest.MonkeyPatch, fault: str, said: str
 ) -> None:
     if "for 1 s" in said:
-        monkeypatch.setattr(physics, "SILENCE", 1.0)
+        monkeypatch.setattr(physics, "SILENCE_TIMEOUT_S", 1.0)
     before, folders = children(), left_behind()
     program = fake_autopilot(fault)
     with pytest.raises(FlightError) as failed:

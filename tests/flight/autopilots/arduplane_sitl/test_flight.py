@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flight.autopilots.sitl.flight import beyond_end, place_on_path
+from flight.autopilots.sitl.flight import distances_from_route_end, place_on_path
 from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral_reference_laws import waypoint_column
 from flight.guidance.navigation_error import MOTION
@@ -60,5 +60,5 @@ def test_an_aircraft_that_cuts_the_corner_goes_over_to_the_next_leg() -> None:
 
 def test_the_end_is_passed_at_its_plane_wherever_that_is() -> None:
     # 40 m left of the last leg, then past its end by 7 m.
-    assert beyond_end(at(990.0, 1040.0), WAYPOINTS) == pytest.approx((-40.0, -10.0))
-    assert beyond_end(at(1007.0, 930.0), WAYPOINTS) == pytest.approx((70.0, 7.0))
+    assert distances_from_route_end(at(990.0, 1040.0), WAYPOINTS) == pytest.approx((-40.0, -10.0))
+    assert distances_from_route_end(at(1007.0, 930.0), WAYPOINTS) == pytest.approx((70.0, 7.0))

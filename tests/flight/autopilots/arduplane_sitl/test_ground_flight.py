@@ -15,7 +15,7 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.autopilots.arduplane_sitl.ground_tick import find_phase
-from flight.autopilots.arduplane_sitl.process import person_parameters
+from flight.autopilots.arduplane_sitl.process import load_user_parameters
 from flight.autopilots.parts import RtlSettings
 from flight.autopilots.sitl.exchange import motion_on_rail
 from flight.autopilots.sitl.flight import launch_rail
@@ -59,7 +59,7 @@ def test_with_one_end_alone_it_is_put_into_the_air_and_says_so() -> None:
     for launch, strip, lacks in ((RAIL, None, "landing"), (None, STRIP, "take-off")):
         ways = by_program(circuit(launch, strip)).ground_phases
         assert not ways
-        assert ways.notes[-1].startswith(f"without a {lacks} that is flown from the ground")
+        assert ways.notes[-1].startswith(f"the {lacks} is not simulated on the ground")
 
 
 def test_in_the_air_a_return_that_goes_on_to_land_is_sent_with_its_landing_sequence() -> None:
@@ -77,7 +77,7 @@ def test_in_the_air_a_return_that_goes_on_to_land_is_sent_with_its_landing_seque
 def test_what_the_scenario_asks_of_its_returns_is_set() -> None:
     setup = circuit(RAIL, STRIP)
     asked = setup.autopilot.with_parameters(**setup.autopilot.returns.parameters_of(RtlSettings(180.0, lands=True)))
-    assert person_parameters(replace(setup, autopilot=asked)) == {"RTL_ALTITUDE": 180.0, "RTL_AUTOLAND": 1.0}
+    assert load_user_parameters(replace(setup, autopilot=asked)) == {"RTL_ALTITUDE": 180.0, "RTL_AUTOLAND": 1.0}
 
 
 def test_the_rail_of_a_launch_is_as_steep_and_as_quick_as_the_launch() -> None:
@@ -154,7 +154,7 @@ def test_whoever_launches_waits_for_all_of_the_motor_where_it_runs_before(
     assert isinstance(parameters, ArduPilotParameters)
     autopilot = ArduPlaneSitl(parameters.changed(TKOFF_THR_MINACC=least), binary=fake_autopilot("none"))
     with AutopilotFlight(setup, AEROSONDE, autopilot, {}) as flight:
-        began = flight.exchanged
+        began = flight.autopilot_time
         for _ in flight._wait_for_thrust():
             flight._lockstep.hold(flight._rail)
-        assert flight.exchanged - began == pytest.approx(seconds, abs=0.01)
+        assert flight.autopilot_time - began == pytest.approx(seconds, abs=0.01)

@@ -50,24 +50,34 @@ def test_news_are_what_the_messages_tell(link: AutopilotLink, program: Program) 
         mavlink.MAVLink_scaled_imu2_message(0, 0, 0, 0, 0, 0, 0, 0, 0, 0),
     )
     link.poll()
-    news = link.news
-    assert (news.vehicle, news.mode, news.armed, news.ekf, news.mission_item) == (1, 10, True, 831, 7)
-    assert (news.texts, news.parameters, news.acknowledged) == (["first", "second"], {"WP_RADIUS": 90.0}, {400: 4})
-    assert (news.requested, news.mission_result) == (3, 13)
+    reported = link.reported
+    assert (reported.vehicle, reported.mode, reported.armed, reported.ekf, reported.mission_item) == (
+        1,
+        10,
+        True,
+        831,
+        7,
+    )
+    assert (reported.texts, reported.parameters, reported.acknowledged) == (
+        ["first", "second"],
+        {"WP_RADIUS": 90.0},
+        {400: 4},
+    )
+    assert (reported.requested, reported.mission_result) == (3, 13)
 
 
 def test_a_heartbeat_of_a_component_tells_nothing_of_the_vehicle(link: AutopilotLink, program: Program) -> None:
     program.mav.srcComponent = 154
     program.say(mavlink.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3))
     link.poll()
-    assert link.news.vehicle is None
+    assert link.reported.vehicle is None
 
 
 def test_bytes_that_are_no_message_are_passed_over(link: AutopilotLink, program: Program) -> None:
     program.socket.sendall(b"\x00garbage")
     program.say(mavlink.MAVLink_heartbeat_message(1, 3, 1, 5, 4, 3))
     link.poll()
-    assert link.news.mode == 5
+    assert link.reported.mode == 5
 
 
 def test_what_is_sent_arrives(link: AutopilotLink, program: Program) -> None:
@@ -80,7 +90,7 @@ def test_what_is_sent_arrives(link: AutopilotLink, program: Program) -> None:
 def test_nobody_there_is_no_error(link: AutopilotLink) -> None:
     link.poll()
     link.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    assert link.news.vehicle is None
+    assert link.reported.vehicle is None
 
 
 def test_a_closed_connection_is_silent(link: AutopilotLink, program: Program) -> None:
@@ -89,4 +99,4 @@ def test_a_closed_connection_is_silent(link: AutopilotLink, program: Program) ->
     for _ in range(3):
         link.poll()
         link.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
-    assert link.news.vehicle is None
+    assert link.reported.vehicle is None

@@ -23,9 +23,9 @@ from flight.autopilots.arduplane_sitl.physics import (
     parse_servo_packet,
 )
 from flight.autopilots.sitl.exchange import (
-    LOOK_FRAMES,
-    METRES_A_DEGREE,
-    PUSH,
+    METRES_PER_DEGREE,
+    POLL_INTERVAL_FRAMES,
+    PUSH_ACCELERATION_MPS2,
     BodyMotion,
     RailEnd,
     motion_on_rail,
@@ -62,7 +62,7 @@ def test_a_packet_holds_its_frame_and_its_outputs(magic: int, count: int) -> Non
 )
 def test_any_other_packet_is_of_another_version(data: bytes) -> None:
     with pytest.raises(
-        FlightError, match=r"speaks another version of the physics interface: a packet of .* allowed: 18458"
+        FlightError, match=r"uses another version of the physics interface: a packet of .* allowed: 18458"
     ):
         parse_servo_packet(data)
 
@@ -98,7 +98,7 @@ def test_small_numbers_keep_their_form() -> None:
 def test_a_degree_is_as_long_as_on_ardupilots_sphere() -> None:
     lat, lon = math.radians(36.5), math.radians(-84.0)
     north, east = offset_on_sphere(lat + math.radians(1.0), lon, lat, lon)
-    assert (north, east) == pytest.approx((METRES_A_DEGREE, 0.0))
+    assert (north, east) == pytest.approx((METRES_PER_DEGREE, 0.0))
     # East at the latitude half way.
     north, east = offset_on_sphere(lat + math.radians(1.0), lon + math.radians(1.0), lat, lon)
     assert (north, east) == pytest.approx((111318.845, 111318.845 * math.cos(math.radians(37.0))))
@@ -106,7 +106,7 @@ def test_a_degree_is_as_long_as_on_ardupilots_sphere() -> None:
 
 def test_an_offset_crosses_the_180th_meridian() -> None:
     _, east = offset_on_sphere(0.0, math.radians(-179.9), 0.0, math.radians(179.9))
-    assert east == pytest.approx(0.2 * METRES_A_DEGREE)
+    assert east == pytest.approx(0.2 * METRES_PER_DEGREE)
 
 
 # ----------------------------------------------------------------------
@@ -148,7 +148,7 @@ class Looks:
 def looked_at(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Looks]:
     def begin(silence: float, leaps: dict[int, float] | None = None) -> Looks:
         looks = Looks(leaps)
-        monkeypatch.setattr(physics, "SILENCE", silence)
+        monkeypatch.setattr(physics, "SILENCE_TIMEOUT_S", silence)
         port.watch, port._clock = looks, RunningClock(lambda: looks.now)
         looks.now += 0.1  # since the port was opened
         return looks
@@ -203,7 +203,7 @@ def test_a_frame_that_was_before_is_a_new_beginning(port: PhysicsPort, autopilot
 
 def test_silence_ends_the_wait_and_not_sooner(port: PhysicsPort, looked_at: Callable[..., Looks]) -> None:
     looks = looked_at(0.6)
-    with pytest.raises(FlightError, match="silent for 1 s; ended"):
+    with pytest.raises(FlightError, match="sent no outputs for 1 s; the flight is ended"):
         port.receive()
     # At 0, 0.25, 0.5 and 0.75 s.
     assert looks.count == 4
@@ -212,7 +212,7 @@ def test_silence_ends_the_wait_and_not_sooner(port: PhysicsPort, looked_at: Call
 def test_a_sleeping_laptop_is_no_silence(port: PhysicsPort, looked_at: Callable[..., Looks]) -> None:
     """Its clock leaps by an hour in the middle of a wait: the program, which slept too, is still waited for."""
     looks = looked_at(1.6, {2: 3600.0})
-    with pytest.raises(FlightError, match="silent"):
+    with pytest.raises(FlightError, match="sent no outputs"):
         port.receive()
     # The leap counts as one second: at 0, 0.25, 1.25, 1.5 and 1.75 s.
     assert looks.count == 5
@@ -227,7 +227,7 @@ def test_the_same_question_without_end_is_no_understanding(
     port.answer(b"what it does not understand")
     for _ in range(5):
         autopilot.send(packet(7))
-    with pytest.raises(FlightError, match="does not understand the physics it is sent: asked for frame 7 again"):
+    with pytest.raises(FlightError, match="does not understand planfly's answers: it requested frame 7 again"):
         port.receive()
 
 
@@ -275,7 +275,7 @@ def test_pulses_move_the_controls_linearly_between_the_knots_and_no_further() ->
     assert [output.value(pulse) for pulse in pulses] == pytest.approx([0.2, 0.2, 0.1, 0.0, -0.15, -0.3, -0.3])
     # No pulse leaves a servo at rest.
     assert output.value(0) == 0.0
-    assert output.rest == 1400.0
+    assert output.center_pulse == 1400.0
 
 
 def test_the_controls_come_from_their_outputs(tmp_path: Path) -> None:
@@ -314,7 +314,7 @@ def test_full_pulses_are_the_aircrafts_full_throws(name: str) -> None:
     [
         (
             ("[rudder]", "[flaps]"),
-            "tables aileron, elevator, flaps, throttle: expected elevator, aileron, rudder, throttle$",
+            "tables aileron, elevator, flaps, throttle: expected the tables elevator, aileron, rudder, throttle$",
         ),
         (("output = 5", "output = 0"), "throttle.output = 0: allowed 1..32"),
         (("output = 5", "output = true"), "throttle.output = True: allowed 1..32"),
@@ -339,7 +339,7 @@ def test_a_bad_file_is_one_line(tmp_path: Path, change: tuple[str, str], said: s
 
 
 def test_an_aircraft_without_the_file_says_what_it_is_for(tmp_path: Path) -> None:
-    with pytest.raises(FlightError, match=r"ardupilot.toml: .*; a real autopilot needs to know what each servo"):
+    with pytest.raises(FlightError, match=r"ardupilot.toml: .*; the autopilot's program needs this file, which states"):
         load_servo_map(replace(AEROSONDE, folder=tmp_path))
 
 
@@ -378,16 +378,16 @@ def test_a_banked_hold_shares_the_force_between_the_axes() -> None:
 
 
 def test_a_push_is_felt_seen_and_adds_up() -> None:
-    assert END.push_time == 20.0 / PUSH
+    assert END.push_time == 20.0 / PUSH_ACCELERATION_MPS2
     half = motion_on_rail(END, 0.0, 2.0, ORIGIN)
     assert half.velocity_east == pytest.approx(10.0)
     assert half.airspeed == pytest.approx(15.0)
-    # PUSH along the nose, but for its rise.
+    # PUSH_ACCELERATION_MPS2 along the nose, but for its rise.
     rise = math.radians(3.0)
-    assert half.force_x == pytest.approx(PUSH * math.cos(rise) + GRAVITY * math.sin(rise))
+    assert half.force_x == pytest.approx(PUSH_ACCELERATION_MPS2 * math.cos(rise) + GRAVITY * math.sin(rise))
     # 0.5 a t^2 from the beginning.
     begin = motion_on_rail(END, 0.0, 0.0, ORIGIN)
-    assert half.east - begin.east == pytest.approx(0.5 * PUSH * 4.0, rel=2e-3)
+    assert half.east - begin.east == pytest.approx(0.5 * PUSH_ACCELERATION_MPS2 * 4.0, rel=2e-3)
 
 
 def test_at_its_end_it_is_the_trimmed_flight_and_no_push() -> None:
@@ -522,7 +522,7 @@ def test_satellites_mistake_what_is_told_on_the_rail_and_off_it(exchange: Exchan
 
 
 def test_a_look_is_taken_every_tenth_of_a_second(exchange: Exchange) -> None:
-    for _ in range(3 * LOOK_FRAMES):
+    for _ in range(3 * POLL_INTERVAL_FRAMES):
         exchange.lockstep.serve()
     assert exchange.looks == 3
     assert exchange.lockstep.time == pytest.approx(0.3)

@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from aircraft.catalog import load_aircraft
 from flight.autopilots.arduplane_sitl.preflight import AUTO, Preflight, version_text
 from flight.autopilots.sitl.conversation import Talk
-from flight.autopilots.sitl.link import AutopilotNews
+from flight.autopilots.sitl.link import ReportedState
 from flight.autopilots.sitl.mission import UploadedMission, uploaded_mission
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
@@ -195,7 +195,7 @@ class Autopilot:
     """A link's two ends in one: what is sent is answered at once."""
 
     def __init__(self) -> None:
-        self.news = AutopilotNews(vehicle=1, ekf=EKF_GOOD)
+        self.reported = ReportedState(vehicle=1, ekf=EKF_GOOD)
         self.sent: list[Any] = []
         self.received: list[Any] = []
         self.results = [mavlink.MAV_MISSION_ACCEPTED]
@@ -206,19 +206,19 @@ class Autopilot:
         self.sent.append(message)
         kind = message.get_type()
         if kind in ("COMMAND_LONG", "COMMAND_INT"):
-            result = self.news.acknowledged[message.command] = self.accepts(message.command)
+            result = self.reported.acknowledged[message.command] = self.accepts(message.command)
             if message.command == 176 and result == 0:
-                self.news.mode, self.news.armed = AUTO, True
+                self.reported.mode, self.reported.armed = AUTO, True
         if kind == "PARAM_REQUEST_READ":
-            self.news.parameters |= {name: self.has[name] for name in (message.param_id,) if name in self.has}
+            self.reported.parameters |= {name: self.has[name] for name in (message.param_id,) if name in self.has}
         if kind == "MISSION_COUNT":
-            self.count, self.received, self.news.requested = message.count, [], 0
+            self.count, self.received, self.reported.requested = message.count, [], 0
         if kind == "MISSION_ITEM_INT":
             self.received.append(message)
             if len(self.received) < self.count:
-                self.news.requested = len(self.received)
+                self.reported.requested = len(self.received)
             else:
-                self.news.mission_result = self.results.pop(0)
+                self.reported.mission_result = self.results.pop(0)
 
     def commands(self) -> list[int]:
         return [message.command for message in self.sent if message.get_type().startswith("COMMAND")]
@@ -296,8 +296,8 @@ def test_space_that_never_comes_is_a_refusal(autopilot: Autopilot, clock: Clock)
 def test_an_estimator_without_a_place_is_waited_for_a_minute(autopilot: Autopilot, clock: Clock) -> None:
     # All but the place above the sea, then all, but without satellites.
     for flags in (EKF_GOOD & ~mavlink.ESTIMATOR_POS_VERT_ABS, EKF_GOOD | mavlink.ESTIMATOR_CONST_POS_MODE):
-        autopilot.news.ekf, started = flags, clock.time
-        with pytest.raises(FlightError, match=r"did not find its position \(EKF\) within 60 s"):
+        autopilot.reported.ekf, started = flags, clock.time
+        with pytest.raises(FlightError, match=r"had no position estimate \(EKF\) within 60 s"):
             clock.go_through(preflight(autopilot, clock).prepare(MISSION))
         assert clock.time - started == pytest.approx(60.0, abs=0.3)
 
@@ -305,28 +305,28 @@ def test_an_estimator_without_a_place_is_waited_for_a_minute(autopilot: Autopilo
 @pytest.mark.parametrize(("command", "said"), [(179, "home"), (400, "arming"), (176, "AUTO")])
 def test_what_is_refused_is_named(autopilot: Autopilot, clock: Clock, command: int, said: str) -> None:
     autopilot.accepts = lambda asked: mavlink.MAV_RESULT_DENIED if asked == command else mavlink.MAV_RESULT_ACCEPTED
-    autopilot.news.texts.append("not today")
-    with pytest.raises(FlightError, match=rf"refused {said} \(.*\) within 5 s; it last said: not today"):
+    autopilot.reported.texts.append("not today")
+    with pytest.raises(FlightError, match=rf"did not accept {said} \(.*\) within 5 s; its last message: not today"):
         clock.go_through(preflight(autopilot, clock).prepare(MISSION))
 
 
 def test_it_is_met_by_its_parameters_those_it_does_not_have_left_out(autopilot: Autopilot, clock: Clock) -> None:
     autopilot.has = {f"P{k}": float(k) for k in range(25)}
     names = [*autopilot.has, "NO_SUCH"]
-    clock.go_through(preflight(autopilot, clock).meet(names))
-    assert autopilot.news.parameters == autopilot.has
+    clock.go_through(preflight(autopilot, clock).identify(names))
+    assert autopilot.reported.parameters == autopilot.has
     assert mavlink.MAV_CMD_DO_SEND_BANNER in autopilot.commands()
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "said"), [(2, "is no ArduPlane: .* type 2; expected 1, a fixed"), (None, "said nothing over MAV")]
+    ("vehicle", "said"), [(2, "is not ArduPlane: .* type 2; expected 1, a fixed"), (None, "sent no heartbeat over MAV")]
 )
 def test_who_is_no_plane_or_says_nothing_is_named(
     autopilot: Autopilot, clock: Clock, vehicle: int | None, said: str
 ) -> None:
-    autopilot.news.vehicle = vehicle
+    autopilot.reported.vehicle = vehicle
     with pytest.raises(FlightError, match=said):
-        clock.go_through(preflight(autopilot, clock).meet([]))
+        clock.go_through(preflight(autopilot, clock).identify([]))
 
 
 def test_a_version_without_a_name_is_its_number() -> None:
@@ -338,11 +338,11 @@ def test_time_that_flies_is_no_reason_to_give_up(autopilot: Autopilot) -> None:
     # A hundred times as fast as the clock: its answer comes after 2 s of its own time, 0.02 s by the clock.
     clock = Clock()
     autopilot.has, names = {"LATE": 1.0}, ["LATE"]
-    talk = Preflight(autopilot, lambda: clock.time, lambda: 0.01 * clock.time).meet(names)  # type: ignore[arg-type]  # a link by hand
+    talk = Preflight(autopilot, lambda: clock.time, lambda: 0.01 * clock.time).identify(names)  # type: ignore[arg-type]  # a link by hand
     autopilot.has = {}
     for _ in talk:
         clock.time += 0.1
         if clock.time > 2.0:
-            autopilot.news.parameters["LATE"] = 1.0
-    assert autopilot.news.parameters == {"LATE": 1.0}
+            autopilot.reported.parameters["LATE"] = 1.0
+    assert autopilot.reported.parameters == {"LATE": 1.0}
     assert clock.time < 3.0

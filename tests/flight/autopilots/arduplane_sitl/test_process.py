@@ -13,9 +13,9 @@ from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.process import (
     FLYING,
     SIMULATION,
-    autopilot_parameters,
+    collect_arduplane_parameters,
     load_aircraft_parameters,
-    person_parameters,
+    load_user_parameters,
 )
 from flight.autopilots.sitl.servos import load_servo_map
 from flight.simulation.setup import FlightSetup
@@ -36,61 +36,63 @@ def setup_at(speed: float = 25.0, params: Path | None = None) -> FlightSetup:
 
 
 def test_the_simulations_the_servos_and_the_aircrafts_are_all_given() -> None:
-    found = autopilot_parameters(setup_at(), AEROSONDE, SERVOS, {})
-    assert found.given.items() >= SIMULATION.items() | SERVOS.parameters().items()
-    assert (found.given["TRIM_THROTTLE"], found.given["ROLL_LIMIT_DEG"]) == (77.0, 30.0)
+    found = collect_arduplane_parameters(setup_at(), AEROSONDE, SERVOS, {})
+    assert found.values.items() >= SIMULATION.items() | SERVOS.parameters().items()
+    assert (found.values["TRIM_THROTTLE"], found.values["ROLL_LIMIT_DEG"]) == (77.0, 30.0)
     assert (found.changed, found.unused) == ({}, ())
 
 
 @pytest.mark.parametrize(("name", "monitor"), [("aerosonde", 4.0), ("c172x", 0.0)])
 def test_the_battery_is_measured_where_there_is_one(name: str, monitor: float) -> None:
     aircraft = load_aircraft(name)
-    given = autopilot_parameters(setup_at(), aircraft, load_servo_map(aircraft), {}).given
+    given = collect_arduplane_parameters(setup_at(), aircraft, load_servo_map(aircraft), {}).values
     assert given["BATT_MONITOR"] == monitor
     assert given.get("BATT_FS_LOW_ACT", 0.0) == 0.0
 
 
 def test_the_missions_speed_is_the_cruise_speed_unless_the_person_has_one() -> None:
-    assert autopilot_parameters(setup_at(22.0), AEROSONDE, SERVOS, {}).given["AIRSPEED_CRUISE"] == 22.0
+    assert collect_arduplane_parameters(setup_at(22.0), AEROSONDE, SERVOS, {}).values["AIRSPEED_CRUISE"] == 22.0
     own = {"AIRSPEED_CRUISE": 23.0}
-    assert autopilot_parameters(setup_at(22.0), AEROSONDE, SERVOS, own).given["AIRSPEED_CRUISE"] == 23.0
+    assert collect_arduplane_parameters(setup_at(22.0), AEROSONDE, SERVOS, own).values["AIRSPEED_CRUISE"] == 23.0
 
 
 def test_a_persons_come_on_top_and_what_they_change_is_known() -> None:
     own = {"ROLL_LIMIT_DEG": 40.0, "TRIM_THROTTLE": 77.0, "NAVL1_PERIOD": 15.0}
-    found = autopilot_parameters(setup_at(), AEROSONDE, SERVOS, own)
-    assert (found.given["ROLL_LIMIT_DEG"], found.given["NAVL1_PERIOD"]) == (40.0, 15.0)
+    found = collect_arduplane_parameters(setup_at(), AEROSONDE, SERVOS, own)
+    assert (found.values["ROLL_LIMIT_DEG"], found.values["NAVL1_PERIOD"]) == (40.0, 15.0)
     # What states the aircraft's own value changes nothing.
     assert found.changed == {"ROLL_LIMIT_DEG": 40.0, "NAVL1_PERIOD": 15.0}
 
 
 @pytest.mark.parametrize("name", ["SERVO1_REVERSED", "SIM_RATE_HZ", "ARSPD_TYPE", "SERIAL0_BAUD", "INS_ACCOFFS_X"])
 def test_a_persons_of_their_hardware_are_left_out(name: str) -> None:
-    found = autopilot_parameters(setup_at(), AEROSONDE, SERVOS, {name: 99.0})
-    assert found.given.get(name) != 99.0
+    found = collect_arduplane_parameters(setup_at(), AEROSONDE, SERVOS, {name: 99.0})
+    assert found.values.get(name) != 99.0
     assert (found.changed, found.unused) == ({}, (name,))
 
 
 def test_a_program_flies_without_an_airspeed_sensor_where_the_file_says_so() -> None:
-    given = [autopilot_parameters(setup_at(), AEROSONDE, SERVOS, own).given for own in ({}, {"ARSPD_USE": 0.0})]
+    given = [
+        collect_arduplane_parameters(setup_at(), AEROSONDE, SERVOS, own).values for own in ({}, {"ARSPD_USE": 0.0})
+    ]
     assert [values["ARSPD_USE"] for values in given] == [1.0, 0.0]
 
 
 def test_a_program_gets_the_settings_of_the_attitude_controllers() -> None:
     own = {"RLL2SRV_RMAX": 40.0, "RLL2SRV_TCONST": 0.7, "PTCH2SRV_RMAX_UP": 40.0, "PTCH2SRV_TCONST": 0.7}
-    assert autopilot_parameters(setup_at(), AEROSONDE, SERVOS, own).changed == own
+    assert collect_arduplane_parameters(setup_at(), AEROSONDE, SERVOS, own).changed == own
 
 
 def test_a_persons_file_is_read_by_present_names_and_units(tmp_path: Path) -> None:
     file = tmp_path / "mine.parm"
     file.write_text("LIM_ROLL_CD 3500\nTRIM_ARSPD_CM 2400\nRLL_RATE_P,0.2\nSERVO3_MAX 1900\n", encoding="utf-8")
-    assert person_parameters(setup_at(params=file)) == {
+    assert load_user_parameters(setup_at(params=file)) == {
         "ROLL_LIMIT_DEG": 35.0,
         "AIRSPEED_CRUISE": 24.0,
         "RLL_RATE_P": 0.2,
         "SERVO3_MAX": 1900.0,
     }
-    assert person_parameters(setup_at()) == {}
+    assert load_user_parameters(setup_at()) == {}
 
 
 @pytest.mark.parametrize("name", aircraft_names())

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.autopilots.px4.navigator import SWITCH_DELAY, acceptance_radius_at, foh_altitude, is_past_corner, navigate
+from flight.autopilots.px4.navigator import SWITCH_DELAY_S, acceptance_radius_at, foh_altitude, is_past_corner, navigate
 from tests.flight.autopilots.px4.laws import flying, memory, parameters, waypoints
 from world.kernels import Record
 from world.scenario_tables import Px4Version
@@ -20,7 +20,7 @@ def after(
 ) -> Record:
     """The memory after the navigator has seen the aircraft at a place for longer than its delay."""
     own = memory() if own is None else own
-    for _ in range(round(SWITCH_DELAY / DT) + 2):
+    for _ in range(round(SWITCH_DELAY_S / DT) + 2):
         navigate(at, waypoints(*route), 0.0, 0.0, 25.0, parameters(version, **values), own, DT)
         if own.leg:
             break
@@ -55,7 +55,7 @@ def test_the_turn_comes_after_the_delay() -> None:
     while not own.leg:
         navigate(flying(0.0, 950.0), route, 0.0, 0.0, 25.0, made, own, DT)
         ticks += 1
-    assert SWITCH_DELAY < ticks * DT <= SWITCH_DELAY + 2.5 * DT
+    assert SWITCH_DELAY_S < ticks * DT <= SWITCH_DELAY_S + 2.5 * DT
 
 
 def test_past_the_plane_across_the_leg_it_is_reached_from_afar() -> None:
@@ -288,7 +288,7 @@ def test_before_a_landing_a_waypoint_is_accepted_at_other_heights(
 ) -> None:
     """`Navigator::get_altitude_acceptance_radius`, `Mission::setActiveMissionItems`, `handle_setpoint_type`."""
     own, route = memory(), waypoints(*LEGS, **fields)
-    for _ in range(round(SWITCH_DELAY / DT) + 2):
+    for _ in range(round(SWITCH_DELAY_S / DT) + 2):
         navigate(flying(0.0, 991.0, up), route, 0.0, 0.0, 25.0, parameters("1.17"), own, DT)
         if own.leg:
             break

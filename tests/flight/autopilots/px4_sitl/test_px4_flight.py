@@ -116,19 +116,22 @@ def test_the_flight_goes_once_around_where_px4_circles_about_its_last_waypoint(f
     ("fault", "said"),
     some(
         [
-            ("silent", "silent for 1 s; ended"),
+            ("silent", "sent no outputs for 1 s; the flight is ended"),
             ("does-not-connect", "did not connect to the simulator within 1 s"),
             ("never-starts", "did not start up within 1 s"),
             ("crash", "ended with exit code 3: out of memory"),
             ("crash-in-air", "ended with exit code 1"),
-            ("mute", "said nothing over MAVLink within 30 s"),
-            ("copter", "is no PX4: its heartbeat says vehicle type 2"),
-            ("ardupilot", "is no PX4: its heartbeat says autopilot 3; expected 12, PX4"),
-            ("no-ekf", "did not find its position (EKF) within 60 s"),
+            ("mute", "sent no heartbeat over MAVLink within 30 s"),
+            ("copter", "is not PX4: its heartbeat states vehicle type 2"),
+            ("ardupilot", "is not PX4: its heartbeat states autopilot 3; expected 12, PX4"),
+            ("no-ekf", "had no position estimate (EKF) within 60 s"),
             # Without home, which ArduPlane counts, item 1 sets the speed.
             ("refuses", "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
-            ("will-not-arm", "refused arming (command 400) within 5 s; it last said: Arming denied: no will"),
-            ("stays-in-manual", "refused MISSION (DO_SET_MODE) within 5 s"),
+            (
+                "will-not-arm",
+                "did not accept arming (command 400) within 5 s; its last message: Arming denied",
+            ),
+            ("stays-in-manual", "did not accept MISSION (DO_SET_MODE) within 5 s"),
         ],
         6,
     ),
@@ -139,7 +142,7 @@ def test_what_goes_wrong_with_px4_is_one_line_that_names_it(
 ) -> None:
     # Of the three patiences the one that runs out; on a loaded machine a program takes longer than that to connect.
     if fault == "silent":
-        monkeypatch.setattr(physics, "SILENCE", 1.0)
+        monkeypatch.setattr(physics, "SILENCE_TIMEOUT_S", 1.0)
     elif fault == "does-not-connect":
         monkeypatch.setattr(px4_flight, "_CONNECT_TIMEOUT_S", 1.0)
     elif fault == "never-starts":
@@ -166,7 +169,7 @@ def test_a_program_without_its_start_up_files_is_one_line(tmp_path: Path) -> Non
     program = tmp_path / "px4"
     program.write_text("#!/bin/sh\nexit 0\n", encoding="utf-8")
     program.chmod(0o755)
-    with pytest.raises(FlightError, match=r"px4: expected its start-up files next to it, in the folder etc of"):
+    with pytest.raises(FlightError, match=r"px4: expected PX4.s start-up files next to the program"):
         fly(make_setup(), program)
     assert left_behind() == []
 

@@ -46,9 +46,9 @@ def test_a_part_of_a_route_keeps_what_belongs_to_its_waypoints() -> None:
     assert part.waypoints.tolist() == route.waypoints[1:].tolist()
     assert (part.legs, part.items.tolist()) == (1, route.items[1:].tolist())
     assert part_of_route(route, 0, 2) is route
-    back = replace(route, return_from=1, return_to=ReturnCircle(0.0, 0.0, 400.0, 80.0))
-    assert (part_of_route(back, 1, 2).return_from, part_of_route(back, 1, 2).return_to) == (0, back.return_to)
-    assert (part_of_route(back, 0, 1).return_from, part_of_route(back, 0, 1).return_to) == (-1, None)
+    back = replace(route, rtl_start=1, rtl_loiter=ReturnCircle(0.0, 0.0, 400.0, 80.0))
+    assert (part_of_route(back, 1, 2).rtl_start, part_of_route(back, 1, 2).rtl_loiter) == (0, back.rtl_loiter)
+    assert (part_of_route(back, 0, 1).rtl_start, part_of_route(back, 0, 1).rtl_loiter) == (-1, None)
 
 
 def test_a_flight_that_ends_in_its_first_lap_has_flown_none_of_the_second() -> None:

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from flight.guidance.path import profile
+from flight.guidance.path import profile_at
 from logs.verdict.measures.path_moves import BLOCK_MOVES, MOVE, flown_moves, move_blocks, move_point, planned_moves
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.track_alignment import align_track
@@ -58,7 +58,9 @@ def test_heights_are_the_profiles() -> None:
     at = 0.0
     for piece in planned_moves(route_requirements(setup)):
         for share in (0.01, 0.4, 0.99):
-            assert move_point(piece, share)[2] == pytest.approx(profile(setup.path.nodes, at + share * piece.length)[0])
+            assert move_point(piece, share)[2] == pytest.approx(
+                profile_at(setup.path.nodes, at + share * piece.length)[0]
+            )
         at += float(piece.length)
 
 

@@ -157,7 +157,7 @@ def test_a_jump_without_end_needs_more_than_any_battery() -> None:
     square = [[0, 0, 500], [0, 2000, 500], [2000, 2000, 500], [2000, 0, 500]]
     setup = make_setup([*square, *square[1:]], table=load_envelope(AEROSONDE))
     items = np.array([1, 2, 3, 4, 2, 3, 4])
-    endless = replace(setup, route=replace(setup.route, items=items, endless=5), battery=1000.0)
+    endless = replace(setup, route=replace(setup.route, items=items, endless_jump=5), battery=1000.0)
     bounded = replace(setup, route=replace(setup.route, items=items), battery=1000.0)
     assert of(judge_geometry(bounded), "energy").ok
     item = of(judge_geometry(endless), "energy", FLIGHT)

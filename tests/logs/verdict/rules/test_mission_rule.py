@@ -315,7 +315,7 @@ def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there
     setup = setup_by_law(mission(wp(0, -3000, 300), *lines))
     verdict = judge_geometry(setup)
     found = [(item.place.item, item.reason, item.ok) for item in verdict.findings if item.check == "unjoined"]
-    assert RouteTable.from_dataclass(setup.route).route("a.json").unjoined == setup.route.unjoined
+    assert RouteTable.from_dataclass(setup.route).route("a.json").unjoined_stops == setup.route.unjoined_stops
     if expected is None:
         assert not found
         return
@@ -324,15 +324,15 @@ def test_what_no_tangent_joins_to_a_circle_fails_where_the_autopilot_flies_there
     assert reason.startswith(expected[1])
     assert reason.endswith("which is not judged")
     # planfly's own guidance flies on tangents, and leaves it out with a note.
-    assert not setup_of(wp(0, -3000, 300), *lines).route.unjoined
+    assert not setup_of(wp(0, -3000, 300), *lines).route.unjoined_stops
 
 
 def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
     around = (_WIDE, wp(5000, 0, 300))
-    assert not setup_by_law(mission(wp(0, 0, 300, command=22), *around)).route.unjoined
+    assert not setup_by_law(mission(wp(0, 0, 300, command=22), *around)).route.unjoined_stops
     # Wherever in it that is; a waypoint there is flown to.
-    assert not setup_by_law(mission(wp(0, 300, 300, command=22), *around)).route.unjoined
-    assert setup_by_law(mission(wp(0, 300, 300), *around)).route.unjoined
+    assert not setup_by_law(mission(wp(0, 300, 300, command=22), *around)).route.unjoined_stops
+    assert setup_by_law(mission(wp(0, 300, 300), *around)).route.unjoined_stops
 
 
 @pytest.mark.parametrize(

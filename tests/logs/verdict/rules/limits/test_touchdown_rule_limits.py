@@ -14,7 +14,7 @@ from tests.logs.verdict.rules.flown_circuits import RAIL, STRIP, flown_circuit, 
 from world.wind import Turbulence
 
 
-def on_strip(**strip: float) -> bool | None:
+def distances_from_strip_center(**strip: float) -> bool | None:
     flown = flown_circuit()
     setup = flown.setup.in_scenario(replace(flown.setup.scenario, landing=replace(STRIP, **strip)))
     return found(setup, flown.track, "touchdown").ok
@@ -29,7 +29,7 @@ def known(what: str) -> float:
 def test_thirty_metres_of_the_strip_are_left(more: float, ok: bool) -> None:
     """The strip's half, less 30 m, against where the aircraft stops or touches down, whatever is farther."""
     farther = max(abs(known("along")), 300.0 - known("strip left"))
-    assert on_strip(length=2.0 * (farther + 30.0 + more)) is ok
+    assert distances_from_strip_center(length=2.0 * (farther + 30.0 + more)) is ok
 
 
 @pytest.mark.parametrize(
@@ -98,7 +98,7 @@ def test_a_strip_that_is_too_short_is_said_before_the_flight(length: float, open
 def test_it_stays_within_half_the_width(more: float, ok: bool) -> None:
     flown = flown_circuit()
     farther = max(abs(known("aside")), abs(float(flown.track.position[-1, 1]) - 600.0))
-    assert on_strip(width=2.0 * (farther + more)) is ok
+    assert distances_from_strip_center(width=2.0 * (farther + more)) is ok
 
 
 @pytest.mark.parametrize(("over", "same"), [(0.018, True), (0.022, False)])
