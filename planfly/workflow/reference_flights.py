@@ -220,7 +220,8 @@ def judge_with_reference_flights(
         return verdict, None
     reference = ReferenceFlights(tried=() if verdict.failed else None)
     with suppress(TrialAborted):
-        if setup.autopilot.level != "airframe":
+        # planfly's guidance does not return by itself, so that its flight does not explain such a return.
+        if setup.autopilot.level != "airframe" and any(finding.rule != "return" for finding in verdict.failed):
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
         if reference.airframe is not None and reference.airframe.flyable:
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))

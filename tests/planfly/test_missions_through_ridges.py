@@ -62,7 +62,8 @@ def take_off(rng: np.random.Generator, home: Floats, course: float, *, item: boo
         return None
     high = over(line(home, last))
     first = [f"0 22 15 0 0 0 0 0 {high:.1f}"] if item else []
-    return [*first, row(16, next_place, high), row(16, last, high)]
+    # A loiter without end: nothing returns.
+    return [*first, row(16, next_place, high), row(17, last, high)]
 
 
 def from_the_air(rng: np.random.Generator, home: Floats, course: float) -> list[str] | None:

@@ -29,7 +29,8 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     (folder / "hill.waypoints").write_text(mission_text(), encoding="utf-8")
     flown = ["fly", str(folder / "hill.waypoints"), "--scenario", str(folder / "hill.toml")]
     with redirect_stdout(StringIO()) as out:
-        assert main([*flown, "--log", str(folder / "hill.mcap")]) == 0
+        # The return after the last item hits the hill.
+        assert main([*flown, "--log", str(folder / "hill.mcap")]) == 4
     assert "returns   of " in out.getvalue()
     return (folder / "hill.mcap").read_bytes()
 
@@ -63,7 +64,7 @@ def test_a_mission_and_its_log_say_the_same(hill: Path, log: bytes, capsys: pyte
     of_log = json.loads((hill / "log.json").read_text(encoding="utf-8"))
     assert of_log["headline"] == answer["headline"]
     assert of_log["engine_out"] == answer["engine_out"]
-    assert main(["check", "hill.waypoints", "--scenario", "hill.toml"]) == 0
+    assert main(["check", "hill.waypoints", "--scenario", "hill.toml"]) == 4
     assert "returns   of " in capsys.readouterr().out
 
 
@@ -107,7 +108,7 @@ def test_an_aircraft_in_a_folder_returns_too(hill: Path, capsys: pytest.CaptureF
     asked = ["hill.waypoints", "--scenario", "hill.toml", "--aircraft", "./own"]
     assert main(["returns", *asked, "--every", "50"]) in (0, 4)
     assert "it returns: the pilot's RTL" in capsys.readouterr().out
-    assert main(["check", *asked]) == 0
+    assert main(["check", *asked]) == 4
     assert "Aircraft: own, 11 kg" in capsys.readouterr().out
 
 

@@ -11,6 +11,7 @@ from flight.mission.items import Command, Frame, MissionItem
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import judge_geometry
+from logs.verdict.places import FLIGHT
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import Glides, judge_glides
 from logs.verdict.returns.judge_returns import PointOfNoReturn, judge_returns, return_world
@@ -137,7 +138,7 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
 def demanded(folder: Path, more: str = "", mission: str = "", demand: str = '["glide"]') -> Finding:
     """What a verdict says by geometry alone where a scenario requires it."""
     setup = hill_setup(folder, f"{more}[returns]\nrequire = {demand}\n", mission)
-    (found,) = [one for one in judge_geometry(setup).findings if one.rule == "return"]
+    (found,) = [one for one in judge_geometry(setup).findings if (one.rule, one.place) == ("return", FLIGHT)]
     return found
 
 
@@ -150,7 +151,8 @@ def test_a_scenario_that_requires_it_fails_where_nothing_is_in_reach(tmp_path: P
     assert far.method == "one return every 1 s of the route, glides that keep 30 m above ground"
     # Flat ground counts, for it is somewhere to land.
     assert demanded(tmp_path).ok is True
-    assert not [one for one in judge_geometry(hill_setup(tmp_path, BARRED)).findings if one.rule == "return"]
+    barred = judge_geometry(hill_setup(tmp_path, BARRED))
+    assert not [one for one in barred.findings if (one.rule, one.place) == ("return", FLIGHT)]
 
 
 def test_just_enough_height_is_enough(tmp_path: Path) -> None:
@@ -193,14 +195,14 @@ def test_taking_off_is_left_out_and_what_is_not_known_is_undecided(tmp_path: Pat
     setup = hill_setup(tmp_path, '[returns]\nrequire = ["glide"]\n')
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None))
     verdict = judge_geometry(bare)
-    (unknown,) = [one for one in verdict.findings if one.rule == "return"]
+    (unknown,) = [one for one in verdict.findings if (one.rule, one.place) == ("return", FLIGHT)]
     assert unknown.ok is None
     assert unknown.reason == "without the engine: not judged: there is no elevation file"
     # The scenario asks for it: nothing is flyable without.
     assert (verdict.flyable, verdict.undecided, verdict.flies) == (False, True, True)
     assert verdict.headline.endswith("it is not fully known whether the aircraft gets home as the scenario requires")
     homeless = replace(setup, mission=replace(setup.mission, home=None))
-    (nowhere,) = [one for one in judge_geometry(homeless).findings if one.rule == "return"]
+    (nowhere,) = [one for one in judge_geometry(homeless).findings if (one.rule, one.place) == ("return", FLIGHT)]
     assert nowhere.ok is None
     assert "home: not stated" in nowhere.reason
 

@@ -11,6 +11,7 @@ from flight.mission.items import Command, Frame, MissionItem
 from flight.mission.return_path import ReturnPoint
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import (
     KINDS,
     Returns,
@@ -241,18 +242,18 @@ def test_what_was_low_before_it_left_the_elevation_file_is_low(tmp_path: Path) -
 def test_a_scenario_that_requires_them_fails_where_one_is_not_safe(tmp_path: Path) -> None:
     asked = '[returns]\nrequire = ["rtl"]\n'
     verdict = judge_geometry(hill_setup(tmp_path, asked))
-    (failed,) = [one for one in verdict.failed if one.rule == "return"]
+    (failed,) = [one for one in verdict.failed if (one.rule, one.place) == ("return", FLIGHT)]
     assert "hit the ground" in failed.reason
     assert not verdict.flyable
     assert judge_geometry(hill_setup(tmp_path)).flyable
     # From above the hill and back there is nothing that could be hit.
     near = judge_geometry(hill_setup(tmp_path, asked, mission_text(0.0, 2000.0)))
-    assert [one.ok for one in near.findings if one.rule == "return"] == [True]
+    assert [one.ok for one in near.findings if (one.rule, one.place) == ("return", FLIGHT)] == [True]
 
 
 def test_where_it_is_required_one_is_flown_from_each_second(tmp_path: Path) -> None:
     verdict = judge_geometry(hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n'))
-    (failed,) = [one for one in verdict.failed if one.rule == "return"]
+    (failed,) = [one for one in verdict.failed if (one.rule, one.place) == ("return", FLIGHT)]
     # 6.5 km at the 25 m/s that are commanded.
     assert int(failed.reason.split()[1]) == pytest.approx(6500.0 / 25.0, abs=2.0)
     assert failed.method.startswith("one return every 1 s of the route, ")
@@ -263,7 +264,7 @@ def test_where_the_ground_is_not_known_it_is_undecided_where_it_is_required(tmp_
     home = f"0\t1\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 - 6000.0 / DEGREE:.7f}\t-325\t1\n"
     way = "QGC WPL 110\n" + home + mission_text(0.0, 2500.0).removeprefix(HEAD)
     found = judge_geometry(hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n', way))
-    (one,) = [one for one in found.findings if one.rule == "return"]
+    (one,) = [one for one in found.findings if (one.rule, one.place) == ("return", FLIGHT)]
     assert one.ok is None
     assert "fly where the terrain is unknown" in one.reason
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.places import FLIGHT
 from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline
@@ -152,7 +153,7 @@ def test_what_is_not_judged_is_neither_kept_nor_failed_where_it_is_required(tmp_
         folder.mkdir()
         (folder / "mine.parm").write_text(stated, encoding="utf-8")
         setup = hill_setup(folder, f'[returns]\nrequire = ["rtl"]\n[flight]\nautopilot = "ardupilot"\n{law}', WAY)
-        (one,) = [each for each in judge_geometry(setup).findings if each.rule == "return"]
+        (one,) = [each for each in judge_geometry(setup).findings if (each.rule, each.place) == ("return", FLIGHT)]
         assert one.ok is ok
     # By PX4's law none is known to be safe.
     px4 = hill_setup(tmp_path, '[returns]\nrequire = ["rtl"]\n[flight]\nautopilot = "px4"\n', mission_text(0.0, 2000.0))
