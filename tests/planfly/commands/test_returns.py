@@ -80,7 +80,7 @@ def test_pictures_map_and_log_go_into_a_folder(hill: Path, log: bytes, capsys: p
     answer = json.loads((hill / "answer.json").read_text(encoding="utf-8"))
     assert sorted(Path(name).name for name in answer["files"]) == files
     # A whole flight, with its returns in the scene.
-    assert main(["check", "drawn/returns.mcap"]) == 0
+    assert main(["check", "drawn/returns.mcap"]) == 4
     assert main([*asked, "--quiet"]) == 2
     assert "exists and is not empty" in capsys.readouterr().err
     # The report and an exported map of the flight have them too.
