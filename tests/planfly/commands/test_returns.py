@@ -84,7 +84,7 @@ def test_pictures_map_and_log_go_into_a_folder(hill: Path, log: bytes, capsys: p
     assert main([*asked, "--quiet"]) == 2
     assert "exists and is not empty" in capsys.readouterr().err
     # The report and an exported map of the flight have them too.
-    assert main(["report", "hill.mcap", "--out", "page", "--quiet"]) == 0
+    assert main(["report", "hill.mcap", "--out", "page", "--quiet"]) == 4
     page = (hill / "page" / "report.html").read_text(encoding="utf-8")
     for name in ("returns", "worst-returns", "return-heights", "glide"):
         assert f'<section id="{name}">' in page
