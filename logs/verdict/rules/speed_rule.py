@@ -44,7 +44,12 @@ def speed_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge each leg's commanded airspeed by the envelope, and report the flown airspeed."""
-    findings = [_speed_finding(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
+    # The demanded route is computed at each access, which is too slow to repeat for each of thousands of legs.
+    demanded_speeds = requirements.setup.demanded_route.airspeed
+    findings = [
+        _speed_finding(requirements, aligned, leg, float(demanded_speeds[leg]), geometric=geometric)
+        for leg in range(requirements.legs)
+    ]
     return [*_parameter_findings(requirements), *findings] if geometric else findings
 
 
@@ -58,10 +63,11 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
     return [make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)]
 
 
-def _speed_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
+def _speed_finding(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
+) -> Finding:
     commanded = float(requirements.route.airspeed[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
-    demanded = float(requirements.setup.demanded_route.airspeed[leg])
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
     notes += _short_leg_notes(requirements, leg, commanded)
     margin = min(commanded - min_speed, max_speed - commanded)
