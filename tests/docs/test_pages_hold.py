@@ -91,13 +91,25 @@ def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
 
 
 def test_every_setting_that_leaves_the_verdict_open_stands_on_its_page() -> None:
-    # The page names a group of settings once.
-    groups = {"FLAP_1_PERCNT": "FLAP_1_*", "FLAP_1_SPEED": "FLAP_1_*", "FLAP_2_PERCNT": "FLAP_2_*"}
-    groups |= {"FLAP_2_SPEED": "FLAP_2_*"}
-    groups |= {name: "BATT2_*" for name in ArduPilotParameters.table.when_stated if re.match("BATT[2-9A-G]_", name)}
-    names = [groups.get(name, name) for name in ArduPilotParameters.table.when_stated]
+    # The pages name a group of settings once.
+    groups = (
+        (r"FLAP_(\d)_.*", r"FLAP_\1_*"),
+        (r"BATT[2-9A-G]_.*", "BATT2_*"),
+        (r"(?:RLL|PTCH)_RATE_(FF|P|I|D|FLTT|FLTE|IMAX)", r"*_RATE_\1"),
+        (r"ARSPD[3-6]_(TYPE|USE)", r"ARSPD2_\1"),
+        (r"SERVO\d+_FUNCTION", "SERVOn_FUNCTION"),
+        (r"FW_(RR|PR)_(?:P|I|D|FF)", r"FW_\1_*"),
+        (r"CA_SV_CS\d_TYPE", "CA_SV_CSn_TYPE"),
+    )
+
+    def group_of(name: str) -> str:
+        pattern, group = next((pair for pair in groups if re.fullmatch(pair[0], name)), (".*", name))
+        return re.sub(pattern, group, name, count=1)
+
+    names = [group_of(name) for name in ArduPilotParameters.table.when_stated]
+    px4_names = [group_of(name) for name in Px4Parameters.table.when_stated]
     assert len(names) > 30
-    for page, expected in (("arduplane-branches.md", names), ("px4-branches.md", [*Px4Parameters.table.when_stated])):
+    for page, expected in (("arduplane-branches.md", names), ("px4-branches.md", px4_names)):
         text = text_of(page)
         assert [name for name in expected if f"`{name}`" not in text] == []
 

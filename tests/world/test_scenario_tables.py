@@ -152,6 +152,7 @@ def test_every_default() -> None:
         "launch": None,
         "landing": None,
         "returns": None,
+        "link": None,
     }
 
 

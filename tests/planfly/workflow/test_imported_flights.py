@@ -119,7 +119,7 @@ def test_a_leg_that_was_not_joined_is_named_and_has_no_overshoot(flights: dict[s
     nearest = min(places, key=lambda place: float(np.hypot(*place)))
     beyond = float(nearest @ leg) / float(np.hypot(*leg)) - float(np.hypot(*leg))
     turn = next(item for item in flights["tight"].verdict.findings if (item.rule, item.place.index) == ("turn", 14))
-    told = re.search(r"that is (\d+) m past the end of the next leg, which was not joined", turn.reason)
+    told = re.search(r"passed (\d+) m beyond the end of the next leg", turn.reason)
     assert told is not None, turn.reason
     assert float(told.group(1)) == pytest.approx(beyond, abs=1.0)
     assert turn.ok is None
