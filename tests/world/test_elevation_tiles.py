@@ -131,7 +131,7 @@ def test_tiles_of_srtm_share_their_outer_posts(tmp_path: Path) -> None:
 FAULTS = {
     "off the grid": (
         ("b.tif", 0.5, "EPSG:4326"),
-        r"b.tif: its pixel grid is offset by 0.5 pixels from that of .*a.tif",
+        r"b.tif: its pixel grid is offset by 0.5 pixels from the grid of .*a.tif",
     ),
     "another system": (("b.tif", 0.0, "EPSG:4258"), r"b.tif: another reference system"),
 }

@@ -185,7 +185,7 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
     """Return a limit in openAIP's form, or None if unlimited."""
     if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
         return None
-    if text.upper() in ("UNL", "UNLIM", "UNLTD", "ENDLESS_LOITER_TIME_S") and key == "upperLimit":
+    if text.upper() in ("UNL", "UNLIM", "UNLTD", "UNLIMITED") and key == "upperLimit":
         return None
     if (level_match := _LEVEL.fullmatch(text)) is not None:
         return {"value": float(level_match[1]), "unit": "FL", "referenceDatum": "STD"}

@@ -262,8 +262,8 @@ class Px4(Autopilot):
         """Return the failsafe from COM_LOW_BAT_ACT and BAT_CRIT_THR, which PX4's own program does not get.
 
         >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
-        >>> Px4(made).checks.battery_failsafes
-        (BatteryFailsafe(parameter='BAT_CRIT_THR', threshold=0.1, used_charge=4500.0),)
+        >>> Px4(made).checks.battery_failsafes[0].used_charge
+        4500.0
         """
         parameters = self.parameters
         if parameters["COM_LOW_BAT_ACT"] not in _LEAVE_AT_CRITICAL_CHARGE:

@@ -25,6 +25,9 @@ def returns_after_last_item(setup: FlightSetup) -> bool:
     last_item = next((item for item in mission.items if item.seq == last_seq), None)
     if last_item is None or last_item.command in LANDINGS | {Command.NAV_LOITER_UNLIM}:
         return False
+    # The route of the airborne part of a flight ends before the landing.
+    if any(item.command in LANDINGS and item.seq > last_seq for item in mission.items):
+        return False
     last_position = route.waypoints[route.items.tolist().index(last_seq)]
     return scenario.external or math.dist(last_position, scenario.destination) > _AT_DESTINATION_M
 

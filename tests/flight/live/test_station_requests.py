@@ -90,7 +90,7 @@ def results(out: list[object], number: int) -> list[int]:
     [
         (178, "speed change"),
         (34, "orbit"),
-        (186, "height"),
+        (186, "altitude change"),
         (22, "take-off"),
         (21, "land"),
     ],

@@ -233,7 +233,7 @@ FAULTS = {
     HEAD + "V D=left": "line 5: V 'D=left': allowed D=+ (clockwise) or D=-",
     HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': expected radius, first and last bearing",
     HEAD + "DX 5": "line 5: 'DX': unknown; shapes are DP, DA, DB, DC, DY",
-    HEAD + "DY 46:00:00N 008:00:00E": "line 1 (LAKE): DY: an airway has at least two points, and a width before",
+    HEAD + "DY 46:00:00N 008:00:00E": "line 1 (LAKE): DY: an airway needs at least two points, and a width",
     HEAD: "line 1 (LAKE): expected one shape",
     "AC R\nAL ask the tower\n": "line 2: AL 'ask the tower': expected a height",
     HEAD + "AA 2026-05-01/2026-04-01": "line 5: AA '2026-05-01/2026-04-01'",

@@ -41,7 +41,9 @@ def test_a_missions_end_has_circles_where_the_autopilot_flies_them() -> None:
     """After the last waypoint ArduPlane returns; PX4 circles, within 2.25 radii of 30 degrees of bank."""
     setup = loiter(TIME, {})
     assert end_loiter_hazards(route_requirements(setup)) is None
-    beside = end_loiter_hazards(route_requirements(replace(setup, autopilot=Px4(Px4Parameters.defaults()))))
+    beside = end_loiter_hazards(
+        route_requirements(replace(setup, autopilot=Px4(Px4Parameters.defaults().changed(FW_AIRSPD_MAX=30.0))))
+    )
     assert beside is not None
     assert beside[0] == pytest.approx(2.25 * radius_at(30.0), rel=0.02)
     assert beside[1] == []

@@ -41,7 +41,7 @@ def test_the_first_row_of_each_departure_is_told(setup: FlightSetup, track: Trac
         columns["attitude"][row, 0] = math.radians(bank)
         columns["airspeed"][row] = speed
     reason = of(judge(setup, Track(**columns)), "departure").reason
-    assert reason.startswith("bank 80° at 50.0 s; airspeed 14.0 m/s at 50.0 s, below 15.0 m/s")
+    assert reason.startswith("bank 80° at 50.0 s, beyond 75°; airspeed 14.0 m/s at 50.0 s, below 15.0 m/s")
     columns = copied(track)
     columns["position"][3000:3600, 2] = -5.0
     assert "ground contact at 50.0 s" in of(judge(setup, Track(**columns)), "departure").reason

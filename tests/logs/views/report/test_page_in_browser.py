@@ -168,10 +168,18 @@ def landing_page(tmp_path_factory: pytest.TempPathFactory, setup: FlightSetup) -
         return write_report(tmp_path_factory.mktemp("landing"), setup, None, judge_geometry(setup), **arguments)[-1]
 
 
-@pytest.mark.parametrize("width", [1400, 420])
-def test_labels_cover_no_other_label_at_any_zoom(browser: Browser, landing_page: Path, width: int) -> None:
-    prefer(browser, "light", width)
+@pytest.fixture
+def browser_at_landing(browser: Browser, page: Path, landing_page: Path) -> Iterator[Browser]:
+    """The browser at the page of the landing, and afterwards at the page of the other tests again."""
     browser.open(landing_page)
+    yield browser
+    browser.open(page)
+
+
+@pytest.mark.parametrize("width", [1400, 420])
+def test_labels_cover_no_other_label_at_any_zoom(browser_at_landing: Browser, width: int) -> None:
+    browser = browser_at_landing
+    prefer(browser, "light", width)
     for name in ("map", "profile"):
         show_chart(browser, name)
         count, covered = browser.value(f"{COVERED}('{name}')")
