@@ -148,10 +148,8 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
     run = EXAMPLE_SPEED_MPS * (time - EXAMPLE_LEAD_S)
     north, east = np.minimum(run, EXAMPLE_LEG_M), np.maximum(run - EXAMPLE_LEG_M, 0.0)
     lats, lons = to_geo(GeoOrigin(lat, lon), east, north)
-    on_first = run < EXAMPLE_LEG_M
-    course = np.where(on_first, 0.0, 0.5 * math.pi)
-    level = np.zeros(time.size)
-    boot = time + 20.0
+    course = np.where(run < EXAMPLE_LEG_M, 0.0, 0.5 * math.pi)
+    level, boot = np.zeros(time.size), time + 20.0
 
     def series(name: str, *columns: np.ndarray) -> LogSeries:
         return LogSeries(name, boot, np.column_stack(columns))
@@ -172,8 +170,7 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
         )
         for number, (y, x) in enumerate(ends, 1)
     )
-    home = Home(items[0].lat_deg, items[0].lon_deg, up - 100.0)
-    height = np.full(time.size, up)
+    home, height = Home(items[0].lat_deg, items[0].lon_deg, up - 100.0), np.full(time.size, up)
     return RawLog(
         source="example.BIN",
         format="ArduPilot dataflash log",
