@@ -221,7 +221,8 @@ def judge_with_reference_flights(
     reference = ReferenceFlights(tried=() if verdict.failed else None)
     with suppress(TrialAborted):
         # planfly's guidance does not return by itself, so that its flight does not explain such a return.
-        if setup.autopilot.level != "airframe" and any(finding.rule != "return" for finding in verdict.failed):
+        is_only_return = bool(verdict.failed) and all(finding.rule == "return" for finding in verdict.failed)
+        if setup.autopilot.level != "airframe" and not is_only_return:
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
         if reference.airframe is not None and reference.airframe.flyable:
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))

@@ -75,7 +75,8 @@ def test_a_leg_above_ground_follows_the_ground(law: str, tmp_path: Path) -> None
     places = (0.0, 0.0, 100.0), (0.0, 1000.0, 100.0), (0.0, 6500.0, 100.0)
     terrain = write_hill(tmp_path, 4000.0, 130.0, slope=math.tan(math.radians(5.0)))
     flown = planfly.fly(write_mission(tmp_path, *places, frame=10), terrain=terrain, autopilot=law)
-    assert flown.verdict.flyable, flown.verdict.summary
+    # The return after the last item, straight and at RTL_ALTITUDE, meets the hill.
+    assert {finding.rule for finding in flown.verdict.failed} == ({"return"} if law == "ardupilot" else set())
     assert flown.track.clearance.min() > 85.0
     # TERRAIN_LOOKAHD lifts ArduPlane before the top, by no more than the hill's height above half of its climb.
     assert flown.track.clearance.max() < 130.0

@@ -160,7 +160,7 @@ def _pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
         latitude = log.series("latitude")
         north = _change(latitude, grid, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
         yield _Pair("velocity_north", "the change of latitude", log.series("velocity_north"), north)
-        east = _change(log.series("longitude"), grid, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
+        east = _change(log.series("longitude"), grid, turning=True, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
         east = east * np.cos(_on_grid(latitude, grid))
         yield _Pair("velocity_east", "the change of longitude", log.series("velocity_east"), east)
     if log.has("roll", "pitch", "yaw"):

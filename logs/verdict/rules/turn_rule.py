@@ -61,8 +61,8 @@ def _turn_finding(
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink(requirements, i)
         if lateral is None:
-            faults.append(_sharp_turn_message(requirements, i, planned_turn, limit, source))
-            facts = [] if faults[0].brief.startswith(turn_text) else facts
+            # The message states the turn and its limit.
+            faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []
         else:
             facts.append(
                 f"a negligible kink: the path without this waypoint passes it at {lateral:.1f} m and can be flown"

@@ -40,6 +40,7 @@ def test_items_that_have_other_numbers_are_the_same() -> None:
         "item 6",
         "leg 1\u20132",
         "leg 2\u20133",
+        "item 8",
     ]
     middle = {"east": 0.5 * (east + far), "north": 0.5 * (north + further)}
     session.edit(messages.Insert(kind="insert", rev=session.rev, after=own[0], **middle))

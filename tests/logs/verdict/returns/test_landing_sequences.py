@@ -80,7 +80,7 @@ def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path,
 def test_what_each_value_says(tmp_path: Path) -> None:
     said = [describe_landing(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
     assert "ArduPlane does not arm" in said[0]
-    assert said[1].endswith("from its circle a return continues to the landing sequence at item 4")
+    assert said[1].endswith("from its loiter a return continues to the landing sequence at item 4")
     assert "for go-arounds only" in said[3]
     assert judged(tmp_path, RTL_AUTOLAND=3).each[0].target.name == "home"
     by_path = judged(tmp_path, RTL_AUTOLAND=4)
