@@ -103,12 +103,12 @@ class PathProfile(NamedTuple):
     """Ground between two antennas.
 
     distances: (n,) distances from the station along the ground, m, without both ends.
-    heights: (n,) altitudes of the ground, m AMSL, raised by the bulge of the Earth between the antennas.
+    altitudes: (n,) of the ground, m AMSL, raised by the bulge of the Earth between the antennas.
     length: distance between the antennas along the ground, m.
     """
 
     distances: Floats
-    heights: Floats
+    altitudes: Floats
     length: float
 
 
@@ -149,11 +149,11 @@ def path_loss(profile: PathProfile, station_altitude: float, aircraft_altitude: 
     free_loss = free_space_loss(slant_distance, frequency)
     if not profile.distances.size:
         return PathLoss(free_loss, 0.0, True, math.inf)
-    if np.isnan(profile.heights).any():
+    if np.isnan(profile.altitudes).any():
         return PathLoss(math.nan, math.nan, False, math.nan)
     wavelength, remaining = LIGHT_SPEED_MPS / frequency, profile.length - profile.distances
     ray = station_altitude + (aircraft_altitude - station_altitude) * profile.distances / profile.length
-    excess = profile.heights - ray
+    excess = profile.altitudes - ray
     # Radius of the first Fresnel zone (ITU-R P.526-15, equation 2).
     fresnel_radii = np.sqrt(wavelength * profile.distances * remaining / profile.length)
     diffraction_loss = _bullington_loss(profile, excess, fresnel_radii, station_altitude, aircraft_altitude, wavelength)
@@ -179,13 +179,13 @@ def _bullington_loss(
     """
     length = profile.length
     # Slopes towards the highest obstacle in sight from either end, and between both ends (equations 47, 51 and 48).
-    station_slope = float(((profile.heights - station_altitude) / profile.distances).max())
+    station_slope = float(((profile.altitudes - station_altitude) / profile.distances).max())
     path_slope = (aircraft_altitude - station_altitude) / length
     if station_slope <= path_slope:
         # Equation 49; sqrt(2) times the height in radii of the first Fresnel zone is the diffraction parameter.
         parameter = math.sqrt(2.0) * float((excess / fresnel_radii).max())
     else:
-        aircraft_slope = float(((profile.heights - aircraft_altitude) / (length - profile.distances)).max())
+        aircraft_slope = float(((profile.altitudes - aircraft_altitude) / (length - profile.distances)).max())
         # The edge where both slopes meet (equations 52 and 53).
         distance = (aircraft_altitude - station_altitude + aircraft_slope * length) / (station_slope + aircraft_slope)
         distance = min(max(distance, 1e-3 * length), (1.0 - 1e-3) * length)

@@ -63,7 +63,7 @@ def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return findings on a flown track, judged by its route and the aircraft's envelope, without its end."""
+    """Return findings on a flown track, by its route and the aircraft's envelope, but not on how the flight ended."""
     return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
 
 

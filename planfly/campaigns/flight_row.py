@@ -272,7 +272,10 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
 
 
 def list_failed_findings(verdict: Verdict) -> tuple[tuple[str, Place], ...]:
-    """Return rule and place of each failed finding; of the rule completion for other incomplete flights."""
+    """Return the rule and the place of each failed finding.
+
+    An incomplete flight without a failed finding fails the rule `completion`.
+    """
     failed_findings = tuple((finding.rule, finding.place) for finding in verdict.findings if finding.ok is False)
     if failed_findings or verdict.flies:
         return failed_findings

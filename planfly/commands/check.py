@@ -13,7 +13,7 @@ from planfly.terminal.arguments import (
     parse_autopilots,
     with_completer,
 )
-from planfly.terminal.command_parser import LineParser
+from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import LOSS, verdict_code
 from planfly.terminal.options import (
     aircraft_and_wind_options,
@@ -33,6 +33,16 @@ if TYPE_CHECKING:
 
 # Suffixes of logs of other programs, as the help shows them.
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
+
+
+def mission_or_log_argument(parser: CommandParser) -> None:
+    """Add the argument for a mission, which is flown first, or for a flight log of planfly or another program."""
+    with_completer(
+        parser.add_argument(
+            "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
+        ),
+        file_completer(*MISSION_SUFFIXES, "mcap", *IMPORTED_LOG_SUFFIXES),
+    )
 
 
 def check_options(command_line: LineParser) -> None:

@@ -4,14 +4,10 @@ import argparse
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.commands.check import LOGS
+from planfly.commands.check import mission_or_log_argument
 from planfly.terminal.arguments import (
-    IMPORTED_LOG_SUFFIXES,
-    MISSION_SUFFIXES,
-    file_completer,
     number_parser,
     parse_position,
-    with_completer,
 )
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
@@ -38,12 +34,7 @@ def link_options(command_line: LineParser) -> None:
         "planfly link mission.waypoints --terrain jacksboro --frequency 915 --power 27 --sensitivity -105",
         "planfly link flight.mcap --scenario mine.toml --out pictures",
     )
-    with_completer(
-        parser.add_argument(
-            "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
-        ),
-        file_completer(*MISSION_SUFFIXES, "mcap", *IMPORTED_LOG_SUFFIXES),
-    )
+    mission_or_log_argument(parser)
     group = parser.group("the link (each replaces an entry of the scenario's [link])")
     for name, unit, text in (
         ("frequency", "MHZ", "frequency, MHz"),

@@ -5,13 +5,9 @@ import math
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.commands.check import LOGS
+from planfly.commands.check import mission_or_log_argument
 from planfly.terminal.arguments import (
-    IMPORTED_LOG_SUFFIXES,
-    MISSION_SUFFIXES,
-    file_completer,
     number_parser,
-    with_completer,
 )
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
@@ -43,12 +39,7 @@ def returns_options(command_line: LineParser) -> None:
         "planfly returns flight.mcap --every 5 --out pictures",
         "planfly returns flight.mcap --sitl ./arduplane --points 5",
     )
-    with_completer(
-        parser.add_argument(
-            "what", metavar="MISSION|LOG", help=f"plan.json, .waypoints or .plan, or a flight log (.mcap, or {LOGS})"
-        ),
-        file_completer(*MISSION_SUFFIXES, "mcap", *IMPORTED_LOG_SUFFIXES),
-    )
+    mission_or_log_argument(parser)
     group = parser.group("the returns")
     group.add_argument(
         "--every",

@@ -81,7 +81,7 @@ def test_the_earth_bulges_between_the_antennas() -> None:
     ground = make_flat_terrain(np.array([[-1000.0, 51_000.0], [-1000.0, 1000.0]]), 0.0, 0.0)
     profile = path_profile(ground, np.zeros(3), np.array([50_000.0, 0.0, 0.0]))
     assert pytest.approx(8_494_667.0, abs=1.0) == EFFECTIVE_EARTH_RADIUS_M
-    assert profile.heights.max() == pytest.approx(36.8, abs=0.1)
+    assert profile.altitudes.max() == pytest.approx(36.8, abs=0.1)
 
 
 def test_lines_of_sight_equal_a_march_along_the_ray() -> None:

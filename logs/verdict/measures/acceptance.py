@@ -146,10 +146,11 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 
 
 def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
-    """Return the distance at which a flyable path without the corner passes it, m, or None if there is no such path.
+    """Return how far a flyable path without waypoint i passes from the waypoints that it omits, m, or None without one.
 
-    The path omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours, passes each of them within
-    `KINK_FRACTION` of the corridor's half width, and has room for the turns at both ends of the gap.
+    The distance is the largest of all omitted waypoints.  The path omits the waypoint and up to `KINK_WAYPOINT_COUNT`
+    - 1 of its neighbours, passes each of them within `KINK_FRACTION` of the corridor's half width, and has room for the
+    turns at both ends of the gap.
     """
     max_distance, is_circle = KINK_FRACTION * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
@@ -159,10 +160,10 @@ def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
             if _distance_from_leg(requirements.points[i], chord) > max_distance:
                 continue
             distance, _ = farthest_from_legs(requirements.points[first : last + 1], chord)
-            is_apart = math.dist(chord[0, :2], chord[1, :2]) > 0.0
+            has_length = math.dist(chord[0, :2], chord[1, :2]) > 0.0
             if (
                 distance <= max_distance
-                and is_apart
+                and has_length
                 and not is_circle[first : last + 1].any()
                 and _has_room(requirements, first, last)
             ):

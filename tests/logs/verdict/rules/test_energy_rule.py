@@ -199,7 +199,7 @@ def test_a_monitor_of_the_voltage_alone_never_acts_by_the_charge(monitor: int, o
 
 
 def test_a_further_battery_that_leaves_the_mission_leaves_the_energy_open() -> None:
-    """How much of the charge comes from which battery is not known."""
+    """The share of the charge that comes from each battery is not known."""
     text = "BATT_MONITOR 4\n{0}_MONITOR 4\n{0}_CAPACITY 1000\n{0}_CRT_MAH 999\n{0}_FS_CRT_ACT 1\n"
     for monitor in ("BATT2", "BATT3", "BATTA"):
         item = _energy_with(text.format(monitor))

@@ -503,7 +503,9 @@ def test_a_throttle_with_an_airspeed_beyond_the_limits_leaves_the_verdict_open(c
     assert [item.reason.startswith(said) for item in left] == [True] * bool(said)
 
 
-RTL, UNLIMITED, TOUCHDOWN = "0 20 0 0 0 0 0 0 0", wp(1500, 1500, command=17), wp(0, 1500, 0, command=21)
+RTL = "0 20 0 0 0 0 0 0 0"
+UNLIMITED = wp(1500, 1500, command=17)
+TOUCHDOWN = wp(0, 1500, 0, command=21)
 MARK = "0 189 0 0 0 0 0 0 0"
 
 
