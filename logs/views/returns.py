@@ -228,10 +228,10 @@ def _glide_margin_panel(glides: Glides) -> Panel:
         column = np.array(values)
         return series(name, role, time, np.where(np.isfinite(column), column, np.nan))
 
-    layers = [line("to spare for home", "left-home", [glide.altitudes_left[0] for glide in glides.each])]
+    layers = [line("to spare for home", "left-home", [glide.home_altitude_left for glide in glides.each])]
     if len(glides.sites) > 1:
-        best_site_margins = [max(glide.altitudes_left[1:]) for glide in glides.each]
-        layers.append(line("to spare for a rally point or landing place", "left-site", best_site_margins))
+        site_margins = [glide.site_altitude_left for glide in glides.each]
+        layers.append(line("to spare for a rally point or landing place", "left-site", site_margins))
     layers.append(line("to spare for flat ground", "left-flat", [glide.flat_altitude_left for glide in glides.each]))
     limits = (("nothing to spare", 0.0),)
     return Panel("altitude to spare without the engine", "m", tuple(layers), limits, min_span=_MIN_SPAN)

@@ -92,8 +92,9 @@ class Glide:
 
     time: s of the flight.  start: (3,) m.
     own_return: outcome of ArduPlane's return.
-    altitudes_left: for each of `Glides.sites`, the altitude left on arrival, m; negative if the altitude is too low,
-        -inf without a path.
+    home_altitude_left: altitude left on arrival at home, m; negative if the altitude is too low, -inf without a path.
+    site_altitude_left: the same for the best rally point or landing place; -inf if there is none.
+    site: index of that place in `Glides.sites`; -1 if no path leads to one.
     flat_altitude_left: the same for flat ground.
     flat_position: east, north and altitude of that ground, m; NaN if there is none.
     reach: the best destination.
@@ -102,7 +103,9 @@ class Glide:
     time: float
     start: tuple[float, float, float]
     own_return: EngineOutReturn
-    altitudes_left: tuple[float, ...]
+    home_altitude_left: float
+    site_altitude_left: float
+    site: int
     flat_altitude_left: float
     flat_position: tuple[float, float, float]
     reach: Reach
@@ -164,7 +167,7 @@ class Glides:
         """Return the index of the best site: home if in reach, or else the one with most altitude left; -1 if none."""
         if glide.reach == "home":
             return 0
-        return int(np.argmax(glide.altitudes_left)) if glide.reach == "site" else -1
+        return glide.site if glide.reach == "site" else -1
 
     @property
     def ranges(self) -> tuple[GlideRange, ...]:
@@ -190,13 +193,12 @@ class Glides:
 
         Below 0 if none is in reach, -inf without a path.
         """
-        if glide.reach in ("home", "site"):
-            return glide.altitudes_left[self.best_site(glide)]
-        return (
-            glide.flat_altitude_left
-            if glide.reach == "flat"
-            else max((*glide.altitudes_left, glide.flat_altitude_left))
-        )
+        altitudes_left = {
+            "home": glide.home_altitude_left,
+            "site": glide.site_altitude_left,
+            "flat": glide.flat_altitude_left,
+        }
+        return altitudes_left.get(glide.reach, max(altitudes_left.values()))
 
 
 # Placeholder for a flight without judged glides.
@@ -234,35 +236,40 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
         result = glide_altitudes_left(rows, glides, world.aircraft, environment, airspeed, bank)
         return *result, glides.min_altitude
 
-    site_results = [search_from_cells(np.array([grid.cell_at(site.east, site.north)])) for site in sites]
-    altitudes_left = [site_result[0] for site_result in site_results]
+    # One search for home, and one for all other sites: it leads each start to the site that is best for it.
+    site_cells = np.array([grid.cell_at(site.east, site.north) for site in sites])
+    home_altitudes_left, _, home_min_altitudes = search_from_cells(site_cells[:1])
+    site_altitudes_left, reached_cells, site_min_altitudes = search_from_cells(site_cells[1:])
+    site_by_cell = {
+        int(np.ravel_multi_index(tuple(cell), grid.floor.shape)): k for k, cell in enumerate(site_cells) if k
+    }
     is_landable = _flat_ground(world, grid)
     flat_altitudes_left, flat_cells, _ = search_from_cells(np.argwhere(is_landable))
     is_known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     glides = []
     for k, row in enumerate(rows):
-        site_altitudes = tuple(float(altitudes[k]) for altitudes in altitudes_left)
-        flat_altitude = float(flat_altitudes_left[k])
-        flat_position = cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NO_POSITION
-        start = (float(row["east"]), float(row["north"]), float(row["up"]))
-        reach = _best_reach(site_altitudes, flat_altitude) if is_known[k] else "unknown"
-        time, own_return = float(starts.time[k]), own_returns[k]
-        glides.append(Glide(time, start, own_return, site_altitudes, flat_altitude, flat_position, reach))
-    site_min_altitudes = np.minimum.reduce([site_result[2] for site_result in site_results])
-    return Glides(
-        tuple(glides),
-        sites,
-        airspeed,
-        grid.cell,
-        burns_fuel,
-        footprint=GlideFootprint(grid, site_min_altitudes, is_landable),
-    )
+        altitudes_left = (float(home_altitudes_left[k]), float(site_altitudes_left[k]), float(flat_altitudes_left[k]))
+        glides.append(
+            Glide(
+                time=float(starts.time[k]),
+                start=(float(row["east"]), float(row["north"]), float(row["up"])),
+                own_return=own_returns[k],
+                home_altitude_left=altitudes_left[0],
+                site_altitude_left=altitudes_left[1],
+                site=site_by_cell.get(int(reached_cells[k]), -1),
+                flat_altitude_left=altitudes_left[2],
+                flat_position=cell_position(grid, int(flat_cells[k])) if flat_cells[k] >= 0 else _NO_POSITION,
+                reach=_best_reach(*altitudes_left) if is_known[k] else "unknown",
+            )
+        )
+    footprint = GlideFootprint(grid, np.minimum(home_min_altitudes, site_min_altitudes), is_landable)
+    return Glides(tuple(glides), sites, airspeed, grid.cell, burns_fuel, footprint=footprint)
 
 
-def _best_reach(altitudes_left: tuple[float, ...], flat_altitude_left: float) -> Reach:
-    if altitudes_left[0] >= 0.0:
+def _best_reach(home_altitude_left: float, site_altitude_left: float, flat_altitude_left: float) -> Reach:
+    if home_altitude_left >= 0.0:
         return "home"
-    if any(altitude >= 0.0 for altitude in altitudes_left):
+    if site_altitude_left >= 0.0:
         return "site"
     return "flat" if flat_altitude_left >= 0.0 else "nothing"
 

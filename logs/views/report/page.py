@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 # Pictures.
 
-# A larger picture is stored with few colours, bytes.
+# A larger picture is embedded as a JPEG, bytes.
 _LARGE_PICTURE_BYTES = 200_000
 
 
@@ -89,16 +89,16 @@ def report_pictures(subject: Subject, names: Collection[str], stills: Mapping[st
 
 
 def picture_address(png: bytes) -> str:
-    """Return a picture as a data URL; a large picture, which is seen only on paper, with few colours.
+    """Return a picture as a data URL; a large picture, which is seen only on paper, as a JPEG.
 
     >>> picture_address(b"PNG")
     'data:image/png;base64,UE5H'
     """
     # Imported here, so that matplotlib is not loaded before a drawing.
-    from logs.views.drawing import reduce_colours
+    from logs.views.drawing import jpeg_bytes
 
-    small = png if len(png) <= _LARGE_PICTURE_BYTES else reduce_colours(png)
-    return "data:image/png;base64," + base64.b64encode(small).decode("ascii")
+    kind, data = ("png", png) if len(png) <= _LARGE_PICTURE_BYTES else ("jpeg", jpeg_bytes(png))
+    return f"data:image/{kind};base64," + base64.b64encode(data).decode("ascii")
 
 
 # Style, scripts and plotly.js of the pages, and the policy that admits no others.

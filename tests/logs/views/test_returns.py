@@ -111,7 +111,7 @@ def test_heights_and_what_is_left_over_stand_at_their_times(shown: tuple[FlightS
     assert set(at[:, 0].tolist()) == {one.time for one in drawn.returns.each}
     assert at[:, 1] == pytest.approx(600.0)
     (home,), (flat,) = by_role(left.layers, "left-home"), by_role(left.layers, "left-flat")
-    lefts = [one.altitudes_left[0] if math.isfinite(one.altitudes_left[0]) else math.nan for one in drawn.glides.each]
+    lefts = [one.home_altitude_left if math.isfinite(one.home_altitude_left) else math.nan for one in drawn.glides.each]
     assert home.y == pytest.approx(lefts, nan_ok=True)
     assert flat.x.tolist() == [one.time for one in drawn.glides.each]
     assert left.limits == (("nothing to spare", 0.0),)

@@ -44,9 +44,9 @@ def test_home_is_in_reach_as_far_as_the_height_lasts(tmp_path: Path) -> None:
     assert farthest == pytest.approx((600.0 - 8.0 - 60.0 - 30.0) * RATIO - 78.0, abs=350.0)
     assert {one.reach for one in found.each if one.start[0] > farthest} == {"nothing"}
     near = min(found.each, key=lambda one: abs(one.start[0] - 1500.0))
-    assert near.altitudes_left[0] == pytest.approx(600.0 - 8.0 - 60.0 - 30.0 - 1578.0 / RATIO, abs=30.0)
+    assert near.home_altitude_left == pytest.approx(600.0 - 8.0 - 60.0 - 30.0 - 1578.0 / RATIO, abs=30.0)
     # 50 m further on 5 m less are left, and no start has a turn of its own.
-    left = [one.altitudes_left[0] for one in home if one.start[0] > 500.0]
+    left = [one.home_altitude_left for one in home if one.start[0] > 500.0]
     assert np.diff(left) == pytest.approx(-50.0 / RATIO, abs=10.0)
     assert [one.kind for one in found.sites] == ["home"]
     assert found.airspeed == 18.0
@@ -75,8 +75,11 @@ def test_a_rally_point_and_a_landing_of_the_mission_are_reached(tmp_path: Path) 
     assert site
     late = min(site, key=lambda one: one.start[0])
     # Ahead of it, with no turn: the rally point is 500 m nearer than the landing.
-    assert late.altitudes_left[1] - late.altitudes_left[2] == pytest.approx(500.0 / RATIO, abs=8.0)
-    assert found.best_site(late) == 1
+    without_rally = judged(hill_setup(tmp_path, BARRED, way), 4.0)
+    landing_alone = next(one for one in without_rally.each if one.time == late.time)
+    assert late.site_altitude_left - landing_alone.site_altitude_left == pytest.approx(500.0 / RATIO, abs=8.0)
+    assert (found.best_site(late), without_rally.best_site(landing_alone)) == (1, 1)
+    assert without_rally.sites[1].kind == "landing"
     assert any(": rally point 1, " in glide_range_text(group, found) for group in found.ranges)
     assert ": the landing at item 3, " in glide_range_text(found.ranges[-1], found)
     assert "a rally point or landing place, but not home, from " in glides_headline(found)
@@ -100,7 +103,7 @@ def test_arduplanes_own_return_ends_where_its_law_says(tmp_path: Path) -> None:
     assert all(0.0 < one.clearance < 30.0 for one in low)
     assert found.arrivals == sum(one.own_return.end == "arrives" for one in found.each) > len(before)
     # It is never better than the best there is, but for what the turn gives back of its speed.
-    assert all(one.altitudes_left[0] > -25.0 for one in found.each if one.own_return.end == "arrives")
+    assert all(one.home_altitude_left > -25.0 for one in found.each if one.own_return.end == "arrives")
 
 
 def test_a_sphere_on_the_way_home_stops_its_own_return_and_is_flown_around(tmp_path: Path) -> None:
@@ -167,11 +170,11 @@ def test_just_enough_height_is_enough(tmp_path: Path) -> None:
     spare = 0.0
     for _ in range(3):
         # What is lost on the way changes with the height by hundredths of it.
-        spare += lowered(spare).each[0].altitudes_left[0]
+        spare += lowered(spare).each[0].home_altitude_left
     assert spare > 200.0
     just, hardly = lowered(spare - 0.5), lowered(spare + 0.5)
-    assert 0.0 <= just.each[0].altitudes_left[0] < 1.0
-    assert -1.0 < hardly.each[0].altitudes_left[0] < 0.0
+    assert 0.0 <= just.each[0].home_altitude_left < 1.0
+    assert -1.0 < hardly.each[0].home_altitude_left < 0.0
     assert (just.always_reaches_ground, hardly.always_reaches_ground) == (True, False)
 
 
