@@ -1,5 +1,5 @@
 # make demo: set up, then plan over real terrain, export, fly, log, check, report
-# make test: set up, then run the tests, but for the 5 % of tests/slow/cases.txt, which take two thirds of the time
+# make test: set up, then run the tests, but for the 9 % of tests/slow/cases.txt, which take three quarters of the time
 # make slow: set up, then run those
 # make lint: set up, then check style, types and the pages of docs/
 # make dev: set up what a developer needs, and nothing more
