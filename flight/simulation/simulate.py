@@ -23,7 +23,7 @@ from flight.simulation.local_map import LocalMap
 from flight.simulation.setup import EngineChoice, FlightSetup
 from flight.simulation.start import Start, default_gear, find_release, release
 from flight.simulation.tick import READ_FIELDS, Workspace
-from flight.simulation.track import Rows, Track, as_track, join_rows
+from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_rows
 from world.errors import FlightError, StartError
 
 # ----------------------------------------------------------------------
@@ -134,6 +134,8 @@ def make_loop(
 TICK_S = 1.0 / 60.0
 # Duration of one block of rows from `simulate`, s.
 BLOCK_DURATION_S = 1.0
+# Largest number of blocks whose rows are kept as they were flown, before they are stored in a track.
+_MAX_PENDING_BLOCKS = 600
 # Bank that guidance may add to the bank of planned turns in order to correct an error, rad.
 BANK_RESERVE_RAD = math.radians(3.0)
 # Time added to the time limit of a flight that takes off or lands, s.
@@ -206,13 +208,51 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
     >>> flown.ended, round(float(flown.track.time[-1])), bool(abs(flown.track.cross_track).max() < 0.1)
     ('completed', 12, True)
     """
-    blocks = list(simulate(flight))
-    return SimulatedFlight(join_blocks(blocks), blocks[-1].end_reason, flight.path)
+    builder, end_reason = TrackBuilder(), ""
+    for block in simulate(flight):
+        builder.add(block.rows)
+        end_reason = block.end_reason
+    return SimulatedFlight(builder.track(), end_reason, flight.path)
 
 
-def join_blocks(blocks: Sequence[FlightBlock]) -> Track:
-    """Return the track of successive blocks."""
-    return as_track(join_rows([block.rows for block in blocks]))
+class TrackBuilder:
+    """Build the track of a flight while it is flown, in half the memory of the flown rows.
+
+    >>> import numpy as np
+    >>> from flight.simulation.track import TRACK_ROW
+    >>> builder = TrackBuilder()
+    >>> for _ in range(2):
+    ...     builder.add(np.zeros(60, TRACK_ROW))
+    >>> len(builder.track())
+    120
+    """
+
+    def __init__(self) -> None:
+        no_rows = as_track(join_rows([]))
+        self._columns = {name: getattr(no_rows, name).copy() for name in COLUMNS}
+        self._pending_rows: list[Rows] = []
+
+    def add(self, rows: Rows) -> None:
+        """Add rows that follow those added before."""
+        self._pending_rows.append(rows)
+        if len(self._pending_rows) >= _MAX_PENDING_BLOCKS:
+            self._store_pending_rows()
+
+    def track(self) -> Track:
+        """Return the track of all rows; no rows can be added afterwards."""
+        self._store_pending_rows()
+        for column in self._columns.values():
+            column.setflags(write=False)
+        return Track(**self._columns)
+
+    def _store_pending_rows(self) -> None:
+        rows = join_rows(self._pending_rows)
+        self._pending_rows.clear()
+        for name, column in self._columns.items():
+            stored_count = len(column)
+            # Enlarge the array in place: a copy of a long flight takes as much memory again.
+            column.resize((stored_count + len(rows), *column.shape[1:]), refcheck=False)
+            column[stored_count:] = rows[name]
 
 
 # Fields of `flight.guidance.inner_loops.GUIDANCE_MEMORY` that describe the flown path and not the aircraft.

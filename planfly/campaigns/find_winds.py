@@ -46,6 +46,8 @@ _MIN_FLIGHTS_EACH = 3
 _MAX_FLIGHTS_EACH = 6
 # Growth of the number of flights between two checks of an open direction, because the posterior is slow to compute.
 _CHECK_GROWTH_RATIO = 1.04
+# Minimum number of flights in calm air that must all fail for a search to end without a flight in wind.
+_MIN_CALM_FLIGHTS = 6
 # Dispersed quantities that the wind of the search replaces.
 SEARCHED_QUANTITIES = ("wind_speed", "wind_from")
 
@@ -147,6 +149,7 @@ def find_winds(
 ) -> WindsResult:
     """Fly rounds of flights until each boundary is known accurately enough, or all flights are used.
 
+    A search starts with a few flights in calm air. If all of them fail, no wind is searched, and the table stays empty.
     Flights in the table are not flown again. The winds of a round depend only on the earlier rounds, so the result is
     the same for any number of workers and interruptions. Flights completed before an error or Ctrl-C stay in the
     table.
@@ -162,7 +165,10 @@ def find_winds(
                 if pool is None:
                     # Report before the workers start, because the start takes seconds.
                     progress.report_start(len(stored_flights.flown))
-                pool = pool or stack.enter_context(worker_pool(workers, base, fly))
+                    pool = stack.enter_context(worker_pool(workers, base, fly))
+                    calm_failures = None if stored_flights.flown else _failures_in_calm_air(pool, goal)
+                    if calm_failures is not None:
+                        return search.result_in_calm_air(calm_failures)
                 _fly_round(pool, search, missing_requests, stored_flights, progress)
             for request in requests:
                 search.add_result(request, stored_flights.flown[request.number])
@@ -244,6 +250,12 @@ class _Search:
         calm_failures = self._calm_failures(boundaries)
         return WindsResult(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm_failures)
 
+    def result_in_calm_air(self, calm: CalmFailures) -> WindsResult:
+        """Return the result of a search that ends after its flights in calm air."""
+        boundaries = (WindBoundary(0.0, 0.0, 0.0, beyond=False),) * self.goal.directions
+        self.flown = [(0, 0.0, False)] * calm.flights
+        return replace(self.result(), boundaries=boundaries, calm=calm)
+
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
         """Return the failures in the weakest wind flown, for directions whose boundary is calm air; otherwise None."""
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
@@ -256,6 +268,29 @@ class _Search:
         numbers = [number for number, (_, speed, _) in numbered_flights if speed == min_speed]
         failed_findings = [self._failed[number] for number in numbers if not self.flown[number][2]]
         return CalmFailures(min_speed, len(numbers), len(failed_findings), count_failures(failed_findings))
+
+
+def _failures_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> CalmFailures | None:
+    """Fly the first draws in calm air, and return their failures if all of them fail, otherwise None.
+
+    If the mission flew with the target probability, so many flights would all fail with a probability of at most one
+    less the confidence.
+    """
+    count = max(_MIN_CALM_FLIGHTS, math.ceil(math.log(1.0 - goal.confidence) / math.log(1.0 - goal.target)))
+    if count > goal.flights:
+        return None
+    draws, rows = iter(range(count)), dict[int, FlightRow]()
+
+    def next_request() -> FlightRequest | None:
+        has_failed_only = all(row.outcome == "not flyable" for row in rows.values())
+        draw = next(draws, None) if has_failed_only else None
+        return None if draw is None else FlightRequest(draw, GivenWind(0.0, 0.0))
+
+    for request, row in pool.fly(next_request):
+        rows[request.index] = row
+    if any(row.outcome != "not flyable" for row in rows.values()):
+        return None
+    return CalmFailures(0.0, count, count, count_failures([rows[draw].failed for draw in range(count)]))
 
 
 def _failure_key(rule: str, place: Place) -> Hashable:

@@ -425,8 +425,15 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
     return f"{lower:.1f} to {f'over {max_speed:g}' if upper >= max_speed - 1e-9 else f'{upper:.1f}'}"
 
 
+def _is_only_calm(winds: WindsResult) -> bool:
+    """Return True if all flights were in calm air, and failed, so that no wind was searched."""
+    return winds.calm is not None and winds.calm.flights == len(winds.flights)
+
+
 def _unsettled_directions(winds: WindsResult) -> list[int]:
-    """Return the directions with too few flights."""
+    """Return the directions with too few flights; none if the mission fails in calm air and no wind was searched."""
+    if _is_only_calm(winds):
+        return []
     counts = Counter(direction for direction, _, _ in winds.flights)
     return [
         k
@@ -511,7 +518,8 @@ def _winds_answer(winds: WindsResult) -> str:
             f" at {percent}), {best_text}"
         )
     if highest_direction.boundary < CALM_MPS:
-        return f"does not fly with P >= {target:g}, by best estimate, even in calm air"
+        basis = "" if _is_only_calm(winds) else ", by best estimate,"
+        return f"does not fly with P >= {target:g}{basis} even in calm air"
     return (
         f"does not fly with P >= {target:g}, by best estimate, in wind from {lowest_direction.from_deg:g}° even in calm"
         " air;"
@@ -529,7 +537,9 @@ def wind_lines(winds: WindsResult) -> list[str]:
         *_lines_without_failures(winds),
         *_unsettled_lines(winds),
         *_lost_lines(winds),
-        f"{len(winds.flights)} flights; intervals at {percent}, by the flights of each direction",
+        f"{len(winds.flights)} flights; no wind was tried, because every flight in calm air fails"
+        if _is_only_calm(winds)
+        else f"{len(winds.flights)} flights; intervals at {percent}, by the flights of each direction",
     ]
 
 

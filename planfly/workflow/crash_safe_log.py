@@ -56,7 +56,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
     True
     """
     leg_lengths = leg_runs(setup.route.waypoints)
-    speed = leg_lengths.sum() / (leg_lengths / setup.route.airspeed).sum()
+    speed = leg_lengths.sum() / (leg_lengths / setup.demanded_route.airspeed).sum()
     return float(setup.path.length / speed)
 
 

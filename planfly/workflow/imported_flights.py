@@ -23,7 +23,7 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import route_through_stops
 from flight.mission_files.formats import read_mission
 from flight.simulation.setup import FlightSetup, ImportedLog, make_limits
-from flight.simulation.simulate import Flight, join_blocks, simulate
+from flight.simulation.simulate import Flight, TrackBuilder, simulate
 from flight.simulation.track import Track
 from logs.importers.clean_positions import MAX_STEP_S
 from logs.importers.imported_flight import LoggedFlight, make_flight, make_track, mean_wind, with_flown_heights
@@ -455,13 +455,14 @@ def _refly_followed_legs(
 
     if draw is not None:
         model_setup = replace(model_setup, seed=draw.seed)
-    flight, blocks = Flight(model_setup, model, None if draw is None else draw.variation), []
-    length = flight.path.length
+    flight = Flight(model_setup, model, None if draw is None else draw.variation)
+    builder, end_reason, length = TrackBuilder(), "", flight.path.length
     for block in simulate(flight):
-        blocks.append(block)
+        builder.add(block.rows)
+        end_reason = block.end_reason
         if advance is not None:
             advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
-    track, end_reason = join_blocks(blocks), blocks[-1].end_reason
+    track = builder.track()
     if len(track) < 2:
         raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {end_reason}", file=scenario.name)
     if draw is not None:

@@ -9,7 +9,7 @@ from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
 from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, FlightBlock, join_blocks, simulate
+from flight.simulation.simulate import Flight, TrackBuilder, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
@@ -221,9 +221,9 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
 
 def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
     """Fly to the end or until the log is full, recording each block; return the track and the reason for the end."""
-    blocks, end_reason, length = list[FlightBlock](), "", flight.path.length
+    builder, end_reason, length = TrackBuilder(), "", flight.path.length
     for block in simulate(flight):
-        blocks.append(block)
+        builder.add(block.rows)
         end_reason = block.end_reason
         if recorder is not None and len(block.rows):
             recorder.write(block.rows)
@@ -232,7 +232,7 @@ def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: Crash
             task.advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
         if end_reason:
             break
-    return join_blocks(blocks), end_reason
+    return builder.track(), end_reason
 
 
 def _judge_unflown(

@@ -20,7 +20,7 @@ from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from planfly.workflow.suggestion_trials import SuggestionTrials, tried_suggestions
-from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, never_abort
+from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_explaining_flights, never_abort
 
 # ----------------------------------------------------------------------
 # Find the autopilot parameter that decides a failed flight, by flying again with one parameter changed at a time.
@@ -29,6 +29,8 @@ from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, never
 # Rules that an altitude error violates, not a cross-track error.
 _VERTICAL_RULES = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
+# Number of flights of a usual search for the deciding parameter.
+_MAX_PARAMETER_FLIGHTS = 10
 # Function that flies with an autopilot and returns True if the flight passes.
 PassesWithAutopilot = Callable[[Autopilot], bool]
 
@@ -210,7 +212,8 @@ def judge_with_reference_flights(
     requirements: the route requirements of the flown setup.
     track, end_reason: the flight, and the reason for its end.
     fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
-    pass.  A flight of planfly's own guidance has no reference flight, but its suggestions are tried.
+    pass.  A flight of planfly's own guidance has no reference flight, but its suggestions are tried.  A failed flight
+    that is too long for `planfly.workflow.trial_flight.max_explaining_flights` has none either.
     should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict
     contains the results up to that moment.
     """
@@ -222,9 +225,11 @@ def judge_with_reference_flights(
     with suppress(TrialAborted):
         # planfly's guidance does not return by itself, so that its flight does not explain such a return.
         is_only_return = bool(verdict.failed) and all(finding.rule == "return" for finding in verdict.failed)
-        if setup.autopilot.level != "airframe" and not is_only_return:
+        is_affordable = fly == "always" or max_explaining_flights(setup) > 1
+        if setup.autopilot.level != "airframe" and not is_only_return and is_affordable:
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
-        if reference.airframe is not None and reference.airframe.flyable:
+        is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS
+        if reference.airframe is not None and reference.airframe.flyable and is_affordable:
             reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, should_abort))
         if verdict.failed:
             judged_mission = JudgedMission(setup.mission, setup, requirements, verdict)

@@ -21,12 +21,12 @@ from logs.verdict.trials import first_that_passes
 from logs.verdict.verdict import Verdict
 from planfly.workflow.apply_suggestion import apply_suggestion
 from planfly.workflow.mission_context import JudgedMission, MissionContext
-from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, never_abort
+from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_explaining_flights, never_abort
 from world.errors import PlanflyError
 
 # Greatest number of findings whose suggestions are tried, the worst of each rule first.
 MAX_TRIED_FINDINGS = 6
-# Greatest number of trial flights for one verdict.
+# Greatest number of trial flights for one verdict, if `max_explaining_flights` allows so many.
 MAX_TRIAL_FLIGHTS = 4
 # Greatest number of missions that are tried for one suggestion: the suggestion itself and larger steps.
 _MAX_STEPS = 10
@@ -105,11 +105,12 @@ class SuggestionTrials:
     context: MissionContext
     judged: JudgedMission
     should_abort: AbortCheck = never_abort
-    _flights_left: int = MAX_TRIAL_FLIGHTS
     _trials: dict[object, Trial] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._current_trial = Trial(self.judged.setup, self.context.airframe.aircraft)
+        # One flight less: the reference flight with planfly's guidance.
+        self._flights_left = min(MAX_TRIAL_FLIGHTS, max_explaining_flights(self.judged.setup) - 1)
 
     def find_passing(self) -> list[PassedTrial]:
         """Try the first suggestion of each finding, then the second and so on, and return the suggestions that pass."""

@@ -8,18 +8,21 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, join_blocks, simulate
+from flight.simulation.simulate import Flight, TrackBuilder, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.energy import predicted_energy
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
+from planfly.workflow.crash_safe_log import predicted_seconds
 from world.errors import StartError
 
 # A mission is not flown if its predicted energy exceeds this multiple of the energy carried, because the flight would
 # show nothing new.
 MAX_ENERGY_RATIO = 2.0
+# Longest predicted time of all flights that explain one verdict, reference flights and trial flights, s of flight.
+MAX_EXPLAINING_TIME_S = 6 * 3600.0
 
 
 class TrialAborted(Exception):
@@ -62,20 +65,31 @@ class Trial:
         reason = reason_not_to_start(self.requirements)
         if reason:
             return join_tracks([]), reason
-        blocks = []
+        builder, end_reason = TrackBuilder(), ""
         try:
             for block in simulate(Flight(self.setup, self.aircraft)):
-                blocks.append(block)
+                builder.add(block.rows)
+                end_reason = block.end_reason
                 if self.should_abort():
                     raise TrialAborted
         except StartError as error:
             return join_tracks([]), f"not started: {error.reason}"
-        return join_blocks(blocks), blocks[-1].end_reason
+        return builder.track(), end_reason
 
     @cached_property
     def flight_verdict(self) -> Verdict:
         """Verdict on the flight."""
         return judge_flight(self.setup, *self.flight, requirements=self.requirements)
+
+
+def max_explaining_flights(setup: FlightSetup) -> int:
+    """Return the number of flights like a setup's own that may be flown to explain its verdict.
+
+    >>> from logs.recording.example_log import example_log
+    >>> max_explaining_flights(example_log().setup) > 100
+    True
+    """
+    return int(MAX_EXPLAINING_TIME_S / predicted_seconds(setup))
 
 
 def reason_not_to_start(requirements: RouteRequirements) -> str:
@@ -85,7 +99,7 @@ def reason_not_to_start(requirements: RouteRequirements) -> str:
     is skipped if even full power throughout the flight would not exceed this energy.
     """
     setup = requirements.setup
-    duration, full_power = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
+    duration, full_power = setup.path.length / float(setup.demanded_route.airspeed.min()), setup.envelope.power_full
     full_energy = float(np.nanmax(full_power, initial=0.0)) * duration / 3600.0
     if full_energy <= MAX_ENERGY_RATIO * setup.battery:
         return ""

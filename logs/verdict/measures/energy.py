@@ -1,6 +1,7 @@
 """Predict the energy that a route takes in steady flight on each leg, from the aircraft's envelope."""
 
 import math
+from functools import cache
 
 import numpy as np
 
@@ -25,6 +26,8 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan
     energies, peak_power = [], 0.0
+    # The legs of a loiter's laps are alike.
+    power_at = cache(envelope.power)
     leg_durations = np.bincount(
         requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
     )
@@ -33,7 +36,7 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
             float(route.airspeed[leg]),
             float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
         )
-        power = envelope.power(speed, up, air_angle(requirements, leg, speed, up))
+        power = power_at(speed, up, air_angle(requirements, leg, speed, up))
         energies.append(power * float(seconds) / 3600.0)
         peak_power = max(peak_power, power) if math.isfinite(power) else math.nan
     return energies, peak_power

@@ -24,7 +24,6 @@ from logs.verdict.tolerances import (
     MAX_CONDITION_NUMBER,
     MAX_STEADY_ACCELERATION_MPS2,
     MAX_UNSTEADINESS_RAD,
-    MIN_AIRBORNE_AIRSPEED_MPS,
     MIN_COURSE_STRETCH_M,
     MIN_SLOPE_STRETCH_M,
     MIN_STRETCH_TIME_S,
@@ -34,12 +33,10 @@ from logs.verdict.tolerances import (
     SATURATED_THROTTLE_FRACTION,
     SATURATED_TIME_S,
     SLOPE_ERROR_FLOOR_RAD,
-    SPEED_MEMORY_S,
     TURN_EXCLUSION_M,
     ZERO_CURRENT_A,
 )
-from world.arrays import Flags, Floats, Singles
-from world.kernels import compiled
+from world.arrays import Flags, Floats
 
 # ----------------------------------------------------------------------
 # Course and slope of flown legs, by least squares if a leg is long enough.
@@ -259,7 +256,7 @@ def _saturation_times(
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
     gust_free_error = _speed_in_mean_wind(requirements, aligned, rows) - commanded
     row_count = max(1, round(SATURATED_TIME_S / tick))
-    lift_gain = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
+    lift_gain = aligned.lift_gain[rows]
     speed_deficit = np.minimum(-error, -gust_free_error) - np.maximum(0.0, -lift_gain)
     speed_excess = np.minimum(error, gust_free_error) - np.maximum(0.0, lift_gain)
     # A log may lack the airspeed at some rows.
@@ -355,22 +352,6 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
     mean_wind = wind.velocities_at(np.ascontiguousarray(track.position[rows, 2]))
     east, north = track.velocity[rows, 0] - mean_wind[:, 0], track.velocity[rows, 1] - mean_wind[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
-
-
-@compiled
-def lifted_speed(time: Floats, airspeed: Singles, vertical_wind: Singles, stop: int) -> Floats:
-    """Return the airspeed that an aircraft on a fixed path gains from rising air, m/s, (stop,).
-
-    The gain fades with the time constant `SPEED_MEMORY_S`.
-    """
-    speed = np.zeros(stop)
-    for k in range(1, stop):
-        step = time[k] - time[k - 1]
-        rate = GRAVITY * vertical_wind[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
-        # A log may lack the airspeed or the wind at some rows.
-        rate = rate if math.isfinite(rate) else 0.0
-        speed[k] = (speed[k - 1] + rate * step) / (1.0 + step / SPEED_MEMORY_S)
-    return speed
 
 
 def _max_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:

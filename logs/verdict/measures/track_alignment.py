@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.envelope import GRAVITY
 from flight.guidance.equivalent_airspeed import true_by_equivalent
 from flight.simulation.setup import FlightSetup
 from flight.simulation.tick import RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
@@ -27,8 +28,10 @@ from logs.verdict.tolerances import (
     MAX_PLAUSIBLE_POSITION_M,
     MAX_PLAUSIBLE_SPEED_MPS,
     MAX_PLAUSIBLE_VALUE,
+    MIN_AIRBORNE_AIRSPEED_MPS,
+    SPEED_MEMORY_S,
 )
-from world.arrays import Floats
+from world.arrays import Floats, Singles
 from world.kernels import compiled, read_only
 
 RowNumbers = NDArray[np.int64]
@@ -55,6 +58,7 @@ class AlignedTrack:
     distance_run: (t,) m along the ground track.
     clearance, clearance_fraction: (t - 1,) minimum height above ground between a row and the next, m, and the fraction
         of the segment at which it occurs; NaN outside the terrain data, and without terrain.
+    lift_gain: (t,) airspeed gained from rising air, m/s.
     tick: usual time between rows, s.
     """
 
@@ -68,6 +72,7 @@ class AlignedTrack:
     distance_run: Floats
     clearance: Floats
     clearance_fraction: Floats
+    lift_gain: Floats
     tick: float
 
     def leg_rows(self, leg: int) -> slice:
@@ -143,6 +148,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]),
         clearance=clearance,
         clearance_fraction=clearance_fraction,
+        lift_gain=lifted_speed(usable_track.time, usable_track.airspeed, usable_track.wind[:, 2]),
         tick=float(np.median(np.diff(usable_track.time))),
     )
 
@@ -300,6 +306,22 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
         rows[i], distance[i] = start + nearest_row, distances[nearest_row]
         previous_row = int(rows[i])
     return rows, distance
+
+
+@compiled
+def lifted_speed(time: Floats, airspeed: Singles, vertical_wind: Singles) -> Floats:
+    """Return the airspeed that an aircraft on a fixed path gains from rising air, m/s, (t,).
+
+    The gain fades with the time constant `SPEED_MEMORY_S`.
+    """
+    speed = np.zeros(time.size)
+    for k in range(1, time.size):
+        step = time[k] - time[k - 1]
+        rate = GRAVITY * vertical_wind[k] / max(MIN_AIRBORNE_AIRSPEED_MPS, airspeed[k])
+        # A log may lack the airspeed or the wind at some rows.
+        rate = rate if math.isfinite(rate) else 0.0
+        speed[k] = (speed[k - 1] + rate * step) / (1.0 + step / SPEED_MEMORY_S)
+    return speed
 
 
 @compiled

@@ -77,9 +77,12 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
         faults.append(message(f"the log has no rows from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
     # Across missing rows the mean velocity is meaningless.
     is_short = steps <= MAX_ROW_GAP_S
-    mean_velocity = np.diff(track.position, axis=0)[is_short] / steps[is_short, None]
-    recorded_velocity = 0.5 * (track.velocity[1:].astype(np.float64) + track.velocity[:-1])[is_short]
-    differences = np.sqrt(((mean_velocity - recorded_velocity) ** 2).sum(axis=1))
+    squares = np.zeros(int(is_short.sum()))
+    for axis in range(3):
+        mean_velocity = np.diff(track.position[:, axis])[is_short] / steps[is_short]
+        recorded_velocity = track.velocity[:, axis].astype(np.float64)
+        squares += (mean_velocity - 0.5 * (recorded_velocity[1:] + recorded_velocity[:-1])[is_short]) ** 2
+    differences = np.sqrt(squares)
     if differences.size and differences.max() > MAX_VELOCITY_DISAGREEMENT_MPS:
         k = int(np.argmax(differences))
         faults.append(message(f"position and velocity contradict each other at {track.time[:-1][is_short][k]:.2f} s"))

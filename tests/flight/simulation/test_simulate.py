@@ -6,6 +6,7 @@ import os
 import pickle
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,9 +17,9 @@ import pytest
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import BANK_RESERVE_RAD, Flight, fly_to_end, join_blocks, make_loop, simulate
+from flight.simulation.simulate import BANK_RESERVE_RAD, Flight, TrackBuilder, fly_to_end, make_loop, simulate
 from flight.simulation.tick import OUTPUT, READ_FIELDS, Workspace
-from flight.simulation.track import COLUMNS, Track
+from flight.simulation.track import COLUMNS, TRACK_ROW, Track
 from tests.flight.simulation.hand_made import make_workspace
 from tests.setups import MakeSetup, standard
 from tests.soak import SOAK, some
@@ -204,6 +205,22 @@ print(hashlib.sha256(b"".join(getattr(track, name).tobytes() for name in COLUMNS
 """
 
 
+def test_a_track_is_built_in_little_more_memory_than_its_own() -> None:
+    """An hour of rows of 35 float64 each, for a track of 4 columns of float64 and 31 of 4 bytes."""
+    block, seconds = np.zeros(60, TRACK_ROW), 3600
+    track_bytes = seconds * 60 * (4 * 8 + 31 * 4)
+    tracemalloc.start()
+    builder = TrackBuilder()
+    for _ in range(seconds):
+        builder.add(block.copy())
+    track = builder.track()
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert len(track) == seconds * 60
+    assert sum(getattr(track, name).nbytes for name in COLUMNS) == track_bytes
+    assert peak < track_bytes + 2 * 600 * block.nbytes + 5e6
+
+
 def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: Aircraft, tmp_path: Path) -> None:
     def setup(seed: int) -> FlightSetup:
         return make_setup(WAY[:4], wind=(7.0, 30.0), turbulence="light", seed=seed)
@@ -216,7 +233,10 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
     assert fly(6) != first
     flight = Flight(setup(5), aerosonde)
     blocks = list(simulate(flight))
-    assert _digest(join_blocks(blocks)) == first
+    builder = TrackBuilder()
+    for block in blocks:
+        builder.add(block.rows)
+    assert _digest(builder.track()) == first
     # A second of flight each, up to the end of the path.
     assert {len(block.rows) for block in blocks[:-1]} == {60}
     assert [block.end_reason for block in blocks] == [""] * (len(blocks) - 1) + ["completed"]

@@ -117,6 +117,44 @@ def test_failures_in_calm_air_are_known_by_rule_and_place(wind_base: CampaignBas
     assert windy.result().calm is None
 
 
+def flight_that_fails_in_calm_air(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """Every flight fails at leg 3 but that of draw 4, which flies at a target of one in two."""
+    row = replace(made_flight(base, index, wind), outcome="not flyable", failed=(("clearance", LEG),))
+    return made_flight(base, index, wind) if index == 4 and base.seed == 4 else row
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize(
+    # 0.1^6 and 0.5^6 are at most 0.05; for 0.001, 0.5 has to fail ten times.
+    ("target", "confidence", "flights"),
+    [(0.9, 0.95, 6), (0.5, 0.95, 6), (0.5, 0.999, 10)],
+)
+def test_a_mission_that_always_fails_in_calm_air_is_answered_at_once(
+    target: float, confidence: float, flights: int, wind_base: CampaignBase, tmp_path: Path
+) -> None:
+    goal = WindsGoal(target, confidence, 4, 20.0, 400)
+    found = searched(wind_base, tmp_path, goal, fly=flight_that_fails_in_calm_air)
+    assert found.calm == CalmFailures(0.0, flights, flights, (RuleFailures("clearance", flights, ((LEG, flights),)),))
+    assert [boundary.estimate for boundary in found.boundaries] == [0.0] * 4
+    assert table(tmp_path / WINDS_DATABASE) == []
+    lines = wind_lines(found)
+    assert lines[0] == f"does not fly with P >= {target:g} even in calm air"
+    assert lines[1] == f"in calm air, {flights} of {flights} flights fail"
+    assert "clearance" in lines[2]
+    assert "leg 3" in lines[2]
+    assert lines[-1] == f"{flights} flights; no wind was tried, because every flight in calm air fails"
+    assert not any("not settled" in line for line in lines)
+    assert searched(wind_base, tmp_path, goal, fly=flight_that_fails_in_calm_air) == found
+
+
+@pytest.mark.usefixtures("here")
+def test_one_flight_that_flies_in_calm_air_is_worth_a_search(wind_base: CampaignBase, tmp_path: Path) -> None:
+    goal = WindsGoal(0.9, 0.95, 4, 20.0, 24)
+    found = searched(replace(wind_base, seed=4), tmp_path, goal, fly=flight_that_fails_in_calm_air)
+    assert len(found.flights) == 24
+    assert len(table(tmp_path / WINDS_DATABASE)) == 24
+
+
 @pytest.mark.usefixtures("here")
 def test_how_narrowly_flights_passed_makes_the_boundary_surer(
     wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import track_rows
 from logs.recording.example_log import example_log
@@ -101,6 +103,13 @@ def test_the_limit_of_time_is_in_ticks() -> None:
 
 def test_a_short_flight_is_told_in_seconds() -> None:
     assert flight_text(example_log().setup).endswith(" s in the air")
+
+
+def test_a_speed_that_the_autopilot_ignores_lengthens_no_predicted_flight() -> None:
+    """ArduPlane takes no DO_CHANGE_SPEED below AIRSPEED_MIN."""
+    setup = dataclasses.replace(example_log().setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))
+    slow = dataclasses.replace(setup.route, airspeed=np.full(setup.route.legs, 0.001))
+    assert predicted_seconds(dataclasses.replace(setup, route=slow)) == pytest.approx(predicted_seconds(setup))
 
 
 # ----------------------------------------------------------------------

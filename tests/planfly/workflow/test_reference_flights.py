@@ -24,6 +24,7 @@ from logs.verdict.verdict import verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.flight_logs import judge_log
 from planfly.live.served_flights import ServedLog
+from planfly.workflow import reference_flights, suggestion_trials
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.pipeline import JudgedFlight, fly_and_judge
 from planfly.workflow.reference_flights import (
@@ -246,6 +247,23 @@ def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
     assert judged.reference is not None
     airframe = None if patience == 0 else judged.reference.airframe
     assert log.reference == ReferenceFlights(airframe, tried=())
+
+
+@pytest.mark.parametrize(("affordable", "has_airframe", "has_deciding"), [(1, False, False), (2, True, False)])
+def test_a_failed_flight_that_is_too_long_has_fewer_flights_beside_it(
+    affordable: int,
+    has_airframe: bool,
+    has_deciding: bool,
+    flown: tuple[JudgedFlight, Path],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    judged, _ = flown
+    for module in (reference_flights, suggestion_trials):
+        monkeypatch.setattr(module, "max_explaining_flights", lambda _: affordable)
+    verdict, reference = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended)
+    assert not verdict.flyable
+    assert reference is not None
+    assert (reference.airframe is not None, reference.deciding is not None) == (has_airframe, has_deciding)
 
 
 def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:

@@ -120,6 +120,18 @@ def test_flights_are_few_and_shared(monkeypatch: pytest.MonkeyPatch) -> None:
     assert flights.count == 2
 
 
+@pytest.mark.parametrize(("affordable", "flown"), [(0, 0), (1, 0), (3, 2), (99, MAX_TRIAL_FLIGHTS)])
+def test_of_a_long_flight_fewer_suggestions_are_flown(
+    affordable: int, flown: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One flight of those that may be flown is the reference flight."""
+    monkeypatch.setattr(suggestion_trials, "max_explaining_flights", lambda _: affordable)
+    items = [low(leg, higher(leg, 12.0), higher(leg, 14.0)) for leg in range(1, 9)]
+    trials, flights = trials_of(monkeypatch, items, lambda up: items)
+    assert trials.find_passing() == []
+    assert flights.count == flown
+
+
 def test_no_suggestion_of_a_mission_of_thousands_of_legs_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     legs = SESSION.judged.requirements.legs
     for max_legs, tried in ((legs, 1), (legs - 1, 0)):

@@ -10,7 +10,8 @@ from aircraft.catalog import load_aircraft
 from logs.recording.example_log import example_log
 from logs.verdict.measures.route_requirements import route_requirements
 from planfly.workflow import trial_flight
-from planfly.workflow.trial_flight import Trial, TrialAborted
+from planfly.workflow.trial_flight import Trial, TrialAborted, max_explaining_flights
+from tests.synthetic import make_setup
 from world.errors import StartError
 
 SETUP = example_log().setup
@@ -45,6 +46,13 @@ def test_a_flight_of_more_than_twice_the_energy_carried_is_not_begun(
     setup = replace(SETUP, battery=0.01, limits=replace(SETUP.limits, envelope=envelope))
     monkeypatch.setattr(trial_flight, "predicted_energy", lambda _: (ratio * 0.01, 0.0))
     assert trial_flight.reason_not_to_start(route_requirements(setup)) == reason
+
+
+def test_flights_that_explain_a_verdict_last_six_hours_in_all() -> None:
+    """At 20 m/s; a path of 72 km takes an hour, so that six of its flights are allowed, and of 450 km none."""
+    for kilometres, flights in ((72.0, 6), (71.0, 6), (73.0, 5), (450.0, 0)):
+        way = np.array([[0.0, 0.0, 300.0], [0.0, 1000.0 * kilometres, 300.0]])
+        assert max_explaining_flights(make_setup(way, airspeed=20.0)) == flights
 
 
 def test_a_trial_in_a_hurry_is_aborted() -> None:
