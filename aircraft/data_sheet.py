@@ -479,8 +479,8 @@ def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerP
     )
 
 
-# Drives that a sheet can have.
-Drive = ElectricMotor | FuelEngine
+# Motors that a data sheet can describe, each with its propeller.
+Motor = ElectricMotor | FuelEngine
 # Drag, N, by airspeed, m/s.
 Drag = Callable[[float], float]
 
@@ -523,18 +523,19 @@ class _NoPropellerError(Exception):
     """Climb and top speed of a sheet that no propeller gives; `_size_propulsion` adds the reason."""
 
 
-def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Drive, DataSheet]:
+def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
     """Size motor or engine, and propeller.
 
     Raises FlightError with an allowed range if no value fits the sheet.
     """
     try:
-        return _size_drive(stated_sheet, sheet, drag)
+        return _size_any_motor(stated_sheet, sheet, drag)
     except _NoPropellerError:
         raise _no_propeller_error(stated_sheet, sheet, drag) from None
 
 
-def _size_drive(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Drive, DataSheet]:
+def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
+    """Size the engine of a fuelled aircraft, or the motor of an electric one. Raises _NoPropellerError if none fits."""
     size_function = _size_engine if sheet.fuelled else _size_motor
     return size_function(stated_sheet, sheet, drag)
 
@@ -586,9 +587,9 @@ def _solve_with_climb_limit(
     """
     climbs = _CLIMB_GUESSES_DEG
     with contextlib.suppress(_NoPropellerError):
-        drive, result = solve()
+        motor, result = solve()
         if result.climb <= MAX_CLIMB:
-            return drive, result
+            return motor, result
         climbs = climbs[::-1]
     for climb in climbs:
         with contextlib.suppress(_NoPropellerError):
@@ -661,9 +662,9 @@ def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prio
         throttle = 0.5 * (min_throttle + max_throttle)
         has_excess = motor.thrust(throttle, sheet.cruise, SHEET_DENSITY) > thrust
         min_throttle, max_throttle = (min_throttle, throttle) if has_excess else (throttle, max_throttle)
-    drive_power = thrust * sheet.cruise / prior.drive_efficiency(sheet.mass)
+    motor_power = thrust * sheet.cruise / prior.propulsive_efficiency(sheet.mass)
     return replace(
-        motor, power_ratio=drive_power / motor.power(max_throttle, sheet.cruise, SHEET_DENSITY), avionics=prior.avionics
+        motor, power_ratio=motor_power / motor.power(max_throttle, sheet.cruise, SHEET_DENSITY), avionics=prior.avionics
     )
 
 
@@ -712,12 +713,12 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
     return engine, _with_performance(sheet, engine, drag)
 
 
-def _thrust_error(drive: Drive, sheet: DataSheet, drag: Drag, field: str) -> float:
+def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
     """Return the relative error of the thrust from the thrust that a field of the sheet needs."""
     speed = sheet.top if field == "top" else sheet.cruise
     throttle = sheet.trim_throttle if field == "trim_throttle" else 1.0
     needed_thrust = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if field == "climb" else 0.0)
-    return drive.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
+    return motor.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
@@ -784,7 +785,7 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     for value in np.geomspace(min_value, max_value, _RANGE_STEP_COUNT).tolist():
         changed = {field: value * factor}
         with contextlib.suppress(_NoPropellerError):
-            _size_drive(replace(stated_sheet, **changed), replace(sheet, **changed), drag)
+            _size_any_motor(replace(stated_sheet, **changed), replace(sheet, **changed), drag)
             feasible_values.append(value)
     others = [
         f"{title} of {getattr(stated_sheet, name) / RANGES[name][4]:.3g} {RANGES[name][1]}"
@@ -801,15 +802,15 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
     return FlightError.of_argument(option, value, allowed, shown=f"{value:.3g} {unit}")
 
 
-def _with_performance(sheet: DataSheet, drive: Drive, drag: Drag) -> DataSheet:
+def _with_performance(sheet: DataSheet, motor: Motor, drag: Drag) -> DataSheet:
     """Return the sheet with the climb and top speed of a motor, if it can climb."""
-    excess_thrust = drive.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
+    excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))
     if not climb >= math.radians(RANGES["climb"][2]) * (1.0 - _EDGE_ROUNDING):
         raise _NoPropellerError
     min_speed, max_speed = sheet.cruise, 4.0 * sheet.cruise
     for _ in range(60):
         airspeed = 0.5 * (min_speed + max_speed)
-        has_excess = drive.thrust(1.0, airspeed, SHEET_DENSITY) > drag(airspeed)
+        has_excess = motor.thrust(1.0, airspeed, SHEET_DENSITY) > drag(airspeed)
         min_speed, max_speed = (airspeed, max_speed) if has_excess else (min_speed, airspeed)
     return replace(sheet, climb=climb, top=min_speed)

@@ -1,7 +1,7 @@
 """Prior of drag and power of a small aircraft from its size, calibrated on real aircraft.
 
-Power in level flight is D V / efficiency + avionics. Minimum drag depends on layout and aspect ratio, the efficiency of
-the drive on mass. All deviations are log-normal. `examples/real/aircraft.csv` lists the powers of the 22 electric
+Power in level flight is D V / efficiency + avionics. Minimum drag depends on layout and aspect ratio, propulsive
+efficiency on mass. All deviations are log-normal. `examples/real/aircraft.csv` lists the powers of the 22 electric
 aircraft that the coefficients are fitted to; `benchmarks/real_power.py` is the fit, and predicts each aircraft from
 the others.
 """
@@ -17,17 +17,17 @@ DRAG_REYNOLDS = 3.2e5
 DRAG_EXPONENT = -0.2
 # Aspect ratio for the reference minimum drag.
 DRAG_ASPECT = 8.0
-# Efficiency of a large drive: propeller 0.85, motor and speed controller 0.88. The Sky-Sailor's parts have 0.86 and
-# 0.80 (Noth, "Design of Solar Powered Airplanes for Continuous Flight", ETH 2008).
+# Propulsive efficiency of a large aircraft: propeller 0.85, motor and speed controller 0.88. The Sky-Sailor's parts
+# have 0.86 and 0.80 (Noth, "Design of Solar Powered Airplanes for Continuous Flight", ETH 2008).
 MAX_EFFICIENCY = 0.75
 # Exponent of the mass in the ratio of losses to output. Losses of bearings, iron, speed controller and of blades at low
-# Reynolds numbers weigh more in a small drive; powers from -0.5 to -0.8 fit the table equally well.
+# Reynolds numbers weigh more in a small aircraft; powers from -0.5 to -0.8 fit the table equally well.
 LOSS_EXPONENT = -2.0 / 3.0
 # Standard deviation of the logarithm of the minimum drag.
 MIN_DRAG_LOG_SD = 0.35
 # Standard deviation of the logarithm of drag due to lift; span efficiencies of 0.65 to 0.95 are published.
 INDUCED_DRAG_LOG_SD = 0.15
-# Standard deviation of the logarithm of the drive's efficiency.
+# Standard deviation of the logarithm of the propulsive efficiency.
 EFFICIENCY_LOG_SD = 0.29
 # Standard deviation of the logarithm of the avionics' power.
 AVIONICS_LOG_SD = 0.4
@@ -57,10 +57,10 @@ class PowerPrior:
             reference_drag * (aspect / DRAG_ASPECT) ** self.aspect_power * (reynolds / DRAG_REYNOLDS) ** DRAG_EXPONENT
         )
 
-    def drive_efficiency(self, mass: float) -> float:
-        """Return the ratio of D V to the battery power of the drive, for a mass in kg.
+    def propulsive_efficiency(self, mass: float) -> float:
+        """Return the propulsive efficiency, drag times airspeed by battery power without avionics, for a mass in kg.
 
-        >>> [round(POWER_PRIOR.drive_efficiency(mass), 2) for mass in (0.5, 2.0, 20.0)]
+        >>> [round(POWER_PRIOR.propulsive_efficiency(mass), 2) for mass in (0.5, 2.0, 20.0)]
         [0.26, 0.43, 0.64]
         """
         return MAX_EFFICIENCY / (1.0 + (mass / self.loss_mass) ** LOSS_EXPONENT)

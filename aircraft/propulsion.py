@@ -108,7 +108,7 @@ class ElectricMotor:
     resistance: ohm.
     idle_current: no-load current, A.
     windmill: fraction of an idle propeller's negative thrust that is applied.
-    power_ratio: ratio of the battery's power for the drive to the power of motor and propeller as computed.
+    power_ratio: ratio of the battery power used for propulsion to the computed power of motor and propeller.
     avionics: power of autopilot, radios and servos, W.
 
     Beard and McLain, section 4.3, with a current that does not brake (`aircraft/aerosonde/README.md`).

@@ -98,7 +98,7 @@ def predict_power(prior: PowerPrior, real: RealAircraft) -> tuple[float, float]:
     least = prior.min_drag_coefficient(real.layout, aspect, real.cruise * real.area / real.span / VISCOSITY)
     induced = lift**2 / (math.pi * CLASSES[real.layout].oswald * aspect)
     drag_power = pressure * real.area * (least + induced) * real.cruise
-    power = drag_power / prior.drive_efficiency(real.mass) + prior.avionics
+    power = drag_power / prior.propulsive_efficiency(real.mass) + prior.avionics
     return power, power_log_sd(least / (least + induced), prior.avionics / power)
 
 

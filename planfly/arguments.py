@@ -41,7 +41,7 @@ class Range(NamedTuple):
 
 
 # Range of times, s.
-_TIME_RANGE_S = Range(0.0, 1e7, "expected seconds from 0 to 10,000,000")
+_TIME_RANGE_S = Range(0.0, 1e7, "expected a time from 0 to 10,000,000 s")
 # Range of positive numbers.
 _POSITIVE_RANGE = Range(0.0, 1e6, "expected a number above 0, up to 1,000,000", above=True)
 # Range of numbers of items.
@@ -57,7 +57,7 @@ RANGES: Mapping[str, Range] = {
     "budget": Range(4, 10**10, "expected a whole number of evaluations, 4..10^10", integer=True),
     "seconds": Range(0.0, 1e6, "expected a number of seconds above 0, up to 1,000,000", above=True),
     "front": Range(2, 100, "expected a whole number of plans, 2 to 100", integer=True),
-    "at_leg": Range(0, 10_000, "expected a leg's number, from 0", integer=True),
+    "at_leg": Range(0, 10_000, "expected the number of a leg, 0 or more", integer=True),
     "airspeed": _POSITIVE_RANGE,
     "until": _TIME_RANGE_S,
     "max_hours": _POSITIVE_RANGE,
@@ -76,18 +76,18 @@ RANGES: Mapping[str, Range] = {
     "at_least": _PROBABILITY_RANGE,
     "confidence": _PROBABILITY_RANGE,
     "flights": Range(1, 10_000_000, "expected a whole number from 1 to 10,000,000", integer=True),
-    "index": Range(0, 10**9 - 1, "expected a flight's index, from 0", integer=True),
-    "directions": Range(4, 72, "expected 4 to 72", integer=True),
+    "index": Range(0, 10**9 - 1, "expected the number of a flight, 0 or more", integer=True),
+    "directions": Range(4, 72, "expected a whole number from 4 to 72", integer=True),
     "points": Range(1, MAX_BY_PROGRAM, f"expected 1 to {MAX_BY_PROGRAM} returns", integer=True),
-    "every": Range(0.1, 3600.0, "expected seconds from 0.1 to 3,600"),
-    "frequency": Range(30.0, 100_000.0, "expected MHz from 30 to 100,000"),
-    "power": Range(-30.0, 60.0, "expected dBm from -30 to 60"),
-    "sensitivity": Range(-150.0, 0.0, "expected dBm from -150 to 0"),
-    "antenna": Range(0.5, 500.0, "expected m above ground from 0.5 to 500"),
-    "fade_margin": Range(0.0, 60.0, "expected dB from 0 to 60"),
-    "most": Range(1.0, 40.0, "expected m/s from 1 to 40"),
-    "margin": Range(0.0, 100.0, "expected km from 0 to 100"),
-    "height": Range(1.0, 5000.0, "expected m above ground from 1 to 5,000"),
+    "every": Range(0.1, 3600.0, "expected a time from 0.1 to 3,600 s"),
+    "frequency": Range(30.0, 100_000.0, "expected a frequency from 30 to 100,000 MHz"),
+    "power": Range(-30.0, 60.0, "expected a power from -30 to 60 dBm"),
+    "sensitivity": Range(-150.0, 0.0, "expected a power from -150 to 0 dBm"),
+    "antenna": Range(0.5, 500.0, "expected a height above ground from 0.5 to 500 m"),
+    "fade_margin": Range(0.0, 60.0, "expected a margin from 0 to 60 dB"),
+    "most": Range(1.0, 40.0, "expected a speed from 1 to 40 m/s"),
+    "margin": Range(0.0, 100.0, "expected a distance from 0 to 100 km"),
+    "height": Range(1.0, 5000.0, "expected a height above ground from 1 to 5,000 m"),
 }
 # Allowed words for each keyword.
 CHOICES: Mapping[str, tuple[Any, ...]] = {
@@ -103,14 +103,14 @@ CHOICES: Mapping[str, tuple[Any, ...]] = {
 
 
 def check_arguments(**given: Any) -> None:
-    """Raise ArgumentError for the first number or word that is outside its range.
+    """Raise ArgumentError for the first argument outside its range or allowed words.
 
-    given: values, keyed by their name in `RANGES` or `CHOICES`; None if a value was not given.
+    given: value of each argument, keyed by its name in `RANGES` or `CHOICES`; None if it was not given.
 
     >>> check_arguments(seed=3, log_hz=60, max_hours=None)
     >>> check_arguments(directions=3)
     Traceback (most recent call last):
-    world.errors.ArgumentError: directions 3: expected 4 to 72
+    world.errors.ArgumentError: directions 3: expected a whole number from 4 to 72
     """
     for name, value in given.items():
         if value is None:
@@ -148,20 +148,20 @@ def is_wind(speed: float, from_deg: float) -> bool:
     return 0.0 <= speed <= 40.0 and -360.0 <= from_deg <= 360.0
 
 
-def is_place(lat: float, lon: float) -> bool:
-    """Return True if a latitude and longitude, degrees, are valid and within the area of planfly's maps.
+def is_valid_position(lat: float, lon: float) -> bool:
+    """Return True if a latitude and a longitude, degrees, are valid; latitudes near the poles are not.
 
-    >>> is_place(-33.9, 18.4), is_place(91.0, 0.0)
+    >>> is_valid_position(-33.9, 18.4), is_valid_position(91.0, 0.0)
     (True, False)
     """
     return -89.0 <= lat <= 89.0 and -180.0 <= lon <= 180.0
 
 
 def is_camera(numbers: Sequence[float]) -> bool:
-    """Return True if numbers are valid for a camera: sensor size, focal length and overlaps.
+    """Return True if three or five numbers describe a camera.
 
-    The sensor size is across and along the track, mm; the focal length in mm; the overlaps, with the next photo and
-    with the next line, in percent.
+    The numbers are the sensor size across and along the track, mm, the focal length, mm, and optionally the overlaps
+    with the next photo and with the next line, percent.
 
     >>> is_camera((23.5, 15.6, 16.0)), is_camera((23.5, 15.6, 16.0, 75.0, 60.0)), is_camera((23.5, 15.6, 0.0))
     (True, True, False)

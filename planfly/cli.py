@@ -55,6 +55,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run_and_report(argv: Sequence[str] | None) -> int:
+    """Run one command, report errors of the machine and interruptions in one line, and return the exit code."""
     try:
         with safe_streams():
             return _run_command(argv)
@@ -72,6 +73,7 @@ def _run_and_report(argv: Sequence[str] | None) -> int:
 
 
 def _run_command(argv: Sequence[str] | None) -> int:
+    """Parse the command line, run its command, report bad input in one line, and return the exit code."""
     parser = build_parser()
     args = parser.parse_args(argv)
     try:
@@ -92,6 +94,7 @@ def _is_machine_error(cause: BaseException | None) -> bool:
 
 
 def _report_error(code: int, message: object) -> int:
+    """Print an error in one line on standard error, and return the exit code."""
     print(colour_text(f"planfly: {printable(str(message))}", "bad", sys.stderr), file=sys.stderr)
     return code
 

@@ -13,7 +13,7 @@ CUT_SHORT = "the log ends before the flight does"
 
 
 def is_log(path: Path) -> bool:
-    """Return True if a file is a flight log, by its first bytes, or by its name if it has none.
+    """Return True if a file is a flight log of planfly, by its first bytes or the suffix .mcap.
 
     Raises PlanflyError for a file that cannot be read.
     """
@@ -28,12 +28,12 @@ def is_log(path: Path) -> bool:
 
 
 def judge_log(log: FlightLog) -> Verdict:
-    """Judge the flight of a log by the rows that the log holds."""
+    """Judge the flight of a log from the rows that the log contains."""
     return judge_flight(
         log.setup, log.track, log.ended or CUT_SHORT, log_complete=log.complete, reference=log.reference
     )
 
 
 def loss_text(log: FlightLog) -> str:
-    """Describe the missing part of a log in a line; return "" for a complete log."""
+    """Describe the missing part of an incomplete log in one line; return "" for a complete log."""
     return "" if log.complete else f"{log.source}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Literal, ParamSpec, TypedDict, TypeVar, cast, get_args, get_type_hints
 
-from flight.autopilots.catalog import program_autopilot
+from flight.autopilots.catalog import program_class_for
 from flight.simulation.setup import EngineChoice, VerticalDatum
 from planfly.arguments import check_arguments, is_wind
 from planfly.workflow.file_autopilots import with_file_autopilot
@@ -171,7 +171,7 @@ _Given = TypeVar("_Given")
 
 
 def takes_options(function: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
-    """Return a function with its ``Unpack[...]`` options in its signature, with their defaults.
+    """Decorate a function: list the options of its ``Unpack[...]`` parameter in its signature, with their defaults.
 
     >>> from typing import Unpack
     >>> @takes_options
@@ -215,7 +215,7 @@ def option_defaults(options: type) -> dict[str, object]:
 
 
 def select_log_options(options: LogOptions) -> dict[str, object]:
-    """Return the options that apply to the log of another program."""
+    """Return the options that apply only to the log of another program."""
     return {name: value for name, value in options.items() if name in LOG_OPTIONS}
 
 
@@ -241,7 +241,8 @@ def load_scenario_with_options(
 ) -> Scenario:
     """Return a scenario, given as an object, a name or a TOML file, with options applied.
 
-    program: the autopilot's program that flies.  Raises ScenarioError, TerrainError or ParameterError.
+    program: the autopilot program that flies, or None for a simulated autopilot.
+    Raises ScenarioError, TerrainError or ParameterError.
     """
     terrain = options.get("terrain")
     terrain_path = None if terrain is None else str(terrain)
@@ -253,10 +254,10 @@ def load_scenario_with_options(
 
 
 def apply_options(scenario: Scenario, options: FlightOptions, program: Path | None = None) -> Scenario:
-    """Apply options of the weather and the flight to a scenario; the terrain is not changed.
+    """Return a scenario with options of weather, time and flight applied; the terrain is not changed.
 
-    program: the autopilot's program that flies.
-    If no autopilot is named, the file of parameters decides the autopilot.
+    program: the autopilot program that flies, or None for a simulated autopilot.
+    If no autopilot is named, the parameter file determines it.
     Raises ScenarioError for values that a scenario file must not have, and ParameterError for the file of another
     autopilot.
 
@@ -296,7 +297,7 @@ def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[
         # A `Path` is a folder; its absolute path marks it as a folder instead of a name.
         "aircraft": str(aircraft.resolve()) if isinstance(aircraft, Path) else aircraft,
         "airspeed_mps": options.get("airspeed"),
-        "autopilot": autopilot_name or None if program is None else program_autopilot(program).name,
+        "autopilot": autopilot_name or None if program is None else program_class_for(program).name,
         "arduplane_version": version if autopilot_name == "ardupilot" and version else None,
         "px4_version": version if autopilot_name == "px4" and version else None,
         "guidance": options.get("guidance"),

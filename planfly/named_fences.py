@@ -29,7 +29,8 @@ class NamedFences:
             return mission
         warnings = mission.warnings
         if mission.fences:
-            warnings = (*warnings, f"its own fence of {len(mission.fences)} items applies in addition to the one named")
+            own_fence = f"the mission's own fence of {len(mission.fences)} items"
+            warnings = (*warnings, f"{own_fence} applies in addition to the named fence")
         return replace(mission, fences=number_items([*mission.fences, *self.items]), warnings=warnings)
 
     def add_to_scenario(self, scenario: Scenario) -> Scenario:
@@ -40,7 +41,7 @@ class NamedFences:
 
 
 def read_named_fences(files: FencePaths) -> NamedFences:
-    """Read one or more files of fences and zones; the suffix of each tells its format.
+    """Read one or more files of fences or zones; the suffix of each file determines its format.
 
     Raises MissionError or ScenarioError for a file that cannot be read, for a file without a fence, and for invalid
     shapes.

@@ -18,7 +18,9 @@ class HiddenPackage(NamedTuple):
 
 
 def find_hidden_package(home: Path) -> HiddenPackage | None:
-    """Return the first package of planfly that a module of the same name hides, or None.  Imports nothing.
+    """Find a module that Python would import in place of a package of planfly; return None without one.
+
+    Nothing is imported.
 
     home: the folder of planfly and its packages.
 
@@ -35,6 +37,7 @@ def find_hidden_package(home: Path) -> HiddenPackage | None:
 
 
 def _module_file(name: str) -> str | None:
+    """Return the file that Python imports or would import for a name, or None without one."""
     if name in sys.modules:
         return getattr(sys.modules[name], "__file__", None)
     spec = find_spec(name)
@@ -42,6 +45,7 @@ def _module_file(name: str) -> str | None:
 
 
 def _is_same_file(file: str, package_file: Path) -> bool:
+    """Return True if both paths name the same file; False if one of them does not exist."""
     try:
         return package_file.samefile(file)
     except OSError:
@@ -59,8 +63,8 @@ def check_hidden_packages() -> None:
     if hidden is None:
         return
     message = (
-        f"{hidden.found}: hides {hidden.own}, which planfly is made of: rename it, or keep its folder off Python's path"
-        " (python -P leaves the current one out)"
+        f"{hidden.found}: hides {hidden.own}, a package of planfly: rename it, or remove its folder from Python's path"
+        " (python -P leaves out the current folder)"
     )
     if _is_command():
         sys.stderr.write(f"planfly: {message}\n")

@@ -33,7 +33,7 @@ def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> F
 def draw_drive_power(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
     """Draw the factor on the battery's power, (count,): 1 if the battery's current was logged.
 
-    No other signal shows the efficiency of the drive, which varies by `EFFICIENCY_LOG_SD` among real aircraft.
+    No other signal shows the propulsive efficiency, which varies by `EFFICIENCY_LOG_SD` among real aircraft.
     """
     if estimate.with_current:
         return np.ones(count)

@@ -39,10 +39,7 @@ class ElectricMotor:
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "ElectricMotor":
-        """Return a motor with factors on thrust, speed per volt, torque, resistance and idle current.
-
-        torque: factor on the propeller's torque.
-        """
+        """Return a copy with scaled thrust, speed per volt, propeller torque, winding resistance and idle current."""
         return replace(
             self,
             thrust=_times(thrust, self.thrust),

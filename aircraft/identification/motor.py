@@ -15,7 +15,14 @@ class Motor(Protocol):
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> Self:
-        """Return a motor with factors on thrust, speed per volt, torque or power for a thrust, and losses."""
+        """Return a copy of the motor with scaled properties.
+
+        thrust: factor on the thrust of the propeller.
+        speed: factor on the speed per volt, or on the exit speed of a propeller disc.
+        torque: factor on the torque of the propeller, or on the power at a given thrust.
+        resistance: factor on the resistance of the winding, or on other losses.
+        idle: factor on the current without load.
+        """
 
     def for_voltage(self, volts: float) -> Self:
         """Return a motor for another battery voltage, with the same thrust and power at full throttle."""

@@ -43,7 +43,10 @@ class MotorTable:
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "MotorTable":
-        """Return a motor with factors on thrust, speed, and power with torque; a table has no parts of its losses."""
+        """Return a copy with scaled thrust, speed and torque; the factor on torque also scales the power.
+
+        resistance, idle: have no effect, because a table does not separate the losses of the motor.
+        """
         del resistance, idle
         return replace(self, pull=self.pull * thrust, speed=self.speed * speed, load=self.load * torque)
 

@@ -37,9 +37,9 @@ class PropellerDisc:
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "PropellerDisc":
-        """Return a disc with factors on thrust, exit speed, power for a thrust, and losses.
+        """Return a copy with scaled thrust, exit speed, power at a given thrust (`torque`) and losses (`resistance`).
 
-        idle: has no effect; a disc has no idle current.
+        idle: has no effect, because a disc has no idle current.
         """
         del idle
         return replace(

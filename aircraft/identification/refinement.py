@@ -112,7 +112,7 @@ def prediction_errors(
     filters: Sequence[GustFilter],
     horizons: Sequence[float] = HORIZONS_S,
 ) -> Floats:
-    """Return measured less predicted angular rates (3, n, h), rad/s, by axis, start and time ahead."""
+    """Return measured minus predicted angular rates (3, n, h), rad/s, by axis, start and time ahead."""
     predicted = Predictor(signals, base, values, filters, with_flow=True).predict(starts, horizons)
     measured = [signals.rates[starts + round(horizon * signals.hertz)] for horizon in horizons]
     return np.stack(

@@ -128,10 +128,10 @@ def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_paramet
             raise ScenarioError.at(scenario.name, f"returns ({name})", value, allowed, shown=f"{value:g}")
 
 
-def program_autopilot(program: Path) -> "type[ProgramAutopilot]":
-    """Return the autopilot of a program.
+def program_class_for(program: Path) -> "type[ProgramAutopilot]":
+    """Return the class of the autopilot that runs an executable built for software in the loop.
 
-    >>> program_autopilot(Path("arduplane")).name
+    >>> program_class_for(Path("arduplane")).name
     'ardupilot'
     """
     return next(kind for kind in program_classes() if kind.recognises(program))

@@ -44,7 +44,7 @@ def recover_log(path: Path) -> RecoveredLog | None:
     log = read_log(path)
     if log.complete:
         return None
-    container, chunks = _whole_chunks(path)
+    container, chunks = _intact_chunks(path)
     file = io.BytesIO()
     writer = ContainerWriter(file, PROFILE)
     for name, data in container.attachments.items():
@@ -64,8 +64,8 @@ def recover_log(path: Path) -> RecoveredLog | None:
     return RecoveredLog(file.getvalue(), log)
 
 
-def _whole_chunks(path: Path) -> tuple[Container, list[bytes]]:
-    """Return the attachments and the chunks of a log before its damage."""
+def _intact_chunks(path: Path) -> tuple[Container, list[bytes]]:
+    """Return the attachments and chunks of a log that precede its damage."""
     container = Container()
     with path.open("rb") as file:
         file.seek(len(MAGIC))

@@ -106,8 +106,8 @@ def _airspeed_source(scenario: Scenario, autopilot: Autopilot) -> AirspeedSource
     return "aircraft" if stated_airspeed is None else "parameters"
 
 
-def setup_conditions(setup: FlightSetup) -> Conditions:
-    """Return the conditions of the verdict on a flight, or on a mission that is not flown."""
+def judging_conditions(setup: FlightSetup) -> Conditions:
+    """Return the conditions (aircraft, airspeed, wind, autopilot) under which a flight or unflown mission is judged."""
     conditions = plan_conditions(setup.scenario, setup.aircraft, setup.airspeed, setup.autopilot)
     conditions = replace(conditions, navigation=setup.nav, zones=len(judged_airspace(setup).zones))
     source = setup.source

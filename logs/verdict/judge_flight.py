@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.conditions import setup_conditions
+from logs.verdict.conditions import judging_conditions
 from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.imported.judge_imported_flight import judge_imported_flight
 from logs.verdict.judge_geometry import (
@@ -80,7 +80,7 @@ def judge_flight(
     findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
     levels = _level_answers(whole_requirements, findings, flyable, reference)
     deciding = None if reference is None or flyable else reference.deciding
-    conditions = setup_conditions(setup)
+    conditions = judging_conditions(setup)
     lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)
     return Verdict(
         *(findings, flyable, complete, lines, "flown", levels, deciding),

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from flight.guidance.path import reversals
 from flight.simulation.setup import FlightSetup
-from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, setup_conditions
+from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, judging_conditions
 from logs.verdict.findings import (
     NOT_FLOWN,
     UNKNOWN_AIRCRAFT,
@@ -63,7 +63,10 @@ def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return findings on a flown track, by its route and the aircraft's envelope, but not on how the flight ended."""
+    """Return the findings on a flown track, checked against its route and the aircraft's envelope.
+
+    Whether the flight was completed, and how it ended, is not checked here; see `flown_findings`.
+    """
     return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
 
 
@@ -263,7 +266,7 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     flyable = complete and not unjudged and not has_failed
     headline_text = headline(findings, flyable, setup.envelope.source)
     levels = (LevelAnswer("geometry", flyable, headline_text, undecided=bool(unjudged) and not has_failed),)
-    conditions = setup_conditions(setup)
+    conditions = judging_conditions(setup)
     return Verdict(
         findings,
         flyable,
@@ -305,7 +308,7 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
         LevelAnswer("geometry", passes, headline(route_findings, passes)),
         LevelAnswer(flown_level(setup), False, headline(findings, False)),
     )
-    conditions = setup_conditions(setup)
+    conditions = judging_conditions(setup)
     lines = summary_lines(findings, setup, "geometric", levels, conditions)
     return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.notes, conditions=conditions)
 

@@ -80,7 +80,7 @@ def _draw_slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     axes.axhline(0.0, color=theme.colour("area"), linewidth=0.8)
     _shade_guidance_speeds(axes, aircraft)
     _set_up_axes(axes, "steepest climb and descent relative to the air", "airspeed (m/s)", "flight path (°)")
-    _add_legend_above(axes, "height AMSL", 3)
+    _add_legend_above(axes, "altitude (AMSL)", 3)
 
 
 def _draw_level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
@@ -99,7 +99,7 @@ def _draw_level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> Non
     _shade_guidance_speeds(axes, aircraft)
     span = float(np.nanmax(max_speeds) - np.nanmin(min_speeds))
     axes.set_xlim(float(np.nanmin(min_speeds)) - 0.08 * span, float(np.nanmax(max_speeds)) + 0.08 * span)
-    _set_up_axes(axes, "level flight", "airspeed (m/s)", "height AMSL (m)")
+    _set_up_axes(axes, "level flight", "airspeed (m/s)", "altitude (m AMSL)")
     _add_legend_above(axes, "", 2)
 
 
@@ -230,15 +230,15 @@ def _draw_roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, all_modes: 
     axes.legend(loc="best")
 
 
-def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
-    """Draw a column for each control.
+def draw_step_responses(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
+    """Draw the step responses of an aircraft: one column of panels for each control.
 
     A panel shows the change of one quantity from level flight over time (s).
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.characteristics import step_responses
     >>> aircraft = load_aircraft("aerosonde")
-    >>> figure = draw_steps(aircraft, step_responses(aircraft))
+    >>> figure = draw_step_responses(aircraft, step_responses(aircraft))
     >>> [axes.get_title(loc="left") for axes in figure.axes[:4]]
     ['change of pitch (°)', 'change of pitch (°)', 'change of roll (°)', 'change of roll (°)']
     """

@@ -60,7 +60,7 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)
 
     def both(values: list[Floats]) -> tuple[Layer, ...]:
-        """Return a line of a quantity for each flight over the distance flown."""
+        """Return a line for each flight: its values of a quantity over the distance flown."""
         return tuple(
             series(shorten(flight.name, 22), role, along / 1e3, np.interp(along, distance, value, right=np.nan))
             for flight, role, distance, value in zip(flights, ROLES, distances, values, strict=True)
@@ -68,7 +68,7 @@ def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
 
     tracks = [flight.track for flight in flights]
     panels = (
-        Panel("height", "m AMSL", both([track.position[:, 2] for track in tracks])),
+        Panel("altitude", "m AMSL", both([track.position[:, 2] for track in tracks])),
         Panel("height above ground", "m", both([_height_above_ground(flight) for flight in flights])),
         Panel("airspeed", "m/s", both([doubles(track.airspeed) for track in tracks]), min_span=4.0),
         Panel("bank, right +", "°", both([np.degrees(doubles(_roll_angle(track))) for track in tracks])),
@@ -141,7 +141,7 @@ def refly_charts(again: Reflight) -> dict[str, Chart]:
         if not np.isfinite(flown_values).any():
             continue
         lines = (series("flown", "flown", along, flown_values), series("simulated", "other", along, simulated_values))
-        difference = (filled_series("flown less simulated", "difference", along, flown_values - simulated_values),)
+        difference = (filled_series("flown minus simulated", "difference", along, flown_values - simulated_values),)
         panels = (
             Panel(title, unit, lines, min_span=span),
             Panel("difference", unit, difference, limits=(("", 0.0),), min_span=0.5 * span),

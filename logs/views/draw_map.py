@@ -138,7 +138,7 @@ def _draw_colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, co
     )
     bar = figure.colorbar(ScalarMappable(norm, colours), cax=figure.add_axes(frame))
     bar.set_ticks(levels[:: max(1, len(levels) // 8)].tolist())
-    bar.set_label("ground height (m AMSL)", fontsize=8)
+    bar.set_label("ground elevation (m AMSL)", fontsize=8)
     bar.ax.tick_params(labelsize=7.5)
 
 

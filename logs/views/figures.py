@@ -253,8 +253,8 @@ FIGURES = (
         "Without its engine",
         _returns_view("glide"),
         alternative=_fixed_caption(
-            "Map, north up: the lowest height from which a glide reaches home, flat ground, and the route coloured "
-            "by what can be reached from there."
+            "Map, north up: the lowest height from which the aircraft can glide home; flat ground suitable for a "
+            "landing; and the route, coloured by what a glide from each point can reach."
         ),
         caption=lambda subject: (
             ("" if subject.returns is None else _as_sentence(glides_headline(subject.returns.glides)))

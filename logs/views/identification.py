@@ -11,12 +11,12 @@ _SHOWN = {"rad": ("°", 180.0 / np.pi), "rad/s2": ("°/s²", 180.0 / np.pi), "m/
 
 
 def equation_chart(equation: Equation) -> Chart:
-    """Return measured and predicted values over the joined time of all stretches, and their difference.
+    """Return a chart of measured and predicted values, and their difference, over the time of all log segments.
 
     >>> wave = np.sin(np.arange(500) / 20.0)
     >>> chart = equation_chart(Equation("pitch acceleration", "rad/s2", 25.0, wave, 0.9 * wave, 0.99, 0.1))
     >>> [panel.title for panel in chart.panels]
-    ['pitch acceleration', 'measured less predicted']
+    ['pitch acceleration', 'measured minus predicted']
     """
     unit, factor = _SHOWN[equation.unit]
     time = np.arange(len(equation.measured)) / equation.hertz
@@ -27,9 +27,9 @@ def equation_chart(equation: Equation) -> Chart:
     residual = filled_series("difference", "difference", time, factor * (equation.measured - equation.predicted))
     panels = (
         Panel(equation.name, unit, lines, min_span=0.1),
-        Panel("measured less predicted", unit, (residual,), limits=(("", 0.0),), min_span=0.1),
+        Panel("measured minus predicted", unit, (residual,), limits=(("", 0.0),), min_span=0.1),
     )
-    return Chart(f"{equation.name}, R² {equation.explained:.3f}", "time of all stretches", "s", panels)
+    return Chart(f"{equation.name}, R² {equation.explained:.3f}", "time, all log segments joined", "s", panels)
 
 
 def prediction_chart(predicted: PredictedLog) -> Chart:
@@ -46,4 +46,4 @@ def prediction_chart(predicted: PredictedLog) -> Chart:
         )
         for k, (name, unit) in enumerate(zip(QUANTITIES, UNITS, strict=True))
     )
-    return Chart("Predictions half a second ahead", "time of all stretches", "s", panels)
+    return Chart("Predictions half a second ahead", "time, all log segments joined", "s", panels)

@@ -44,7 +44,7 @@ def band_chart(bands: Sequence[Band], title: str, *, by_time: bool = True) -> Ch
 
 
 def _with_gaps(along: Floats, *columns: Floats) -> tuple[Floats, ...]:
-    """Return the axis and columns with a NaN wherever the axis jumps, as between stretches."""
+    """Return the axis and columns with a NaN wherever the axis jumps, as it does between segments of the log."""
     steps = np.diff(along)
     jumps = np.flatnonzero(steps > _MAX_STEP_RATIO * np.median(steps)) + 1
     return along if not len(jumps) else np.insert(along, jumps, np.nan), *(

@@ -94,7 +94,7 @@ def profile_chart(
     labels = [*fail_labels(failed, corners, entered_positions), *labels, *cut_names, *zone_names]
     limits, note = _limit_lines(scenario, min_altitude, max_altitude)
     panel = Panel(
-        "height", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
+        "altitude", "m AMSL", tuple(layers), limits, span=(min_altitude, max_altitude), note=note, labels=tuple(labels)
     )
     return _make_chart(scenario, waypoint_distances, stop_starts, panel, is_straight=is_straight_line)
 
@@ -202,7 +202,7 @@ def ground_bands(scenario: Scenario, plane: PathPlane) -> list[Layer]:
         )
     layers.append(Layer("band", "terrain", "terrain", along, ground, np.full(len(ground), plane.min_altitude)))
     if max_height is not None:
-        name = f"greatest height, {max_height:g} m above ground"
+        name = f"maximum height, {max_height:g} m above ground"
         layers.append(Layer("line", name, "limit", along, ground + max_height))
     return layers
 

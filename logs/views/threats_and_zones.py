@@ -118,30 +118,36 @@ def sphere_cuts(center: Floats, radius: float, points: Floats) -> tuple[Floats, 
     return center[2] - half_height, center[2] + half_height
 
 
-def outline_anchor(
+def outline_label_position(
     kilometres: Floats, lower: Floats, upper: Floats, min_altitudes: Floats, max_altitude: float
 ) -> tuple[float, float, tuple[int, int]] | None:
-    """Find the anchor of a name on a sphere's section within the altitude range of a picture.
+    """Find where to label the outline of a sphere in a vertical section.
 
-    kilometres, lower, upper: (s,), NaN outside the sphere.  min_altitudes: (s,), the ground where it hides the sphere.
-    Returns km, m AMSL and the side of the name; None if no part of the outline is in the picture.
+    kilometres: distance of each sample along the section, km, (s,).
+    lower, upper: altitude of the sphere's surface, m AMSL, (s,), NaN outside the sphere.
+    min_altitudes: altitude below which the ground hides the sphere, m AMSL, (s,).
+    max_altitude: upper edge of the picture, m AMSL.
+    Returns distance (km), altitude (m AMSL) and the direction (right, up) in which the label lies; None if no part of
+    the outline is visible.
     """
-    rows_inside = np.flatnonzero(np.isfinite(upper))
-    top, bottom = rows_inside[np.argmax(upper[rows_inside])], rows_inside[np.argmin(lower[rows_inside])]
+    samples_inside = np.flatnonzero(np.isfinite(upper))
+    top, bottom = samples_inside[np.argmax(upper[samples_inside])], samples_inside[np.argmin(lower[samples_inside])]
     if min_altitudes[top] < upper[top] < max_altitude:
         return float(kilometres[top]), float(upper[top]), (0, 1)
     if min_altitudes[bottom] < lower[bottom] < max_altitude:
         return float(kilometres[bottom]), float(lower[bottom]), (0, -1)
     for edge in (upper, lower):
         # From the left: the highest point of the first part of the outline within the picture.
-        visible_rows = rows_inside[
-            (edge[rows_inside] > min_altitudes[rows_inside])
-            & (edge[rows_inside] < max_altitude - 0.04 * (max_altitude - min_altitudes.min()))
+        visible_samples = samples_inside[
+            (edge[samples_inside] > min_altitudes[samples_inside])
+            & (edge[samples_inside] < max_altitude - 0.04 * (max_altitude - min_altitudes.min()))
         ]
-        if visible_rows.size:
-            first_part = visible_rows[: np.flatnonzero(np.diff(visible_rows, append=visible_rows[-1] + 2) > 1)[0] + 1]
-            anchor_row = first_part[np.argmax(edge[first_part])]
-            return float(kilometres[anchor_row]), float(edge[anchor_row]), (1, 0)
+        if visible_samples.size:
+            first_part = visible_samples[
+                : np.flatnonzero(np.diff(visible_samples, append=visible_samples[-1] + 2) > 1)[0] + 1
+            ]
+            label_sample = first_part[np.argmax(edge[first_part])]
+            return float(kilometres[label_sample]), float(edge[label_sample]), (1, 0)
     return None
 
 
@@ -181,17 +187,20 @@ def threat_cuts(
     for kind, radii in (("radar", threats.detection_radius), ("missile", threats.kill_radius)):
         for k in np.flatnonzero((radii > 0.0) & (distances <= radii)):
             lower, upper = sphere_cuts(threats.position[k], float(radii[k]), plane.points)
-            rows_inside = np.flatnonzero(np.isfinite(upper))
-            if not rows_inside.size:
+            samples_inside = np.flatnonzero(np.isfinite(upper))
+            if not samples_inside.size:
                 continue
             # Add one sample on either side, so that the outline ends at the edge of the sphere.
-            rows = slice(max(0, int(rows_inside[0]) - 1), int(rows_inside[-1]) + 2)
+            rows = slice(max(0, int(samples_inside[0]) - 1), int(samples_inside[-1]) + 2)
             name, legend = f"{threats.names[k][:40]} ({kind})", f"{kind}'s sphere over the path"
             layers.append(Layer("band", name, kind, plane.kilometres[rows], upper[rows], lower[rows], legend=legend))
-            anchor = outline_anchor(plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude)
-            if anchor is not None and k not in labelled_elsewhere:
+            label_position = outline_label_position(
+                plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude
+            )
+            if label_position is not None and k not in labelled_elsewhere:
                 role = "radar" if kind == "radar" else "ink"
-                labels[int(k)] = Label(shorten(threats.names[k], 20), anchor[0], anchor[1], "name", role, anchor[2])
+                distance, altitude, direction = label_position
+                labels[int(k)] = Label(shorten(threats.names[k], 20), distance, altitude, "name", role, direction)
     return layers, list(labels.values())[:_MAX_CUT_NAMES]
 
 
@@ -207,9 +216,11 @@ def entered_cuts(
             continue
         legend = "threat that is entered"
         layers.append(Layer("band", legend, "entered", plane.kilometres, upper, lower, quiet=True))
-        anchor = outline_anchor(plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude)
-        if anchor is not None:
-            label_positions[k] = anchor[:2]
+        label_position = outline_label_position(
+            plane.kilometres, lower, upper, plane.min_visible_altitudes(), plane.max_altitude
+        )
+        if label_position is not None:
+            label_positions[k] = label_position[:2]
     return layers, label_positions
 
 

@@ -192,7 +192,7 @@ def describe_aircraft(
 
 
 def _load_aircraft(name: str | Path) -> Aircraft:
-    """Load the aircraft with a name or in a folder.  Raises PlanflyError if there is none."""
+    """Load an aircraft by its name or folder.  Raises PlanflyError for an unknown name or a missing folder."""
     text = str(name.absolute()) if isinstance(name, Path) else name
     if not names_folder(text):
         return find_aircraft(text)
@@ -209,13 +209,14 @@ def _draw_pictures(
     modes: Mapping[float, tuple[Mode, ...]],
     steps: tuple[StepResponse, ...],
 ) -> dict[str, bytes]:
+    """Return the pictures of an aircraft as PNG, keyed by file name."""
     # Imported here: only pictures need matplotlib.
-    from logs.views.aircraft import draw_envelope, draw_steps, draw_trims
+    from logs.views.aircraft import draw_envelope, draw_step_responses, draw_trims
     from logs.views.drawing import png_bytes
 
     with stage("drawing", "drawing an aircraft"):
         return {
             "envelope.png": png_bytes(draw_envelope(aircraft, envelope)),
             "trims.png": png_bytes(draw_trims(aircraft, trims, modes)),
-            "steps.png": png_bytes(draw_steps(aircraft, steps)),
+            "steps.png": png_bytes(draw_step_responses(aircraft, steps)),
         }

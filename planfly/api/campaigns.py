@@ -75,7 +75,7 @@ def _open_base(
 
 
 def _command_line_target(target: Plan | str | Path, folder: Path) -> str:
-    """Return the target for the command line that repeats a campaign; for a `Plan`, its file in `folder`."""
+    """Return the target for the command line that repeats a campaign; a `Plan` is named by its file in `folder`."""
     return str(folder / "plan.json") if isinstance(target, Plan) else str(target)
 
 
@@ -100,6 +100,7 @@ def _make_workers(count: int | None, scheduler: str | None, seed: int | None) ->
 
 
 def _read_spread(file: str | Path | None) -> Dispersions:
+    """Read a dispersions file, or return planfly's own dispersions for None."""
     return default_dispersions() if file is None else read_dispersions(Path(file))
 
 
@@ -212,10 +213,11 @@ def campaign_flight(
 
 
 def _flight_row(base: CampaignBase, goal: Goal, folder: Path, index: int) -> FlightRow:
+    """Return a flight of a campaign's table.  Raises PlanflyError if the table has no flight with this index."""
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
-            allowed = f"no such flight; it has {store.tally().flown}, from 0"
+            allowed = f"no such flight: the campaign has {store.tally().flown} flights, numbered from 0"
             raise PlanflyError.of_argument("index", index, allowed, file=store.path)
     return row
 
@@ -256,7 +258,7 @@ def winds(
     >>> winds("paper-07", directions=3)
     Traceback (most recent call last):
     ...
-    world.errors.ArgumentError: directions 3: expected 4 to 72
+    world.errors.ArgumentError: directions 3: expected a whole number from 4 to 72
     """
     confidence, flights, spread = options["confidence"], options["flights"], options["spread"]
     check_arguments(prove=prove, confidence=confidence, directions=directions, most=most, flights=flights)

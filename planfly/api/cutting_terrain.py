@@ -71,7 +71,7 @@ def terrain(
 
 
 def _parse_box(edges: Sequence[float]) -> Box:
-    """Return the box with the given edges.  Raises ArgumentError for invalid edges."""
+    """Convert south, west, north and east edge, degrees, to a box.  Raises ArgumentError for invalid edges."""
     try:
         south, west, north, east = (float(value) for value in edges)
     except (TypeError, ValueError):

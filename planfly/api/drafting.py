@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from aircraft.catalog import find_aircraft
-from planfly.arguments import check_arguments, is_place
+from planfly.arguments import check_arguments, is_valid_position
 from planfly.runtime.stages import stage
 from planfly.workflow.output_paths import check_output_file
 from world.elevation_formats import EMBEDDED
@@ -84,7 +84,10 @@ def new_scenario(
 
 
 def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
-    """Return the file to write.  Raises PlanflyError for an invalid folder, or an existing file without `overwrite`."""
+    """Return the path of the new scenario file, NAME.toml in the folder.
+
+    Raises PlanflyError for an invalid folder, and for an existing file without `overwrite`.
+    """
     if not name.isprintable() or not 1 <= len(name) <= 100:
         allowed = "expected a folder with a name of 1 to 100 printable characters"
         raise PlanflyError.of_argument("folder", folder, allowed, shown=ascii(str(folder)))
@@ -104,7 +107,7 @@ def _parse_position(keyword: str, coordinates: Sequence[float]) -> GeoPosition:
         lat, lon = (float(value) for value in coordinates)
     except (TypeError, ValueError):
         lat = lon = math.nan
-    if not is_place(lat, lon):
+    if not is_valid_position(lat, lon):
         raise ArgumentError.of_argument(keyword, coordinates, "expected latitude -89..89 and longitude -180..180")
     return GeoPosition(lat, lon)
 
@@ -115,7 +118,7 @@ def _absolute_path(path: str | Path, *, is_name: bool) -> str:
 
 
 def _relative_path(folder: Path, path: str) -> str:
-    """Return an absolute path relative to a folder, as a file in that folder names it, or a name unchanged."""
+    """Return an absolute path relative to a folder; a name is returned unchanged."""
     if not Path(path).is_absolute():
         return path
     relative = os.path.relpath(path, absolute_path(folder))

@@ -153,6 +153,7 @@ def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary
 
 
 def _check_suffix(target: Path) -> None:
+    """Raise MissionError if the suffix of a file is not that of a mission file."""
     try:
         mission_kind(target)
     except MissionError:
@@ -162,7 +163,10 @@ def _check_suffix(target: Path) -> None:
 
 
 def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions) -> _SourceContent:
-    """Return the parts of a source that the targets need."""
+    """Read a log, a plan or a mission, as far as the target files need it.
+
+    Raises MissionError for options that do not apply to a log, and for targets that need a log.
+    """
     if path.is_file() and is_log(path):
         if (at := options["at"]) is not None:
             allowed = "a log is exported with the zones of its own time"
@@ -181,6 +185,7 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
 
 
 def _needs_kml(targets: tuple[Path, ...]) -> bool:
+    """Return True if one of the targets is a KML file."""
     return any(target.suffix.lower() == ".kml" for target in targets)
 
 
@@ -194,6 +199,7 @@ def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | Non
 
 
 def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:
+    """Read a flight log.  needs_returns: True to add returns from a few points of the flight."""
     log = read_log(path)
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):

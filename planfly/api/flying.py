@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Unpack
 
-from flight.autopilots.catalog import program_autopilot
+from flight.autopilots.catalog import program_class_for
 from flight.autopilots.sitl.process import check_binary
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
@@ -33,12 +33,12 @@ from planfly.rtl.return_summary import ReturnSummary, returns_line
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import report_replaced, stage
 from planfly.workflow import pipeline
-from planfly.workflow.airframe import airframe_of
+from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.crash_safe_log import FlightLimits, flight_kind, flight_text
 from planfly.workflow.open_flight import open_flight, with_engine
 from planfly.workflow.output_paths import FLY_LOG, LOG_FIGURES, check_output_file, file_target, prepare_folder
 from planfly.workflow.pipeline import JudgedFlight, PlanThenFly, autopilot_log, fly_and_judge
-from planfly.workflow.suggestion_trials import judge_mission
+from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.errors import ArgumentError, ScenarioError
 from world.extras import require_extra
@@ -211,7 +211,7 @@ def fly(
     with stage(f"flying {flight_text(setup)}", flight_kind(setup)) as advance:
         flight = fly_and_judge(
             setup,
-            airframe_of(setup),
+            airframe_for_setup(setup),
             target,
             advance,
             every=60 // options["log_hz"],
@@ -264,7 +264,7 @@ def fly_by_each(
         name: value for name, value in options.items() if name in ("params", "guidance", "autopilot")
     }
     check_keywords_not_given(
-        _source_name(mission), per_autopilot_options, "belongs to one autopilot, and several are named"
+        _source_name(mission), per_autopilot_options, "can only be given for a single autopilot, but several are named"
     )
     flights = {}
     for name in names:
@@ -333,7 +333,7 @@ def judge(
         flight = fly(what, **flight_options)
         return Judged(flight.setup, flight.verdict, track=flight.track if len(flight.track) else None)
     setup = open_flight(what, flight_options)
-    return Judged(setup, judge_mission(setup))
+    return Judged(setup, judge_mission_geometry(setup))
 
 
 @takes_options
@@ -364,10 +364,11 @@ def _source_name(what: FlightLog | FlownMission | Plan | str | Path) -> str:
 
 
 def check_keywords_not_given(source: str, keywords: Mapping[str, Any], reason: str) -> None:
-    """Raise ScenarioError for the first keyword that was given, because no keyword applies to the judged source.
+    """Raise ScenarioError if one of some keywords was given, because these keywords do not apply to the source.
 
+    source: name of the source, for the message.
     keywords: value of each keyword; None if it was not given.
-    reason: text of the message.
+    reason: reason for the refusal, for the message.
     """
     for name, value in keywords.items():
         if value is not None:
@@ -390,6 +391,7 @@ def check_judging_options(source: str, options: MissionOptions) -> None:
 
 
 def _judge_flight(flight: FlightLog | FlownMission, terrain: str | Path | None, fences: NamedFences) -> Judged:
+    """Judge a recorded flight.  terrain: replaces the terrain of the flight unless None.  fences: additional fences."""
     setup = flight.setup
     if terrain is not None:
         setup = setup.in_scenario(with_terrain(setup.scenario, str(terrain)))
@@ -413,5 +415,5 @@ def named_program(sitl: str | Path | None) -> Path | None:
         return None
     require_extra("live", "--sitl needs")
     program = Path(sitl)
-    check_binary(program, program_autopilot(program).title)
+    check_binary(program, program_class_for(program).title)
     return program

@@ -84,7 +84,7 @@ def plan_front(
 
 
 def _write_front(front: Front, world: Scenario, folder: Path) -> None:
-    """Write plans, tables and pictures; a front without plans gets only the empty tables."""
+    """Write the plans, tables and pictures of a front into a folder; a front without plans has only empty tables."""
     for number, front_plan in enumerate(front.plans, 1):
         write_atomically(folder / f"plan-{number}.json", plan_json(front_plan.plan))
     rows = table_rows(front)
@@ -123,6 +123,7 @@ def table_rows(front: Front) -> list[dict[str, Any]]:
 
 
 def _table_row(number: int, front_plan: FrontPlan) -> dict[str, Any]:
+    """Return a row of the table of a front, keyed by `COLUMNS`.  number: number of the plan, from 1."""
     values = (
         front_plan.length,
         front_plan.exposure,

@@ -16,9 +16,9 @@ from logs.importers.motion_log import read_motion
 from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_model
 from planfly.identification.checks import check_battery, check_estimate
-from planfly.identification.drive_check import DriveConflict
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
+from planfly.identification.propulsion_check import PowerConflict
 from planfly.identification.records import (
     AMPLE_HZ,
     LEFT,
@@ -88,7 +88,7 @@ class IdentifiedAircraft:
     without_current: tuple[str, ...] = ()
     slow: tuple[SlowLog, ...] = ()
     wide: tuple[WideNumber, ...] = ()
-    conflict: DriveConflict | None = None
+    conflict: PowerConflict | None = None
 
 
 @requires_extra("identification")
@@ -158,6 +158,7 @@ def identify_aircraft(
 def _make_result(
     aircraft: Aircraft, identified: Identified, predicted: PredictedLog, records: Sequence[FlightRecord]
 ) -> IdentifiedAircraft:
+    """Return the result of an identification: aircraft, estimate, performance, predictions, and gaps in the logs."""
     climb, sink, power = _performance_intervals(identified)
     return IdentifiedAircraft(
         aircraft=aircraft,
@@ -169,12 +170,12 @@ def _make_result(
         without_current=without_current(records),
         slow=slow_logs(identified.logs),
         wide=_find_wide_numbers(identified),
-        conflict=identified.drive_conflict(),
+        conflict=identified.power_conflict(),
     )
 
 
 def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
-    """Return voltage, V, and energy, J, of a stated battery, or of the base's."""
+    """Return voltage (V) and energy (J) of a battery such as "44.4V,888Wh", or of the base's battery for None."""
     if battery is None:
         return prior.battery_voltage, prior.battery_energy
     sheet = parse_sheet({}, battery=battery, prop=None, layout=None)
@@ -182,13 +183,17 @@ def _find_battery(prior: Aircraft, battery: str | None) -> tuple[float, float]:
 
 
 def _load_base(base: str | Path) -> Aircraft:
+    """Load the base of an identification, by name or folder.
+
+    Raises FlightError for an aircraft that was itself identified, or that burns fuel.
+    """
     text = str(base.absolute()) if isinstance(base, Path) else base
     aircraft = find_aircraft(absolute_path(Path(text)) if names_folder(text) else text)
     if (aircraft.folder / "posterior.toml").is_file():
-        allowed = "identified from flight logs itself: name its base, which its posterior.toml states"
+        allowed = "this aircraft was itself identified from flight logs: name its base instead, see its posterior.toml"
         raise FlightError.of_argument("base", str(base), allowed)
     if aircraft.battery_voltage == 0.0:
-        allowed = "burns fuel, and no engine is estimated: expected an electric aircraft"
+        allowed = "expected an electric aircraft; engines that burn fuel cannot be identified"
         raise FlightError.of_argument("base", str(base), allowed)
     return aircraft
 
@@ -206,10 +211,9 @@ def _check_stated(stated_numbers: dict[str, float], prior: Aircraft) -> None:
         ("span", stated_numbers["span"], prior.wing_span),
     ):
         if not 1.0 / _MAX_SIZE_RATIO <= value / base_value <= _MAX_SIZE_RATIO:
-            allowed = (
-                f"{base_value / _MAX_SIZE_RATIO:.3g}..{base_value * _MAX_SIZE_RATIO:.3g} is near enough to {prior.name}"
-            )
-            advice = "planfly aircraft --new FOLDER makes a base from a data sheet, for `base`"
+            min_value, max_value = base_value / _MAX_SIZE_RATIO, base_value * _MAX_SIZE_RATIO
+            allowed = f"expected {min_value:.3g}..{max_value:.3g} for the base {prior.name}"
+            advice = "or make another `base` from a data sheet: planfly aircraft --new FOLDER"
             raise FlightError.of_argument(name, value, f"{allowed}; {advice}", shown=f"{value:g}")
 
 
@@ -218,7 +222,7 @@ def _check_distinct(logs: Sequence[MotionLog]) -> None:
     sources: dict[str, str] = {}
     for log in logs:
         if log.sha256 in sources:
-            allowed = "name each log once, and check with another one"
+            allowed = "name each log only once, and use another log to check the result"
             raise LogError(
                 f"{log.source}: the same bytes as {sources[log.sha256]}: {allowed}", file=log.source, allowed=allowed
             )
@@ -268,6 +272,7 @@ def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
 
 
 def _report_page(identified: Identified, predicted: PredictedLog, check: str | Path | None, name: str) -> str:
+    """Return the HTML page of an identification.  check: log that was predicted.  name: name of the aircraft."""
     from logs.views.report.identification import IdentificationFacts, identification_page
 
     numbers = tuple(
@@ -279,7 +284,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
         )
     )
     logs = tuple((Path(log.source).name, log.sha256) for log in identified.logs)
-    conflict = identified.drive_conflict()
+    conflict = identified.power_conflict()
     conflicts = () if conflict is None else (conflict.text,)
     wide = (*conflicts, *(wide_number.text for wide_number in _find_wide_numbers(identified)))
     check_name = None if check is None else Path(check).name
@@ -289,6 +294,7 @@ def _report_page(identified: Identified, predicted: PredictedLog, check: str | P
 
 
 def _find_wide_numbers(identified: Identified) -> tuple[WideNumber, ...]:
+    """Return sink rate and power, each if the logs determine it only within a wide interval."""
     _, sink, power = _performance_intervals(identified)
     return wide_numbers(sink, power, with_current=identified.estimate.with_current)
 
@@ -307,7 +313,7 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
 
     degrees = math.degrees(1.0)
     lower_power, power, upper_power = interval(best.power, samples.power)
-    if (conflict := identified.drive_conflict()) is not None:
+    if (conflict := identified.power_conflict()) is not None:
         upper_power = max(upper_power, conflict.largest_power)
     return (
         interval(best.climb, samples.climb, degrees),
@@ -317,12 +323,12 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
 
 
 def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
-    """Return the names of the logs without battery current; empty if no log has it."""
+    """Return the names of the logs without battery current; empty if none of the logs has it."""
     lacking = {record.source: None for record in records if not record.has_current}
     return tuple(lacking) if any(record.has_current for record in records) else ()
 
 
 def slow_logs(logs: Sequence[MotionLog]) -> tuple[SlowLog, ...]:
-    """Return the logs with less than `AMPLE_HZ` rows per second."""
+    """Return the logs in which sensors or outputs have fewer than `AMPLE_HZ` rows per second."""
     rates = [(log, slowest_rows(log)) for log in logs]
     return tuple(SlowLog(log.source, rate, recording_setting(log)) for log, rate in rates if rate < AMPLE_HZ)

@@ -56,7 +56,7 @@ def read_imported(log: str | Path, **options: Unpack[LogOptions]) -> ImportedFli
     """
     for name in ("params", "guidance", "autopilot", "airspeed", "nav", "seed"):
         if (value := dict(options)[name]) is not None:
-            allowed = "an imported flight is judged by the autopilot and the speeds of its log"
+            allowed = "an imported flight is judged with the autopilot and the speeds of its log"
             raise ScenarioError.of_argument(name, value, allowed, shown="", file=log)
     check_arguments(flight=options["flight"], datum=options["datum"])
     return import_flight(Path(log), options)
@@ -126,7 +126,7 @@ def guess_columns(
 
 
 def _write_log(target: Path, flight: ImportedFlight) -> None:
-    """Write the log completely or not at all."""
+    """Write an imported flight as a flight log, completely or not at all."""
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
         path = Path(folder) / target.name
         with Recorder(path, flight.setup) as recorder:
@@ -189,6 +189,10 @@ def refly(
 
 
 def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
+    """Draw the charts that compare a logged with a simulated flight, and return the files.
+
+    ending: added to the stem of each file name.
+    """
     # Imported here: only pictures need matplotlib.
     from logs.views.compare import refly_charts
     from logs.views.drawing import draw_chart, png_bytes
@@ -202,7 +206,10 @@ def _draw_charts(folder: Path, reflight: Reflight, ending: str) -> list[Path]:
 
 
 def _record_simulation(folder: Path, reflight: Reflight, log: FlightLog, ending: str) -> Path:
-    """Write the simulated flight as a separate log, for `compare` and `replay`, and return its file."""
+    """Write the simulated flight as a log of its own, for `compare` and `replay`, and return the file.
+
+    ending: added to the stem of the file name.
+    """
     path = folder / f"simulated{ending}.mcap"
     verdict = judge_flight(reflight.setup, reflight.simulated, reflight.ended)
     with Recorder(path, replace(reflight.setup, seed=log.setup.seed)) as recorder:

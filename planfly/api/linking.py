@@ -48,7 +48,7 @@ class LinkResult:
 
     @property
     def outage_lines(self) -> tuple[str, ...]:
-        """Description of each outage, by time."""
+        """One line for each outage of the link, in order of time."""
         if self.along is None:
             return ()
         lines = []
@@ -113,8 +113,8 @@ def link(
         check_output_folder(Path(out), overwrite)
     judged = judge(what, **options)
     if judged.setup.scenario.link is None:
-        given = dict(zip(_NEEDED, (frequency, power, sensitivity), strict=True))
-        missing = next((name for name, value in given.items() if value is None), None)
+        required_values = dict(zip(_NEEDED, (frequency, power, sensitivity), strict=True))
+        missing = next((name for name, value in required_values.items() if value is None), None)
         if missing is not None:
             raise ArgumentError.of_argument(missing, "missing", "expected a number, or a scenario with [link]")
     setup = judged.setup.in_scenario(with_link(judged.setup.scenario, **entries))
@@ -144,7 +144,7 @@ def _with_pictures(result: LinkResult, folder: Path, *, overwrite: bool) -> Link
 
 
 def _judge_link(setup: FlightSetup, track: Track | None) -> LinkResult:
-    """Judge the link of a setup's scenario along a track, or leave it open without a track."""
+    """Judge the radio link of a scenario along a track; without a track or terrain the result is undecided."""
     with stage("computing the radio link"):
         requirements = route_requirements(setup)
         aligned = None if track is None else align_track(requirements, track)

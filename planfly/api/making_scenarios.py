@@ -58,7 +58,10 @@ def make_scenario(
 
 
 def _threat_rows(threats: Any) -> list[dict[str, Any]] | np.ndarray:
-    """Convert threats to tables of a scenario file, or to an array (n, 4).  Raises ArgumentError for other values."""
+    """Convert threats to tables of a scenario file, or to an array (n, 4).
+
+    Raises ArgumentError for values that are neither a data frame, columns, mappings nor an array (n, 4).
+    """
     try:
         if isinstance(threats, Mapping):
             columns = {name: np.asarray(values).tolist() for name, values in threats.items()}
@@ -80,11 +83,15 @@ def _threat_rows(threats: Any) -> list[dict[str, Any]] | np.ndarray:
 
 
 def _raise_invalid_threats(threats: Any) -> Any:
+    """Raise ArgumentError for threats of a type that cannot be converted."""
     raise ArgumentError.of_argument("threats", type(threats).__name__, _THREATS_EXPECTED)
 
 
 def _threat_table(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the table of a threat: without missing values and zones of radius 0, and with default scales."""
+    """Return a threat as a table of a scenario file.
+
+    Missing values and radii of 0 are left out, and missing scales get their defaults.
+    """
     values = {key: value for key, value in row.items() if value is not None and value == value}
     for kind, ratio in (("kill", KILL_SCALE_RATIO), ("detection", DETECTION_SCALE_RATIO)):
         radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"

@@ -97,7 +97,7 @@ class Optimiser:
         if self._levels and (
             scores.shape[1] != self._scores.shape[1] or violation_values.shape[1] != self._violation_count
         ):
-            raise ValueError("values, violations: other numbers of columns than before")
+            raise ValueError("values, violations: the numbers of columns differ from the previous call")
         if not self._levels:
             self._violation_count = violation_values.shape[1]
             self._levels = _priority_levels(violation_values.shape[1], objective_values.shape[1])
@@ -107,7 +107,7 @@ class Optimiser:
         self._search.tell(scores)
 
     def _update_front(self, points: Floats, scores: Floats) -> None:
-        """Merge points into the front, keep the non-dominated points, and sort them by the first objective."""
+        """Merge points into the front, which keeps only non-dominated points, sorted by the first objective."""
         all_points, all_scores = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
         front = np.flatnonzero(ranks(all_scores, self._levels) == 0)
         order = front[np.argsort(all_scores[front, self._violation_count], kind="stable")][: self._max_points]
@@ -223,12 +223,16 @@ def optimise(
 
 
 def _priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
-    """Return the priority levels: first the constraints with the goal 0, then the objectives without goals."""
+    """Return the priority levels of the scores: first the constraints with the goal 0, then the objectives.
+
+    violations, objectives: numbers of constraints and of objectives.
+    """
     values = Level(tuple(range(violations, violations + objectives)), (NO_GOAL,) * objectives)
     return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)
 
 
 def _parse_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
+    """Return numbers as an array (row_count, columns), with infinity in place of NaN.  Raises ValueError."""
     columns = np.array(numbers, dtype=np.float64)
     columns = columns[:, np.newaxis] if columns.ndim == 1 else columns
     if columns.ndim != 2 or len(columns) != row_count:

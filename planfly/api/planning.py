@@ -105,6 +105,7 @@ def replan(
 
 
 def _with_budget(scenario: Scenario, budget: int | None) -> Scenario:
+    """Return a scenario with another budget of evaluations; None keeps the scenario."""
     return scenario if budget is None else with_planner(scenario, "budget", budget=budget)
 
 
@@ -156,7 +157,10 @@ def _search_and_write(
 
 
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
-    """Return a stop condition, which returns "interrupted" after `stop`, "budget" after `seconds`, or otherwise ""."""
+    """Return a function that states the reason to stop a search, or "" to continue.
+
+    The reason is "interrupted" as soon as `stop` returns True, and "budget" after a number of seconds.
+    """
     deadline = None if seconds is None else time.monotonic() + seconds
 
     def should_stop() -> str:

@@ -118,11 +118,12 @@ def predict(
     path = Path(log)
     motion = None if by == "mission" or is_log(path) else _read_motion(path, required=by == "controls")
     if by == "controls" and motion is None:
-        raise LogError(f"{path}: by the mission only: a flight log of planfly holds no inertial sensors", file=path)
+        reason = "a flight log of planfly has no inertial sensors; predict it by its mission"
+        raise LogError(f"{path}: {reason}", file=path)
     if motion is not None:
         predicted = _predict_by_controls(motion, aircraft, start)
     elif start is not None:
-        allowed = "expected only for a prediction by the controls; by the mission every followed leg is judged"
+        allowed = "only for a prediction by controls; a prediction by mission judges every leg that was followed"
         raise PlanflyError.of_argument("start", start, allowed)
     else:
         predicted = _predict_by_mission(path, aircraft, options)
@@ -147,7 +148,7 @@ def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
         return None
     has_controls = len(motion.inertial.time) > 1 and len(motion.surface_commands.time) > 1
     if not has_controls and required:
-        raise LogError(f"{path}: no inertial sensors or no controls: predict it by the mission", file=path)
+        raise LogError(f"{path}: no inertial sensors or no controls; predict it by its mission", file=path)
     return motion if has_controls else None
 
 
@@ -156,6 +157,11 @@ def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
 
 
 def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | None) -> Predicted:
+    """Predict a flight from its logged controls, over windows of 2 s.
+
+    start: start of the judged part, s of the log; None for the default of `_judged_start`.
+    Raises LogError if there is too little usable flight before or after the start.
+    """
     with stage("reading a log"):
         records, _ = records_and_outputs(motion, aircraft, MIN_CHECK_SECONDS)
     start = _judged_start(motion, aircraft, records, start)
@@ -164,7 +170,7 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
     for parts, side in ((earlier, "before"), (judged, "from")):
         seconds = sum(part.seconds for part in parts)
         if seconds < MIN_CHECK_SECONDS:
-            allowed = f"at least {MIN_CHECK_SECONDS:g} s of usable flight are needed on either side"
+            allowed = f"at least {MIN_CHECK_SECONDS:g} s of usable flight are needed before and after it"
             message = f"{motion.source}: {seconds:.1f} s of usable flight {side} {start:.1f} s: {allowed}"
             raise LogError(message, file=motion.source, field="start", value=start, allowed=allowed)
     with stage("predicting") as advance:
@@ -187,16 +193,18 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
 
 
 def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[FlightRecord], start: float | None) -> float:
-    """Return the start of the part that is judged, s of the log.
+    """Return the start of the judged part, s of the log.
 
-    Raises LogError if the aircraft was identified from rows after it.
+    The default is the end of the part from which the aircraft was identified, or the middle of a log that was not used
+    for the identification.  Raises LogError if the aircraft was identified from the whole log, and PlanflyError for a
+    start within the part from which it was identified.
     """
     used = _used_until(aircraft, motion.sha256)
     if used is None:
         return float(np.median(np.concatenate([record.time for record in records]))) if start is None else start
     if not math.isfinite(used):
         allowed = "identify it with --until S, and predict the rest"
-        message = f"{motion.source}: {aircraft.name} was identified from all of it: {allowed}"
+        message = f"{motion.source}: {aircraft.name} was identified from the whole log: {allowed}"
         raise LogError(message, file=motion.source, field="aircraft", value=aircraft.name, allowed=allowed)
     if start is not None and start < used:
         allowed = f"expected at least {used:g} s: {aircraft.name} was identified from the rows before"
@@ -219,10 +227,11 @@ def _used_until(aircraft: Aircraft, sha256: str) -> float | None:
 
 
 def drawn_flights(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
-    """Return flights that differ from what is stated, drawn as for a campaign without a file of dispersions.
+    """Draw variations of aircraft, wind, turbulence and position for flights that predict a logged flight.
 
-    The wind is the wind of a log instead of a forecast's, and each level of turbulence is as likely.  The error of the
-    positions of satellite navigation, with which a campaign's flights start, is the error of the logged positions.
+    The quantities are drawn as in a campaign with planfly's own dispersions, with two differences: the wind varies by
+    the error of a logged wind instead of a forecast, and all levels of turbulence are equally likely.  The position
+    offset stands for the error of the logged positions.
     """
     dispersions = with_aircraft_draws(default_dispersions(), aircraft)
     generator = np.random.default_rng(_SEED)
@@ -247,6 +256,10 @@ def drawn_flights(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:
 
 
 def _predict_by_mission(path: Path, aircraft: Aircraft, options: LogOptions) -> Predicted:
+    """Predict a flight by simulating its mission with sampled variants of the aircraft.
+
+    Raises LogError for a log of a flight that planfly itself simulated.
+    """
     if is_log(path):
         log = read_log(path)
         setup, track = log.setup, log.track
@@ -292,18 +305,20 @@ def _profile_bands(flights: Sequence[Reflight]) -> tuple[Band, ...]:
 
 
 def _band_lines(bands: Sequence[Band]) -> list[str]:
+    """Return a line for each band: its width, and the fraction of the flight inside."""
     lines = []
     for band in bands:
         if math.isnan(band.inside):
             lines.append(f"  {band.name:<12} not in the log")
             continue
-        unchanged = "" if math.isnan(band.unchanged) else f" (if it stayed as at the start: ±{band.unchanged:.3g})"
+        unchanged = "" if math.isnan(band.unchanged) else f" (if the value did not change: ±{band.unchanged:.3g})"
         width = f"band of ±{band.half_width:.3g} {band.unit} at the median"
         lines.append(f"  {band.name:<12} {100.0 * band.inside:.1f} % of the flight inside, {width}{unchanged}")
     return lines
 
 
 def _write_page(folder: Path, predicted: Predicted) -> tuple[Path, ...]:
+    """Write the page and the picture of a prediction into a folder, and return both files."""
     from logs.views.drawing import draw_chart, png_bytes
     from logs.views.prediction import band_chart
     from logs.views.report.prediction import prediction_page

@@ -28,6 +28,7 @@ _STATION_TIMEOUT_S = 10.0
 
 
 def _read_log_if_path(log: FlightLog | str | Path) -> FlightLog:
+    """Return a flight log, read from a file if its path is given."""
     return log if isinstance(log, FlightLog) else read_log(log)
 
 
@@ -38,7 +39,7 @@ def replay_interval(log: FlightLog, start: float | None, end: float | None) -> t
     end_time = log.end_time if end is None else min(end, log.end_time)
     end_text = f"the log ends at {log.end_time:.1f} s"
     if end is not None and end > log.end_time and end in _PORTS:
-        allowed = f"{end_text}; if a port is meant, name its address, too: `end` 127.0.0.1:{end:g}"
+        allowed = f"{end_text}; to name a port, add its address: `end` 127.0.0.1:{end:g}"
         raise LogError.of_argument("end", end, allowed, shown=f"{end:g}", file=log.source)
     if start_time > log.end_time:
         raise LogError.of_argument("start", start_time, end_text, shown=f"{start_time:g}", file=log.source)
@@ -112,6 +113,7 @@ def replay(
 def _play_frames(
     instruments_shown: Instruments, start_time: float, end_time: float, speed: float, width: int | Callable[[], int]
 ) -> Iterator[tuple[float, list[str]]]:
+    """Yield flight time and instrument lines at `_FRAME_RATE_HZ` until the end.  speed: multiple of real time."""
     clock, flight_time = RunningClock(), start_time
     while True:
         yield flight_time, instruments_shown.frame(flight_time, width=width() if callable(width) else width)
@@ -149,10 +151,12 @@ def movie(
 
 
 def _never_stop() -> bool:
+    """Return False, so that a replay runs to its end."""
     return False
 
 
 def _ignore_message(_text: str) -> None:
+    """Ignore a message of a replay."""
     pass
 
 
@@ -204,7 +208,7 @@ def play_to_foxglove(
 
 
 def _check_origin(text: str) -> str:
-    """Return the origin if browsers would write it like this.  Raises LogError for an invalid origin."""
+    """Return the origin of a web page unchanged.  Raises LogError if it is not written as browsers write it."""
     if not _ORIGIN.fullmatch(text):
         allowed = "expected the origin of a web page, such as https://example.com or http://localhost:8080"
         raise LogError.of_argument("allow_origin", text, allowed)

@@ -17,7 +17,7 @@ from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import COMPARE_FILES, LOG_FIGURES, check_output_file, clean_folder
-from planfly.workflow.suggestion_trials import judge_mission
+from planfly.workflow.suggestion_trials import judge_mission_geometry
 from planner.plan import Plan
 from world.files import write_atomically
 from world.html_table import html_table
@@ -177,9 +177,10 @@ def compare(
 
 
 def _report_content(source: Source) -> _ReportContent:
+    """Return the setup, verdict and flight that a report shows, for a plan, a flight or a log."""
     if isinstance(source, Plan):
         setup = open_flight(source, {})
-        return _ReportContent(setup, judge_mission(setup))
+        return _ReportContent(setup, judge_mission_geometry(setup))
     if isinstance(source, FlownMission):
         return _ReportContent(source.setup, source.verdict, source.track, source.ended, source.events)
     log = source if isinstance(source, FlightLog) else read_log(source)

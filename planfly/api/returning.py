@@ -38,7 +38,7 @@ from planfly.rtl.return_summary import return_starts
 from planfly.rtl.sitl_returns import ProgramReturns, check_is_arduplane, fly_by_program
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
-from planfly.workflow.airframe import airframe_of
+from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.crash_safe_log import INTERRUPTED
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import RETURN_FILES, check_output_folder, clean_folder
@@ -95,12 +95,12 @@ class ReturnsResult:
 
     @property
     def cause_lines(self) -> tuple[str, ...]:
-        """Lines on the triggers of a return, the settings that trigger none, and the end of a return."""
+        """Lines on the failsafes that trigger a return, those that do not, and on how a return ends."""
         return (*describe_causes(self.returns.causes), *describe_landing(self.returns))
 
     @property
     def range_lines(self) -> tuple[str, ...]:
-        """Description of each range of seconds, the worst first."""
+        """One line for each period of the flight whose returns have the same outcome, the worst first."""
         return tuple(
             range_text(return_range, self.returns, self.setup.scenario) for return_range in self.returns.ranges
         )
@@ -143,23 +143,25 @@ class ReturnsResult:
                 f" simulations differ by up to {max_difference:.0f} m"
             )
         if self.returns.stands_in:
-            notes.append(f"{self.setup.autopilot.title}'s own return is not simulated: ArduPlane's return stands in")
+            notes.append(
+                f"the return of {self.setup.autopilot.title} is not simulated; ArduPlane's return is used instead"
+            )
         if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
-            notes.append("the battery is guessed, so energy is not judged; battery_wh in the scenario states it")
+            notes.append("the battery capacity is guessed, so energy is not judged; state battery_wh in the scenario")
         if self.returns.lands:
             notes.append("a return to a landing sequence is judged up to its first item; the landing is not judged")
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
             notes.append(
-                "no parameter file was given: the settings above are not those of your aircraft; "
+                "no parameter file was given: the settings above are defaults, not the settings of your aircraft; "
                 "--params names its parameter file"
             )
         if self.setup.scenario.terrain is None:
             notes.append("no terrain was given: --terrain names an elevation file")
         if self.setup.scenario.external:
-            notes.append("the mission came without a scenario: threats are unknown")
+            notes.append("the mission was given without a scenario: threats are unknown")
         if not self.returns.flown:
-            notes.append("returns begin on the planned path: nothing was flown, and no energy was used before")
+            notes.append("returns start on the planned path: nothing was flown, and no energy was used before")
         return (*notes, *glide_notes(self.glides))
 
     def __repr__(self) -> str:
@@ -221,6 +223,7 @@ def returns(
 
 
 def _read_imported_flight(path: Path, options: LogOptions) -> "ImportedFlight":
+    """Read and judge a flight from the log of another program."""
     # Imported here: only this call needs the libraries that read the logs of other programs.
     from planfly.api.imported import read_imported
 
@@ -259,6 +262,7 @@ def _check_request(
 
 
 def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest) -> ReturnsResult:
+    """Judge the returns of an imported flight."""
     return _judge_flight(imported.setup, imported.track, request, imported.ended)
 
 
@@ -266,11 +270,12 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
     """Fly a mission, and judge the returns of its flight."""
     return_world(setup)  # Raises errors before the flight.
     with stage("flying the mission"):
-        flight = fly_and_judge(setup, airframe_of(setup), None, reference="never")
+        flight = fly_and_judge(setup, airframe_for_setup(setup), None, reference="never")
     return _judge_flight(flight.setup, flight.track, request, flight.ended)
 
 
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
+    """Simulate and judge returns from points of a flight, look for remedies, and write the requested files."""
     world = return_world(setup)
     starts = return_starts(setup, track, request.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
@@ -281,7 +286,7 @@ def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, en
             logs = None if request.folder is None else Path(log_folder)
             program_returns = fly_by_program(world, starts, judged_returns, request.program, request.points, logs)
             judged_returns = program_returns.with_worse_results(judged_returns)
-        with stage("gliding from there without the engine"):
+        with stage("gliding without the engine"):
             result = ReturnsResult(setup, judged_returns, judge_glides(world, starts), by_program=program_returns)
         if request.suggest and not result.safe and result.returns.each:
             result = replace(result, suggested=_suggest_remedies(world, starts, result, request.every))
@@ -312,7 +317,7 @@ def _suggest_remedies(
     # Remedies do not help a return that sinks to the ground in a take-off or a landing.
     judged_times = [judged_return.time for judged_return in result.returns.each]
     airborne_starts = starts.subset(np.flatnonzero(np.isin(starts.time, judged_times)))
-    with stage("looking for what would make them safe"):
+    with stage("looking for remedies"):
         remedies = suggest_parameters(world, airborne_starts)
         rally = suggest_rally_points(world, airborne_starts)
     remedies += [] if rally is None else [rally]

@@ -17,10 +17,12 @@ if TYPE_CHECKING:
 
 
 def _never_stop() -> bool:
+    """Return False, so that the vehicle is served until it is interrupted."""
     return False
 
 
 def _ignore_message(_text: str) -> None:
+    """Ignore a message of the served vehicle."""
     pass
 
 
@@ -94,10 +96,12 @@ def link_access(
 
 
 def _split_addresses(addresses: str | Sequence[str]) -> Sequence[str]:
+    """Split addresses at commas; a sequence is returned unchanged."""
     return addresses.split(",") if isinstance(addresses, str) else addresses
 
 
 def _parse_address(argument: str, text: str) -> tuple[str, int]:
+    """Parse IP:PORT.  argument: name of the argument in the message.  Raises FlightError for invalid text."""
     host, colon, port = text.strip().rpartition(":")
     if not colon and port.isdigit():
         raise FlightError.of_argument(argument, text, f"expected IP:PORT, such as 127.0.0.1:{port}")
@@ -107,6 +111,7 @@ def _parse_address(argument: str, text: str) -> tuple[str, int]:
 
 
 def _parse_ip(argument: str, text: str) -> str:
+    """Return an IP address in its usual form.  Raises FlightError for invalid text."""
     try:
         return str(ipaddress.ip_address(text))
     except ValueError as error:

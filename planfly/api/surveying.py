@@ -36,7 +36,7 @@ from planfly.surveys.survey_text import (
     survey_text,
     usable_segments_text,
 )
-from planfly.workflow.airframe import airframe_of
+from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.crash_safe_log import flight_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
@@ -101,8 +101,8 @@ class SurveyResult:
     def no_remedy_lines(self) -> tuple[str, ...]:
         """Lines for a survey without a remedy, with the closest trial, and the reason to keep the layout."""
         texts = [
-            "no single turn-around, order, course, parameter or airspeed was found that would help, nor longer"
-            " turn-arounds with another parameter or a slower flight"
+            "nothing was found that would help: no turn-around, order, course, parameter or airspeed alone, and no"
+            " longer turn-arounds combined with a parameter or a lower airspeed"
         ]
         texts += [usable_segments_text(*pair) for pair in zip(self.surveys, self.lines, strict=True)]
         if self.kept:
@@ -200,7 +200,7 @@ def _with_camera(setup: FlightSetup, camera: Camera | None) -> FlightSetup:
 def _fly_survey(setup: FlightSetup, suggest: bool) -> SurveyResult:
     """Fly a mission, measure its photo lines, and look for remedies if they are requested."""
     _check_has_survey(setup)
-    airframe = airframe_of(setup)
+    airframe = airframe_for_setup(setup)
     with stage(f"flying {flight_text(setup)}", "flying a survey") as advance:
         flight = fly_and_judge(setup, airframe, None, advance, reference="never")
     result = _measure_survey(flight.requirements, flight.track, flight.verdict)
@@ -253,7 +253,7 @@ def _check_has_survey(setup: FlightSetup) -> None:
     if not judged_surveys(setup):
         source = setup.mission.source
         raise MissionError(
-            f"{source}: no survey; expected at least three lines side by side, or two with photos along them",
+            f"{source}: no survey found; expected at least three parallel lines, or two with photos along them",
             file=source,
         )
 
@@ -266,6 +266,7 @@ def _judge_flown_survey(setup: FlightSetup, track: Track, end_reason: str) -> Su
 
 
 def _measure_survey(requirements: RouteRequirements, track: Track, verdict: Verdict) -> SurveyResult:
+    """Measure the photo lines and the overlap of a flight; without a track the measures are None."""
     setup, surveys = requirements.setup, requirements.surveys
     aligned = align_track(requirements, track) if len(track) else None
     lines = tuple(

@@ -18,17 +18,17 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
-from logs.verdict.conditions import Conditions, setup_conditions
+from logs.verdict.conditions import Conditions, judging_conditions
 from planfly.campaigns.dispersions import DEFAULT_DISPERSIONS_NAME, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
 from planfly.flight_options import MissionOptions, load_scenario_with_options
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.workflow.airframe import (
     Airframe,
-    airframe_of,
-    bank_limit,
+    airframe_for_setup,
     check_level_flight,
     choose_seed,
     load_airframe,
+    max_turn_bank,
     with_tracking,
 )
 from planfly.workflow.make_plan import Advance, make_plan
@@ -75,15 +75,18 @@ class CampaignBase:
     name: str
 
     def nominal_setup(self) -> FlightSetup:
-        """Return the setup without any variation. Raises PlanflyError for a mission without a valid route."""
+        """Return the flight setup without any variation. Raises PlanflyError for a mission without a valid route."""
         return make_setup(self.scenario, self.airframe, self.mission, self.seed, plan=self.plan, placed=self.placed)
 
     def conditions(self) -> Conditions:
         """Return the nominal conditions of the flights: aircraft, weather, world and autopilot."""
-        return setup_conditions(self.nominal_setup())
+        return judging_conditions(self.nominal_setup())
 
-    def world_hash(self) -> str:
-        """Return the hash of all inputs of a flight except the code: scenario, mission, model, dispersions and seed."""
+    def inputs_hash(self) -> str:
+        """Return a hash of all inputs of the flights except the code.
+
+        The inputs are scenario, terrain, mission, aircraft model, autopilot parameters, dispersions and seed.
+        """
         model = self.airframe.aircraft
         terrain = self.scenario.terrain
         parts = (
@@ -134,7 +137,8 @@ def open_campaign(
         has_plan_file = plan_file is not None and plan_file.is_file()
         plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
         if has_plan_file and plan.scenario.to_json() != scenario.to_json():
-            raise MissionError(f"{plan_file}: is the plan of another scenario than {target}", file=str(plan_file))
+            message = f"{plan_file}: this plan was made for another scenario, not {target}"
+            raise MissionError(message, file=str(plan_file))
         if plan_file is not None and not has_plan_file:
             write_atomically(plan_file, plan_json(plan))
         base = _make_base_from_plan(plan, fences, dispersions, choose_seed(scenario, seed))
@@ -145,6 +149,7 @@ def open_campaign(
 
 
 def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) -> Plan:
+    """Plan a path in a scenario.  Raises MissionError if no feasible path is found."""
     plan = make_plan(scenario, load_airframe(scenario), choose_seed(scenario, seed), advance=advance)
     if not plan.feasible:
         raise MissionError(
@@ -154,6 +159,7 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
 
 
 def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersions, seed: int) -> CampaignBase:
+    """Return the base of a campaign that flies the mission of a plan.  seed: seed of the campaign."""
     scenario = plan.scenario
     airframe = load_airframe(scenario)
     mission = fences.add_to_mission(mission_of_plan(plan, airframe))
@@ -163,8 +169,9 @@ def _make_base_from_plan(plan: Plan, fences: NamedFences, dispersions: Dispersio
 
 
 def _make_base_from_setup(setup: FlightSetup, dispersions: Dispersions, source: str) -> CampaignBase:
+    """Return the base of a campaign that flies the mission of a setup.  source: name of the mission in messages."""
     mission = replace(setup.mission, source=source)
-    scenario, airframe = setup.scenario, airframe_of(setup)
+    scenario, airframe = setup.scenario, airframe_for_setup(setup)
     placed_mission = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
     dispersions = with_aircraft_draws(dispersions, airframe.aircraft)
     return CampaignBase(scenario, airframe, mission, placed_mission, setup.plan, dispersions, setup.seed, setup.name)
@@ -189,7 +196,7 @@ def check_level_flight_at_medians(base: CampaignBase) -> None:
             f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
         )
         raise SpreadError(
-            f"{base.dispersions.name}: {factors}: at the middle of these {aircraft.name} cannot hold level flight at"
+            f"{base.dispersions.name}: with the medians {factors}, {aircraft.name} cannot fly level at"
             f" {base.airframe.airspeed:g} m/s",
             file=base.dispersions.name,
             value=factors,
@@ -204,7 +211,7 @@ def _check_draws(base: CampaignBase) -> None:
     try:
         Fdm(base.airframe.aircraft, variation=Variation(properties=draws.properties(0)))
     except FlightError as error:
-        allowed = f"draws of another aircraft: {error}"
+        allowed = f"these draws belong to another aircraft: {error}"
         raise SpreadError(f"{draws.source}: {allowed}", file=draws.source, field=error.field) from error
 
 
@@ -250,10 +257,10 @@ class VariedFlight:
 
 
 def vary_flight(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
-    """Return the flight of a draw.
+    """Return the varied flight for a draw: setup, airframe, and the variations that the autopilot does not know.
 
-    Scenario and limits are adapted to the flight's wind, as in `planfly fly --wind`. The autopilot does not know the
-    mass, drag, control power, drawn aircraft and start position.
+    Scenario and limits are adapted to the wind of the flight, as in `planfly fly --wind`. The autopilot does not know
+    the varied mass, drag, control power, aircraft properties and start position.
 
     wind: mean wind that the draw varies; None for the wind of the scenario.
     """
@@ -291,17 +298,22 @@ def _with_drawn_wind(scenario: Scenario, values: dict[str, float], mean_wind: Gi
 
 
 def _draw_strip_error(strip: LandingStrip | None, seed: int) -> float | None:
-    """Return the error of a strip's surveyed height in a flight, m; None if its height was not surveyed."""
+    """Draw the error of the surveyed height of a landing strip, m; None if the height was not surveyed.
+
+    seed: seed of the flight.
+    """
     if strip is None or strip.height_sd is None:
         return None
     return float(np.random.default_rng([seed, _STRIP_ERROR_STREAM]).normal(0.0, strip.height_sd))
 
 
 def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, strip_error: float | None) -> Terrain:
-    """Return a terrain whose heights differ by an error, m, but at a surveyed strip by the error of the survey.
+    """Return a terrain with an error added to all heights, except near a surveyed landing strip.
 
-    The error changes linearly from ``strip_error``, within the strip and `_SURVEYED_DISTANCE_M` beyond its ends, to
-    ``error``, `_SURVEY_BLEND_DISTANCE_M` further away.  strip_error: m; None if the strip was not surveyed.
+    At the strip, and up to `_SURVEYED_DISTANCE_M` beyond its ends, the error is `strip_error`.  Over the next
+    `_SURVEY_BLEND_DISTANCE_M` it changes linearly to `error`.
+    error: m.
+    strip_error: m; None if the strip was not surveyed.
     """
     if strip is None or strip_error is None:
         return replace(terrain, heights=terrain.heights + np.float32(error)) if error else terrain
@@ -325,5 +337,5 @@ def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -
     # The performance of a drawn aircraft is known exactly, so it has no standard deviations.
     exact_envelope = replace(old_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = exact_envelope if is_drawn else old_limits.envelope
-    limits = make_limits(scenario, envelope, old_limits.airspeed, bank_limit(scenario, airframe.autopilot))
+    limits = make_limits(scenario, envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot))
     return with_tracking(limits, airframe.autopilot, scenario)

@@ -48,6 +48,7 @@ def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> s
 
 
 def _command_line(command: str, target: str, options: Mapping[str, object]) -> str:
+    """Return a command line with quoted options; options that are None or have their default are omitted."""
     parts = ["planfly", command, shlex.quote(target)]
     for name, value in options.items():
         if value is None or value == _DEFAULTS.get(name):
@@ -58,6 +59,7 @@ def _command_line(command: str, target: str, options: Mapping[str, object]) -> s
 
 
 def _option_text(value: object) -> str:
+    """Return the text of an option's value; numbers of a tuple are separated by commas."""
     if isinstance(value, tuple):
         return ",".join(_option_text(number) for number in value)
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
@@ -123,7 +125,7 @@ class CampaignResult:
         Raises ValueError for a campaign without a folder.
         """
         if self.table is None:
-            raise ValueError("shapes: the campaign kept no folder; give it one by out")
+            raise ValueError("shapes: the campaign has no folder; name one with `out`")
         return read_path_arrays(self.table)
 
     def __repr__(self) -> str:
@@ -144,7 +146,7 @@ def make_goal(flights: int | None, prove: float | None, at_least: float | None, 
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)
     """
     if prove is not None and at_least is not None:
-        raise ArgumentError("`prove` and `at_least`: give one of them", field="prove", value=prove)
+        raise ArgumentError("`prove` and `at_least`: give only one of them", field="prove", value=prove)
     check_arguments(prove=prove, at_least=at_least, confidence=confidence, flights=flights)
     flight_count = flights or (DEFAULT_FLIGHTS if prove is None else MAX_FLIGHTS)
     return Goal(

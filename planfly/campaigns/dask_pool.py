@@ -57,7 +57,10 @@ class CampaignPlugin(WorkerPlugin):
 
 
 def fly_task(campaign: str, request: FlightRequest) -> FlightRow:
-    """Fly a flight on the worker that runs this task."""
+    """Fly the requested flight of a campaign on the dask worker that runs this task.
+
+    campaign: name under which the campaign is registered on the worker.
+    """
     worker = get_worker()
     plugin = worker.plugins[campaign]
     if not isinstance(plugin, CampaignPlugin):

@@ -109,13 +109,14 @@ class VaryingQuantity:
 
     @cached_property
     def _scipy_distribution(self) -> Any:
+        """Distribution of scipy.stats with the quantity's parameters."""
         from scipy import stats
 
         return getattr(stats, self.distribution)(**dict(self.parameters))
 
     @cached_property
     def _range_limits(self) -> tuple[float, float]:
-        """Return the values of the distribution function just below and at the upper end of the quantity's range."""
+        """Cumulative probabilities at the lower and the upper end of the quantity's range."""
         min_value = self.quantity.low - (0.5 if self.quantity.integer else 0.0)
         return float(self._scipy_distribution.cdf(min_value)), float(self._scipy_distribution.cdf(self.quantity.high))
 
@@ -126,7 +127,7 @@ class VaryingQuantity:
         return upper_probability - lower_probability
 
     def value(self, fraction: float) -> float:
-        """Return the value below which a fraction, 0 to 1, of the distribution within the range lies.
+        """Return the quantile of the distribution, truncated to the quantity's range.  fraction: 0 to 1.
 
         >>> mass = VaryingQuantity(QUANTITY_BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand")
         >>> round(mass.value(0.25), 6)
@@ -135,7 +136,7 @@ class VaryingQuantity:
         return float(self.values(np.array([fraction]))[0])
 
     def values(self, fractions: Floats) -> Floats:
-        """Return the value for each of several fractions, like `value`.  fractions: (n,)."""
+        """Return the quantile for each of several fractions, (n,); see `value`."""
         lower_probability, upper_probability = self._range_limits
         values = self._scipy_distribution.ppf(lower_probability + fractions * (upper_probability - lower_probability))
         return np.clip(values, self.quantity.low, self.quantity.high)
@@ -256,6 +257,7 @@ def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
 
 
 def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> VaryingQuantity:
+    """Parse the table of a quantity.  Raises SpreadError for an invalid table.  name: name of the file in messages."""
     if not isinstance(quantity_table, dict):
         allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, quantity_table, allowed, shown="")
@@ -272,14 +274,15 @@ def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> Varyi
     fraction = _compute_fraction_inside(varying, name)
     if not fraction >= MIN_FRACTION_INSIDE:
         allowed = (
-            f"{100.0 * fraction:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
-            f" {quantity.unit or 'of the nominal'}; at least {100.0 * MIN_FRACTION_INSIDE:.0f} % has to"
+            f"only {100.0 * fraction:.1f} % of the distribution lies within {quantity.low:g}..{quantity.high:g}"
+            f" {quantity.unit or 'times the nominal value'}; at least {100.0 * MIN_FRACTION_INSIDE:.0f} % must"
         )
         raise SpreadError.at(name, quantity.name, _call_text(varying), allowed)
     return varying
 
 
 def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> None:
+    """Raise SpreadError unless scipy.stats has the named distribution, discrete for a whole-number quantity."""
     from scipy import stats
 
     kind = stats.rv_discrete if quantity.integer else stats.rv_continuous
@@ -288,12 +291,17 @@ def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> Non
         allowed = "missing; expected the name of one of scipy.stats' distributions"
         raise SpreadError.at(name, field, distribution, allowed, shown="")
     if not isinstance(getattr(stats, distribution, None), kind):
-        kind_text = "a discrete one, such as randint" if quantity.integer else "a continuous one, such as norm"
-        allowed = f"no distribution of scipy.stats; expected {kind_text}"
+        kind_text = "a discrete" if quantity.integer else "a continuous"
+        example = "randint" if quantity.integer else "norm"
+        allowed = f"expected {kind_text} distribution of scipy.stats, such as {example}"
         raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
 
 
 def _check_parameters(distribution: str, entries: dict[str, Any], name: str, quantity: str) -> None:
+    """Raise SpreadError for an unknown, non-finite or missing parameter of a distribution.
+
+    name: name of the file in messages.
+    """
     from scipy import stats
 
     scipy_distribution: Any = getattr(stats, distribution)
@@ -316,14 +324,19 @@ def _check_parameters(distribution: str, entries: dict[str, Any], name: str, qua
 
 
 def _compute_fraction_inside(varying: VaryingQuantity, name: str) -> float:
+    """Return the fraction of a distribution within the quantity's range.
+
+    Raises SpreadError for parameters that are invalid for the distribution.
+    """
     fraction = varying.fraction_inside
     if math.isnan(fraction):
-        allowed = f"parameters that {varying.distribution} cannot have"
+        allowed = f"these parameters are invalid for {varying.distribution}"
         raise SpreadError.at(name, varying.quantity.name, _call_text(varying), allowed)
     return fraction
 
 
 def _call_text(varying: VaryingQuantity) -> str:
+    """Return a distribution with its parameters as text, such as "norm(loc=1, scale=0.05)"."""
     return f"{varying.distribution}({', '.join(f'{key}={value:g}' for key, value in varying.parameters)})"
 
 
@@ -345,7 +358,7 @@ class Draw:
 
 
 def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
-    r"""Draw a flight's numbers.
+    r"""Draw the values of all quantities for one flight.
 
     The random numbers are from ``SeedSequence(seed, spawn_key=(index,))``. No draw depends on another draw, so any
     order, any number of workers and any part of a campaign give the same flights.
@@ -368,7 +381,7 @@ def draw_flight(dispersions: Dispersions, seed: int, index: int) -> Draw:
 
 
 def standard_draws(dispersions: Dispersions, seed: int, start: int, stop: int) -> Floats:
-    """Return the draws of flights as standard deviations from the mean of each quantity, (stop - start, d).
+    """Return the draws of flights, (stop - start, d), in standard deviations from the mean of each quantity.
 
     The flights are drawn as in `draw_flight`.  d is the number of varying quantities that have more than one value.
 
@@ -399,15 +412,15 @@ def standard_population(dispersions: Dispersions, count: int) -> Floats:
 
 
 def _draw_fractions(seed: int, index: int) -> tuple[Floats, int]:
-    """Draw the fraction of each quantity's distribution, 0 to 1, and the seed used within the flight."""
+    """Draw a cumulative probability, 0 to 1, for each quantity, and the seed used within the flight."""
     random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
     return random.random(len(QUANTITIES)), int(random.integers(2**63))
 
 
 def _standardise(dispersions: Dispersions, fractions: Floats) -> Floats:
-    """Convert fractions of the varying quantities' distributions, (n, v), to deviations from the mean, (n, d).
+    """Convert cumulative probabilities of the varying quantities, (n, v), to deviations from the mean, (n, d).
 
-    The deviations are in standard deviations.
+    The deviations are in standard deviations.  A quantity with only one value has no column.
     """
     quantiles = (np.arange(_QUANTILE_COUNT) + 0.5) / _QUANTILE_COUNT
     columns = []

@@ -136,7 +136,7 @@ def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resum
     Raises StoreError, also for the table of a search with another goal.
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
-    return WindsStore(folder / WINDS_DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
+    return WindsStore(folder / WINDS_DATABASE, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
 
 
 def find_winds(
@@ -207,6 +207,7 @@ class _Search:
         return requests[: max(0, self.goal.flights - len(self.flown))]
 
     def _is_open(self, index: int) -> bool:
+        """Return True if a direction needs more flights; its boundary is computed only at intervals."""
         direction = self.directions[index]
         count = len(direction.speeds)
         if count < self._next_check[index]:
@@ -294,7 +295,7 @@ def _failures_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> CalmFailures | N
 
 
 def _failure_key(rule: str, place: Place) -> Hashable:
-    """Return the key of a failure: its rule and place."""
+    """Return a hashable key for a failed rule and place; item numbers and names are not part of it."""
     return rule, place.kind, place.index
 
 
@@ -308,11 +309,16 @@ class _StoredFlights:
         self.flown = {number: flight for number, (_, flight) in requests_and_outcomes.items()}
 
     def missing(self, requests: list[RequestedFlight]) -> list[RequestedFlight]:
-        """Return the requests that are not in the table. Raises StoreError if a number has another request there."""
+        """Return the requests whose flights are not in the table.
+
+        Raises StoreError if the table has another request with the same number.
+        """
         for request in requests:
             if self._requests.get(request.number, request) != request:
                 path = self._store.path
-                raise StoreError(f"{path}: flight {request.number} does not follow from those before it", file=path)
+                raise StoreError(
+                    f"{path}: flight {request.number} is not the flight that this search would request", file=path
+                )
         return [request for request in requests if request.number not in self.flown]
 
     def add(self, request: RequestedFlight, row: FlightRow) -> None:
@@ -328,6 +334,7 @@ def _fly_round(
     stored_flights: _StoredFlights,
     progress: "_ProgressReport",
 ) -> None:
+    """Fly the missing flights of a round, and write each to the table as soon as it is done."""
     remaining_requests = iter(missing_requests)
     requested_by_request: dict[FlightRequest, RequestedFlight] = {}
 

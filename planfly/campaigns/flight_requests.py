@@ -66,7 +66,7 @@ def code_hash() -> str:
 
 
 def fingerprint(aircraft: str) -> dict[str, str]:
-    """Return the versions and hashes, keyed by name, that determine a flight of an aircraft on this machine.
+    """Return the software versions and hashes that determine a flight on this machine, keyed by name.
 
     >>> sorted(fingerprint("aerosonde"))
     ['jsbsim', 'model', 'numba', 'numpy', 'planfly', 'python', 'scipy', 'sources']
@@ -85,7 +85,7 @@ def fingerprint(aircraft: str) -> dict[str, str]:
 
 
 def check_fingerprint(own_fingerprint: dict[str, str], worker_fingerprint: dict[str, str], worker: str) -> None:
-    """Raise WorkerError if the fingerprints differ, with the worker and the first difference.
+    """Raise WorkerError if a worker's fingerprint differs; the message names the worker and the first difference.
 
     >>> check_fingerprint({"planfly": "0.1.0"}, {"planfly": "0.0.9"}, "tls://10.0.0.7:4000")
     Traceback (most recent call last):
@@ -94,9 +94,9 @@ def check_fingerprint(own_fingerprint: dict[str, str], worker_fingerprint: dict[
     """
     for name, value in own_fingerprint.items():
         if worker_fingerprint.get(name) != value:
-            value_there, allowed = worker_fingerprint.get(name), f"not {value} as here"
-            message = f"worker {worker}: {name} {value_there or 'missing'}, {allowed}"
-            raise WorkerError(message, file=f"worker {worker}", field=name, value=value_there, allowed=allowed)
+            worker_value, allowed = worker_fingerprint.get(name), f"not {value} as here"
+            message = f"worker {worker}: {name} {worker_value or 'missing'}, {allowed}"
+            raise WorkerError(message, file=f"worker {worker}", field=name, value=worker_value, allowed=allowed)
 
 
 class CampaignCopy:
@@ -112,7 +112,7 @@ class CampaignCopy:
         self._unpacked: tuple[CampaignBase, FlyOne] | None = None
 
     def fly(self, request: FlightRequest, worker: str) -> FlightRow:
-        """Fly a flight on this worker. Raises WorkerError if this worker would fly it differently."""
+        """Fly the requested flight on this worker. Raises WorkerError if this worker's software differs."""
         base, fly = self.unpack(worker)
         return replace(fly(base, request.index, request.wind), worker=worker)
 

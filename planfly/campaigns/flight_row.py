@@ -41,9 +41,10 @@ MarginalPass = tuple[str, Place, float]
 
 
 def find_marginal_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[MarginalPass, ...]:
-    """Return rule, place and margin of each marginal pass, in the verdict's order, followed by the passes at missiles.
+    """Return rule, place and scaled margin of each marginal pass: a finding that passed by less than its rule's scale.
 
-    The margin is 0 if a rule accepts a value beyond its limit for another reason.
+    The margin is a fraction of the scale, 0 to 1; it is 0 if a rule accepts a value beyond its limit for another
+    reason.  Passes close to a missile's sphere follow at the end.
     """
     fractions: dict[tuple[str, Place], float] = {}
     failed_keys = {(finding.rule, finding.place) for finding in findings if finding.ok is False}
@@ -161,11 +162,12 @@ class Column:
 
 
 def _failed_findings_text(failed_findings: Iterable[tuple[str, Place]]) -> str:
+    """Return the JSON text of failed rules and places, for a column of the table."""
     return json.dumps([{"rule": rule, **asdict(place)} for rule, place in failed_findings])
 
 
 def parse_failed_findings(text: str) -> tuple[tuple[str, Place], ...]:
-    """Parse the rule and place of each failed finding from the text in the column.
+    """Parse failed rules and places from the JSON text of a column; the inverse of `_failed_findings_text`.
 
     >>> parse_failed_findings('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
     3
@@ -220,7 +222,7 @@ class FlightRow:
 
     @property
     def closeness(self) -> float:
-        """Minimum of all scaled margins, which sorts the closest calls; inf if no margin is known."""
+        """Minimum of all scaled margins, by which flights are sorted; inf if no margin is known."""
         fractions = (fraction for rule, margin in self.margins if (fraction := scale_margin(rule, margin)) is not None)
         return min((fraction for fraction in fractions if math.isfinite(fraction)), default=math.inf)
 
@@ -243,8 +245,9 @@ COLUMN_FIELDS = _column_fields()
 
 
 def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:
-    """Fly the flight of a campaign with an index, and return its row.
+    """Fly one flight of a campaign, and return its row.
 
+    index: number of the flight, from 0.
     wind: mean wind that replaces the scenario's wind, or None.
     log: file for the recording, or None for no recording.
     """
@@ -304,5 +307,5 @@ def find_minimum_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, Mini
 
 
 def make_lost_row(base: CampaignBase, index: int, reason: str) -> FlightRow:
-    """Return the row of a flight that could not be flown."""
+    """Return the row of a flight with the outcome "lost", because it could not be flown."""
     return FlightRow(draw_flight(base.dispersions, base.seed, index), "lost", reason)

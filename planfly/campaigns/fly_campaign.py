@@ -30,14 +30,17 @@ class _FlightTally:
     is_decided: bool = False
 
     def add(self, index: int, outcome: str) -> None:
-        """Add a flight, and decide as soon as the flights before the first missing index allow a decision."""
+        """Add the outcome of a flight, and count all flights before the first missing index.
+
+        Set `is_decided` as soon as the counted flights decide the goal.
+        """
         self.later_outcomes[index] = outcome
         while not self.is_decided and (next_outcome := self.later_outcomes.pop(self.tally.flown, None)) is not None:
             self.tally = _add_outcome(self.tally, next_outcome)
             self.is_decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def next_request(self) -> FlightRequest | None:
-        """Return the next flight to send, or None if no flight remains."""
+        """Return the request of the next missing flight, or None if the goal is decided or no flight is missing."""
         self.next_index = max(self.next_index, self.tally.flown)
         while self.next_index in self.later_outcomes:
             self.next_index += 1
@@ -48,6 +51,7 @@ class _FlightTally:
 
 
 def _add_outcome(tally: Tally, outcome: str) -> Tally:
+    """Return a tally with one more flight of an outcome."""
     flyable, not_flyable, lost = tally
     return Tally(flyable + (outcome == "flyable"), not_flyable + (outcome == "not flyable"), lost + (outcome == "lost"))
 
@@ -61,7 +65,7 @@ def resumed_goal(requested: Goal | None, folder: Path, confidence: float | None 
     path = folder / CAMPAIGN_DATABASE
     settings = read_stored_settings(path)
     if not settings:
-        raise StoreError(f"{path}: no campaign there to continue", file=path)
+        raise StoreError(f"{path}: there is no campaign to continue", file=path)
     old_goal = Goal(**{setting.name: settings[setting.name] for setting in fields(Goal) if setting.name in settings})
     goal = old_goal if requested is None else requested
     is_same = (goal.stops, goal.flights) == (old_goal.stops, old_goal.flights)
@@ -75,7 +79,7 @@ def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) ->
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
     path = folder / CAMPAIGN_DATABASE
-    return Store(path, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
+    return Store(path, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
 
 
 def fly_campaign(
@@ -106,6 +110,7 @@ def fly_campaign(
 
 
 def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, progress: "_ProgressReport") -> None:
+    """Fly the missing flights until the goal is decided, and write each to the table."""
     progress.start_timing(flight_tally.tally)
     for _, row in pool.fly(flight_tally.next_request):
         _store_flight(row, flight_tally, store)
@@ -116,6 +121,7 @@ def _fly_remaining(pool: WorkerPool, flight_tally: _FlightTally, store: Store, p
 
 
 def _store_flight(row: FlightRow, flight_tally: _FlightTally, store: Store) -> None:
+    """Write a flight to the table, and count its outcome."""
     store.add(row)
     flight_tally.add(row.draw.index, row.outcome)
 
@@ -133,7 +139,7 @@ class _ProgressReport:
             advance(float(stored_tally.flown), float(total), remark)
 
     def start_timing(self, stored_tally: Tally) -> None:
-        """Start to measure the rate of flights, because the workers are ready."""
+        """Start measuring the rate of flights; called when the workers are ready."""
         self._rate = FlightRate(stored_tally.flown)
 
     def _min_total_flights(self, tally: Tally) -> int:
@@ -141,7 +147,7 @@ class _ProgressReport:
         return max(self._estimator.min_flights, tally.flown) if self._goal.stops else self._goal.flights
 
     def report(self, tally: Tally, is_last: bool = False) -> None:
-        """Report the flights, P with its bounds, flights per minute and remaining time.
+        """Report the number of flights, the probability of success with its bounds, the rate and the remaining time.
 
         is_last: True reports even if no report is due.
         """

@@ -39,7 +39,7 @@ def _initialise_worker(campaign: CampaignCopy) -> None:
 
 
 def _fly_request(request: FlightRequest) -> FlightRow:
-    """Fly a flight in a worker process."""
+    """Fly the requested flight in a worker process."""
     return _worker_campaign[0].fly(request, f"process {os.getpid()}")
 
 
@@ -54,7 +54,7 @@ class _Worker:
         self._start_future: Future[None] = Future()
 
     def send(self, request: FlightRequest) -> Future[FlightRow]:
-        """Send a flight to the process."""
+        """Send a request to the worker's process; start the process if there is none or it has died."""
         # Ctrl-C reaches every process of a terminal, so workers ignore it, and this process ends them.
         with children_ignore_sigint(), delay_signals():
             try:
@@ -65,6 +65,7 @@ class _Worker:
                 return self._submit(request)
 
     def _submit(self, request: FlightRequest) -> Future[FlightRow]:
+        """Submit a request to the worker's process; start the process if there is none."""
         if self._pool is None:
             other_children = set(active_children())
             # The pool has one process, so that its flight is known if the process dies.
@@ -145,7 +146,11 @@ class LocalPool:
             _end_workers(worker for worker, _ in flying.values())
 
     def _result_row(self, future: Future[FlightRow], worker: _Worker, request: FlightRequest) -> FlightRow | None:
-        """Return the row of a flight, or None if its process has died. Raises the errors of `fly`."""
+        """Return the row of a flight, or None if its process has died.
+
+        Raises the PlanflyError of a flight, RuntimeError for any other error of a flight, and OSError if processes
+        repeatedly end at their start.
+        """
         try:
             row = future.result()
         except BrokenProcessPool:

@@ -134,7 +134,10 @@ def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float 
 
 
 def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
-    """Draw the probability P against wind speed, with its interval and the number of flights in each range."""
+    """Draw the fraction of flyable flights against wind speed, with its interval and the number of flights.
+
+    target: required probability, drawn as a line, or None.
+    """
     with clean_style():
         figure = new_figure(4.2)
         axes = figure.add_axes((0.08, 0.16, 0.89, 0.70))
@@ -175,15 +178,18 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
         axes.set_xlabel("mean wind at the start's height (m/s)")
         axes.set_ylabel("share of flyable flights")
         axes.set_title(
-            "Probability against wind speed: the line is the share, the band Wilson's interval, "
-            "below is the number of flights"
+            "Probability against wind speed: line, share of flyable flights; band, Wilson interval; numbers, flights"
         )
         _style_axes(axes)
     return figure
 
 
 def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
-    """Draw the quantities that explain the variance of the deciding margin, to the right if an increase helps."""
+    """Draw a tornado chart: the fraction of the deciding margin's variance that each quantity explains.
+
+    A bar points to the right if an increase of the quantity increases the margin.
+    rule_title: title of the rule with the deciding margin.
+    """
     with clean_style():
         height = 1.2 + 0.3 * max(1, len(bars))
         figure = new_figure(height)
@@ -206,7 +212,7 @@ def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
         axes.invert_yaxis()
         half_range = max([0.2, *(1.25 * bar.index for bar in bars)])
         axes.set_xlim(-half_range, half_range)
-        axes.set_xlabel("share of the margin's variance   (left: more of it leaves less margin; right: more)")
+        axes.set_xlabel("share of the margin's variance   (left: an increase reduces the margin; right: increases it)")
         axes.set_title(f"What decides: first-order sensitivity of the margin of {rule_title}")
         axes.set_xticks([])
         for spine in ("top", "right", "left"):
@@ -216,6 +222,7 @@ def draw_tornado(bars: Sequence[Bar], rule_title: str) -> Figure:
 
 
 def _style_axes(axes: object) -> None:
+    """Draw a grid behind the data, and remove the top and right edge of the axes."""
     if isinstance(axes, Axes):
         axes.grid(visible=True, color=GRID_COLOUR, linewidth=0.6)
         axes.set_axisbelow(True)
@@ -237,7 +244,7 @@ _PANELS_PER_ROW = 5
 def draw_clearance_fan(
     clearance: Floats, has_failed: NDArray[np.bool_], terrain_altitudes: Floats, length: float, min_clearance: float
 ) -> Figure:
-    """Draw the height above ground along the path for all flights, above the profile of the ground.
+    """Draw the height above ground of all flights along the path, as quantile bands, and below it the ground profile.
 
     clearance: minimum clearance of each flight on each of s equal pieces of the path, m, (n, s); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,); at most 30 of them are drawn.
@@ -293,7 +300,7 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
-    """Draw the crossings of each waypoint in a panel, seen along the path, with their 95 % ellipse.
+    """Draw where the flights crossed each waypoint, one panel for each, seen along the path, with the 95 % ellipse.
 
     crossings: distance right of and above each waypoint, m, (n, w, 2); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,).
@@ -331,14 +338,14 @@ def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
             axes.set_xlim(-half_size, half_size)
             axes.set_ylim(-half_size, half_size)
             axes.tick_params(labelsize=7)
-        title = "Crossings of the waypoints, m right of and above each, with the ellipse of 95 %"
+        title = "Where flights crossed each waypoint, m right of and above it, with the ellipse of 95 %"
         figure.text(0.07, 1.0 - 0.3 / height, title, fontsize=11, color=INK_COLOUR)
         figure.text(0.98, 1.0 - 0.3 / height, "dots flyable, crosses not", fontsize=8, color=QUIET_COLOUR, ha="right")
     return figure
 
 
 def covariance_ellipse(points: Floats) -> Ellipse:
-    """Return the 95 % ellipse of a normal distribution with the mean and covariance of points.  points: (n, 2).
+    """Return the 95 % ellipse of the normal distribution fitted to points, (n, 2).
 
     >>> points = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     >>> ellipse = covariance_ellipse(points)
@@ -356,6 +363,7 @@ def covariance_ellipse(points: Floats) -> Ellipse:
 
 
 def _panel_half_size(crossings: Floats) -> float:
+    """Return the half size of a panel, m, that contains 99.5 % of the distances; 10 without crossings."""
     distances = np.abs(crossings[np.isfinite(crossings)])
     return max(5.0, 1.1 * float(np.quantile(distances, 0.995))) if distances.size else 10.0
 
@@ -391,7 +399,7 @@ def draw_go_no_go(
     name: str,
     wind: tuple[float, float] | None,
 ) -> Figure:
-    """Draw a polar chart of wind direction, north up, and wind speed, up to ``max_speed`` m/s at the edge.
+    """Draw a polar chart of the winds in which a mission is flyable, north up, up to `max_speed` (m/s) at the edge.
 
     wind: speed, m/s, and direction, degrees, of the scenario's wind, which is drawn as a star; or None.
     """
@@ -460,7 +468,7 @@ def draw_go_no_go(
 def _draw_legend(
     figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None, open_edge: float | None
 ) -> None:
-    """Draw the legend.
+    """Draw the legend of the chart of winds.
 
     open_edge: maximum wind of the search, m/s, if the boundary of a direction is beyond it, otherwise None.
     """
@@ -470,10 +478,10 @@ def _draw_legend(
     handles_and_labels: list[tuple[Artist, str]] = [
         (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} also at the\nlow end of the interval"),
         (Line2D([], [], color=INK_COLOUR, linewidth=1.8), f"boundary, P = {target:g}"),
-        (Patch(color=INTERVAL_COLOUR, alpha=0.45), f"its interval, {100 * confidence:g} %"),
+        (Patch(color=INTERVAL_COLOUR, alpha=0.45), f"interval of the\nboundary, {100 * confidence:g} %"),
         (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),
         (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
-        (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not"),
+        (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not flyable"),
     ]
     if open_edge is not None:
         handles_and_labels.append(
@@ -518,7 +526,7 @@ _LINE_SPACING_RATIO = 1.3
 
 
 def narrow_figure(figure: Figure) -> Figure:
-    """Lay out a picture of this module with a width of `NARROW_WIDTH_IN`, wrapped text, and the legends below.
+    """Change a figure of this module to a narrow layout for phones (`NARROW_WIDTH_IN`), and return it.
 
     >>> float(narrow_figure(draw_failures([("slopes", "leg 2", 3)], 9)).get_figwidth())
     5.0

@@ -66,7 +66,7 @@ _MAX_DRAWN_FLIGHTS = 3000
 
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
-    """Return the report page as bytes.  command: the command line that repeats the campaign."""
+    """Return the HTML page of a campaign's report as UTF-8.  command: the command line that repeats the campaign."""
     pictures = [_draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
     lines = campaign_lines(summary)
     text = _render_page(
@@ -114,11 +114,15 @@ def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, co
 
 
 def _render_page(template: str, **values: object) -> str:
+    """Return the HTML text of a template of this package, filled with values."""
     return page_template(template, "planfly.campaigns").render(colours=Markup(css_variables()), **values)
 
 
 def winds_page(name: str, figure: Figure, winds: WindsResult, rows: Sequence[tuple[str, ...]], command: str) -> bytes:
-    """Return the page of a go/no-go chart. Changes the figure to the narrow layout."""
+    """Return the HTML page of a go/no-go chart as UTF-8; the figure is changed to the narrow layout.
+
+    rows: cells of a table with a row for each wind direction.
+    """
     picture = _draw_both_widths(figure, "Go/no-go chart: wind from each direction")
     page = _render_page(
         "winds.html",
@@ -133,7 +137,7 @@ def winds_page(name: str, figure: Figure, winds: WindsResult, rows: Sequence[tup
 
 
 def _draw_both_widths(figure: Figure, caption: str) -> Markup:
-    """Return a picture for a page in two widths, for desktops and phones. Changes the figure to the narrow layout."""
+    """Return HTML with a figure in a wide and a narrow layout; the figure is changed to the narrow layout."""
     wide_svg = page_svg(figure, caption)
     narrow_svg = page_svg(narrow_figure(figure), f"{caption} (narrow)")
     return Markup(f'<div class="wide">{wide_svg}</div><div class="narrow">{narrow_svg}</div>')
@@ -159,7 +163,7 @@ def _draw_pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -
         figures.append((draw_tornado(bars, RULE_WORDS[summary.deciding].title), "What the deciding margin depends on"))
     if counts:
         failures = draw_failures(counts, summary.estimate.tally.flown)
-        figures.append((failures, "In how many flights each rule failed, and where"))
+        figures.append((failures, "Number of flights that failed each rule, by place"))
     return figures + _draw_tracks(base, store)
 
 
@@ -233,7 +237,8 @@ class OutputDirectory:
         folder = self.folder
         if self.resume:
             if not (folder / self.table).is_file():
-                raise PlanflyError(f"{folder / self.table}: no campaign there to continue", file=folder / self.table)
+                message = f"{folder / self.table}: there is no campaign to continue"
+                raise PlanflyError(message, file=folder / self.table)
             return
         if folder.exists() and not folder.is_dir():
             raise PlanflyError(f"{folder}: is a file; expected a folder", file=folder)
@@ -294,6 +299,7 @@ def clear_campaign(folder: Path) -> None:
 
 
 def _worst_flight_logs(folder: Path) -> list[Path]:
+    """Return the logs of the worst flights in a campaign's folder, sorted by name."""
     return sorted((folder / "worst").glob("flight-[0-9]*.mcap"))
 
 
@@ -341,7 +347,7 @@ WINDS_SCHEMA = "planfly.winds/1"
 
 
 def chart_directions(winds: WindsResult) -> list[ChartDirection]:
-    """Return the directions of the go/no-go chart, with the flights in each."""
+    """Return the boundary, its interval and the flights of each wind direction, for the go/no-go chart."""
     directions = []
     for number, boundary in enumerate(winds.boundaries):
         counts: dict[float, list[bool]] = {}
@@ -406,6 +412,7 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
 
 
 def _calm_document(calm: CalmFailures) -> dict[str, Any]:
+    """Return the failures in the weakest wind as data for a JSON document."""
     return {
         "speed_mps": round(calm.speed, 3),
         "flights": calm.flights,
@@ -415,6 +422,7 @@ def _calm_document(calm: CalmFailures) -> dict[str, Any]:
 
 
 def _speed_text(speed: float, max_speed: float) -> str:
+    """Describe a boundary, m/s; a boundary at the maximum wind of the search is only known to be above it."""
     return f"over {max_speed:g} m/s" if speed >= max_speed - 1e-9 else f"{speed:.1f} m/s"
 
 
@@ -426,12 +434,15 @@ def _interval_text(lower: float, upper: float, max_speed: float) -> str:
 
 
 def _is_only_calm(winds: WindsResult) -> bool:
-    """Return True if all flights were in calm air, and failed, so that no wind was searched."""
+    """Return True if all flights were in calm air and failed, so that no wind was searched."""
     return winds.calm is not None and winds.calm.flights == len(winds.flights)
 
 
 def _unsettled_directions(winds: WindsResult) -> list[int]:
-    """Return the directions with too few flights; none if the mission fails in calm air and no wind was searched."""
+    """Return the indices of directions that have too few flights or too wide an interval.
+
+    The list is empty if every flight in calm air failed, because then no wind was searched.
+    """
     if _is_only_calm(winds):
         return []
     counts = Counter(direction for direction, _, _ in winds.flights)
@@ -456,9 +467,9 @@ def _unsettled_lines(winds: WindsResult) -> list[str]:
     if not unsettled:
         return []
     return [
-        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions, for lack of "
+        f"not settled: {len(unsettled)} of {len(winds.boundaries)} directions have too few "
         f"flights: each requires at least {MIN_FLIGHTS_PER_DIRECTION}, and an interval of at most "
-        f"{2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer, the interval rests mostly on "
+        f"{2.0 * BOUNDARY_ACCURACY_MPS:g} m/s; with fewer flights, the interval depends mostly on "
         "assumptions"
     ]
 
@@ -478,7 +489,10 @@ def _lost_lines(winds: WindsResult) -> list[str]:
 
 
 def _lines_without_failures(winds: WindsResult) -> list[str]:
-    """Return a line about directions without a failure, with the probability that is proved by these flights only."""
+    """Return a line about directions without a failure; empty if all directions have failures.
+
+    The line states the probability of success that the flights in the maximum wind prove by themselves.
+    """
     max_speed, confidence = winds.goal.most, winds.goal.confidence
     counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)
     failed_directions = {direction for direction, _, flyable in winds.flights if not flyable}
@@ -487,8 +501,8 @@ def _lines_without_failures(winds: WindsResult) -> list[str]:
         return []
     min_count, probability_text = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
     return [
-        f"none failed from {len(counts)} of {len(winds.boundaries)} directions: {min_count} flights in"
-        f" {max_speed:g} m/s from each show P >= {probability_text} by themselves"
+        f"no flight failed in {len(counts)} of {len(winds.boundaries)} directions: {min_count} flights in"
+        f" {max_speed:g} m/s from each of them show P >= {probability_text} by themselves"
     ]
 
 
@@ -502,7 +516,7 @@ def _calm_lines(winds: WindsResult) -> list[str]:
 
 
 def _winds_answer(winds: WindsResult) -> str:
-    """Return the answer of a search in a line, with the lowest and the highest boundary."""
+    """Return one line with the answer of a search for winds: the lowest and the highest boundary."""
     directions, target = chart_directions(winds), winds.goal.target
     lowest_direction, highest_direction = (
         select(directions, key=lambda spoke: spoke.boundary) for select in (min, max)
@@ -511,19 +525,18 @@ def _winds_answer(winds: WindsResult) -> str:
     best_text = f"{_speed_text(highest_direction.boundary, max_speed)} from {highest_direction.from_deg:g}°"
     if winds.calm is None:
         return (
-            f"flies with P >= {target:g}, by best estimate, in wind up to"
+            f"flies with P >= {target:g}, by the best estimate, in wind up to"
             f" {_speed_text(lowest_direction.boundary, max_speed)}"
             f" from {lowest_direction.from_deg:g}° (the lowest;"
             f" {_interval_text(lowest_direction.low, lowest_direction.high, max_speed)} m/s"
             f" at {percent}), {best_text}"
         )
     if highest_direction.boundary < CALM_MPS:
-        basis = "" if _is_only_calm(winds) else ", by best estimate,"
+        basis = "" if _is_only_calm(winds) else ", by the best estimate,"
         return f"does not fly with P >= {target:g}{basis} even in calm air"
     return (
-        f"does not fly with P >= {target:g}, by best estimate, in wind from {lowest_direction.from_deg:g}° even in calm"
-        " air;"
-        f" it flies in wind up to {best_text}"
+        f"does not fly with P >= {target:g}, by the best estimate, in any wind from {lowest_direction.from_deg:g}°,"
+        f" even a light one; it flies in wind up to {best_text}"
     )
 
 
@@ -539,7 +552,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
         *_lost_lines(winds),
         f"{len(winds.flights)} flights; no wind was tried, because every flight in calm air fails"
         if _is_only_calm(winds)
-        else f"{len(winds.flights)} flights; intervals at {percent}, by the flights of each direction",
+        else f"{len(winds.flights)} flights; intervals at {percent}, from the flights in each direction",
     ]
 
 

@@ -99,6 +99,7 @@ def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store
 
 
 def _count_failures(store: Store) -> tuple[RuleFailures, ...]:
+    """Count the flights in a table by failed rule and place."""
     failed_lists = map(json.loads, store.texts("failed"))
     return count_failures(
         [(failed_finding.pop("rule"), Place(**failed_finding)) for failed_finding in failed_findings]
@@ -107,6 +108,11 @@ def _count_failures(store: Store) -> tuple[RuleFailures, ...]:
 
 
 def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
+    """Return the rule that decides the campaign, and the margin that 5 % of the flights fall below.
+
+    The deciding rule is the rule that most flights failed.  Without failures it is the rule with the smallest ratio of
+    mean margin to its standard deviation.  Returns "" and None if no margin is known.
+    """
     low_margins, reliability_indices = {}, {}
     for rule in RULE_WORDS:
         margins = store.column(RULE_WORDS[rule].margin_column)
@@ -127,7 +133,7 @@ def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str
 def _rule_sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Sensitivity, ...]:
     """Return the sensitivity of a rule's minimum margin to each varying quantity, the strongest first.
 
-    Too few flights show none.
+    The result is empty for fewer than `MIN_FLIGHTS_FOR_INDEX` flights with a margin.
     """
     if not rule:
         return ()
@@ -187,6 +193,7 @@ def summary_json(summary: CampaignSummary) -> str:
 
 
 def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
+    """Return a flight as data for a JSON document.  log: path of its log, or "" for a flight without a log."""
     return {
         "flight": row.draw.index,
         "outcome": row.outcome,
@@ -239,22 +246,25 @@ def campaign_lines(summary: CampaignSummary) -> list[str]:
 
 
 def _answer_text(summary: CampaignSummary) -> str:
+    """Return the answer to the goal as text, such as "P >= 0.99 is undecided"."""
     target = summary.goal.target
     texts = {"reached": f"P >= {target}", "missed": f"P < {target}", "undecided": f"P >= {target} is undecided"}
     return texts.get(summary.estimate.answer, "no target is set (--prove P or --at-least P)")
 
 
 def _drivers_text(summary: CampaignSummary) -> str:
+    """Describe the quantities that explain most of the deciding margin's variance, at most three."""
     if not summary.sensitivities:
-        return f"fewer than {MIN_FLIGHTS_FOR_INDEX} flights do not show what it depends on"
+        return f"at least {MIN_FLIGHTS_FOR_INDEX} flights would show what the margin depends on"
     drivers = [sensitivity for sensitivity in summary.sensitivities if sensitivity.index >= _MIN_NAMED_FRACTION][:3]
     if not drivers:
-        return "no single quantity explains it"
-    return "of its variance " + ", ".join(
+        return "no single quantity explains the margin"
+    return "of the margin's variance " + ", ".join(
         f"{QUANTITY_BY_NAME[sensitivity.quantity].title} explains {100.0 * sensitivity.index:.0f} %"
         for sensitivity in drivers
     )
 
 
 def _to_plain_number(value: float | None) -> float | None:
+    """Return a number rounded for a JSON document, or None for NaN and infinity; a negative zero becomes 0."""
     return None if value is None or not math.isfinite(value) else round(float(value), 9) + 0.0

@@ -55,26 +55,26 @@ class Examination(NamedTuple):
         """Describe the damage and its consequence.
 
         >>> Examination([0, 1, 3], [2]).text()
-        'flight 2 is damaged and was taken out: 3 flights are intact and stay; --resume flies the missing ones'
+        'flight 2 is damaged and was removed; intact flights: 3; --resume flies the missing ones'
         """
-        intact_text = f"{len(self.undamaged)} flights are intact and stay; --resume flies the missing ones"
+        intact_text = f"intact flights: {len(self.undamaged)}; --resume flies the missing ones"
         later_text = ""
         if self.last_known is not None:
             later_text = (
-                f", and any after flight {self.last_known} were lost"
+                f", and any flights after flight {self.last_known} are lost"
                 if self.last_known >= 0
-                else ", and no flight is found"
+                else ", and no flight was found"
             )
         if not self.damaged:
-            return f"is damaged{later_text}: {intact_text}"
+            return f"is damaged{later_text}; {intact_text}"
         numbers_text = ", ".join(map(str, self.damaged[:_MAX_LISTED]))
         more_text = f" and {len(self.damaged) - _MAX_LISTED} more" if len(self.damaged) > _MAX_LISTED else ""
         has_several = len(self.damaged) > 1
         damaged_text = (
             f"flight{'s' if has_several else ''} {numbers_text}{more_text} {'are' if has_several else 'is'} damaged"
         )
-        removed_text = f"{'were' if has_several else 'was'} taken out"
-        return f"{damaged_text} and {removed_text}{later_text}: {intact_text}"
+        removed_text = f"{'were' if has_several else 'was'} removed"
+        return f"{damaged_text} and {removed_text}{later_text}; {intact_text}"
 
 
 def examine_table(
@@ -124,6 +124,7 @@ def _readable_numbers(connection: sqlite3.Connection) -> list[Any]:
 
 
 def _check_rows(rows: Iterable[tuple[Any, ...]]) -> Examination:
+    """Sort rows into undamaged and damaged by their checksum, the last value of each row."""
     examination = Examination([], [])
     for *values, stored_checksum in rows:
         (examination.undamaged if stored_checksum == checksum(values) else examination.damaged).append(values[0])
@@ -141,6 +142,7 @@ def _read_row(connection: sqlite3.Connection, query: str, number: int) -> tuple[
 
 
 def _raise_if_locked(error: sqlite3.Error) -> None:
+    """Raise the error again if it means that another process has locked the file."""
     if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_CORRUPT) & 0xFF in LOCKED_CODES:
         raise error
 
@@ -152,10 +154,12 @@ def copy_undamaged_rows(
     numbers: Sequence[int],
     entries: Mapping[str, str],
 ) -> None:
-    """Write a new file with the given rows of a table, and with the entries `entries` in its table ``campaign``.
+    """Write a new database file with some rows of a campaign's table.
 
+    target: the new file; an existing file is replaced.
     statements: SQL statements that create both tables.
-    numbers: numbers of the rows to copy.
+    numbers: flight numbers of the rows to copy.
+    entries: keys and values of the table ``campaign``.
     """
     target.unlink(missing_ok=True)
     with closing(sqlite3.connect(target, isolation_level=None)) as copy:

@@ -47,7 +47,7 @@ ARRAY_COLUMNS = tuple(name for name, column in COLUMN_FIELDS.items() if column.k
 
 
 def _row_columns() -> dict[str, str]:
-    """Return the kind of each column, keyed by name, in the order of the row's fields."""
+    """Return the SQL type of each column, keyed by name, in the order of the fields of `FlightRow`."""
     columns = {"seed": "INTEGER NOT NULL", **dict.fromkeys(NAMES, "REAL NOT NULL")}
     for name in FlightRow.__dataclass_fields__:
         if name in COLUMN_FIELDS:
@@ -64,7 +64,7 @@ ROW_COLUMNS = _row_columns()
 
 
 def row_values(row: FlightRow) -> dict[str, Any]:
-    """Return the value of each of `ROW_COLUMNS`."""
+    """Return the value of a flight for each column of `ROW_COLUMNS`, keyed by column name."""
     values: dict[str, Any] = dict.fromkeys(ROW_COLUMNS)
     values |= {"seed": row.draw.seed, **row.draw.values}
     values |= {name: column.write(getattr(row, name)) for name, column in COLUMN_FIELDS.items()}
@@ -77,7 +77,11 @@ def row_values(row: FlightRow) -> dict[str, Any]:
 
 
 def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
-    """Make the row of a flight.  index: index of its draw.  values: value of each column."""
+    """Make the row of a flight from a row of the table; the inverse of `row_values`.
+
+    index: index of the flight's draw.
+    values: value of each column, keyed by name.
+    """
     margins = []
     for rule in RULE_WORDS.values():
         if (place_json := values[rule.place_column]) is not None:
@@ -161,6 +165,10 @@ class LockedTable:
             raise
 
     def _prepare_file(self, settings: dict[str, Any]) -> None:
+        """Lock the file, check and repair an existing table, and write the settings.
+
+        Raises StoreError for a table of another campaign, or with more flights than requested.
+        """
         self._lock_file()
         execute = self._connection.execute
         tables = {name for (name,) in execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
@@ -193,6 +201,7 @@ class LockedTable:
         execute("BEGIN EXCLUSIVE")
 
     def _create_statements(self) -> list[str]:
+        """Return the SQL statements that create the tables of flights and of settings."""
         columns = ", ".join(f"{name} {kind}" for name, kind in self._kind.columns.items())
         return [
             f"CREATE TABLE IF NOT EXISTS flights ({columns}, checksum TEXT NOT NULL)",
@@ -200,6 +209,7 @@ class LockedTable:
         ]
 
     def _check_same_campaign(self, stored_settings: dict[str, str], settings: dict[str, Any]) -> None:
+        """Raise StoreError if the stored settings are damaged, or belong to another campaign or request."""
         schema = self._kind.schema
         if "schema" not in stored_settings:
             _check_settings_intact(stored_settings, self.path)
@@ -218,7 +228,7 @@ class LockedTable:
         for name in self._kind.fixed:
             if stored_request[name] != settings[name]:
                 raise StoreError(
-                    f"{self.path}: {name} {settings[name]}: the flights there were requested"
+                    f"{self.path}: {name} {settings[name]}: the stored flights were requested"
                     f" with {stored_request[name]}",
                     file=self.path,
                 )
@@ -298,7 +308,7 @@ class LockedTable:
         except OSError:
             is_same_file = False
         if not is_same_file:
-            reason = "was removed, or another file took its place: the flights that were written into it are lost"
+            reason = "was removed or replaced by another file: the flights written to it are lost"
             raise OSError(errno.EIO, reason, str(self.path))
 
     def tally(self) -> Tally:
@@ -400,8 +410,9 @@ class Store(LockedTable):
         super().__init__(path, CAMPAIGN_KIND, made_of, settings, resume=resume)
 
     def _check_flight_count(self, settings: Mapping[str, Any]) -> None:
+        """Raise StoreError if the table contains more flights than requested."""
         if (flight_count := self.tally().flown) > settings.get("flights", math.inf):
-            reason = f"flights {settings['flights']}: {flight_count} have been flown there"
+            reason = f"flights {settings['flights']}: the table already contains {flight_count} flights"
             raise StoreError(f"{self.path}: {reason}", file=self.path)
 
     def add(self, row: FlightRow) -> None:
@@ -453,12 +464,14 @@ class Store(LockedTable):
 
 
 def _check_column(name: str) -> str:
+    """Return the name of a column.  Raises KeyError for an unknown name, which must not get into a query."""
     if name not in COLUMN_NAMES:
         raise KeyError(name)
     return name
 
 
 def _make_row(values: tuple[Any, ...]) -> FlightRow:
+    """Make the row of a flight from the values of all columns in order."""
     columns = dict(zip(COLUMN_NAMES, values, strict=True))
     return make_flight_row(columns["flight"], columns)
 
@@ -545,7 +558,7 @@ class WindsStore(LockedTable):
 
 
 def parse_marginal_passes(text: str) -> tuple[MarginalPass, ...]:
-    """Parse the marginal passes from the text in the column.
+    """Parse marginal passes from the JSON text of a column.
 
     >>> parse_marginal_passes('[{"rule": "slope", "margin": 0.25, "kind": "leg", "index": 3}]')[0][2]
     0.25
@@ -554,6 +567,7 @@ def parse_marginal_passes(text: str) -> tuple[MarginalPass, ...]:
 
 
 def _make_marginal_pass(rule: str, margin: float, **place: Any) -> MarginalPass:
+    """Make a marginal pass from an entry of the JSON text.  place: fields of the place."""
     return rule, Place(**place), margin
 
 
@@ -619,6 +633,7 @@ def _read_arrays(connection: sqlite3.Connection, name: str, entry_shape: tuple[i
 
 @contextmanager
 def _open_to_read(path: Path) -> Iterator[sqlite3.Connection]:
+    """Yield a connection for reading a table.  Raises StoreError for a locked file or another kind of file."""
     # Nothing is written, but a writable connection removes its -wal and -shm files when it closes.
     with (
         convert_errors(path),

@@ -67,16 +67,17 @@ def worker_pool(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> 
 
 
 def check_scheduler_address(address: str) -> str:
-    """Return a scheduler's address. Raises SchedulerError for plain TCP beyond loopback; TLS is allowed for any host.
+    """Return the full address of a scheduler; an address without a scheme gets tcp://.
 
-    The reason is that the workers of a scheduler run any code sent to them.
+    Raises SchedulerError for an invalid address, and for plain TCP to another machine, because the workers of a
+    scheduler run any code sent to them.  TLS is allowed for any host.
 
     >>> check_scheduler_address("127.0.0.1:8786"), check_scheduler_address("tls://10.0.0.7:8786")
     ('tcp://127.0.0.1:8786', 'tls://10.0.0.7:8786')
     >>> check_scheduler_address("tcp://10.0.0.7:8786")
     Traceback (most recent call last):
     ...
-    planfly.campaigns.worker_pool.SchedulerError: scheduler tcp://10.0.0.7:8786: plain TCP beyond loopback; ...
+    planfly.campaigns.worker_pool.SchedulerError: scheduler tcp://10.0.0.7:8786: tcp:// is allowed only ...
     """
     full_address = address if "://" in address else f"tcp://{address}"
     try:
@@ -88,12 +89,13 @@ def check_scheduler_address(address: str) -> str:
         allowed = "expected tcp://HOST:PORT on this machine, or tls://HOST:PORT"
         raise SchedulerError.of_argument("scheduler", address, allowed)
     if parts.scheme == "tcp" and not _is_loopback(host):
-        allowed = "plain TCP beyond loopback; use tls://, with certificates in dask's configuration"
+        allowed = "tcp:// is allowed only on this machine; use tls://, with certificates in dask's configuration"
         raise SchedulerError.of_argument("scheduler", address, allowed)
     return full_address
 
 
 def _is_loopback(host: str) -> bool:
+    """Return True for a loopback address and for "localhost"."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:

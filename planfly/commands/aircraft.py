@@ -11,7 +11,7 @@ import planfly
 from planfly.terminal.arguments import complete_aircraft, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import call_api, result_options
+from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 from world.errors import PlanflyError
@@ -37,9 +37,9 @@ _INTERVAL_SIGMAS = 1.96
 _WIND_MPS = 10.0
 
 
-def aircraft_options(command_line: LineParser) -> None:
+def add_aircraft_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly aircraft``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "aircraft",
         "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list the aircraft",
         "planfly aircraft aerosonde --out aerosonde",
@@ -52,7 +52,7 @@ def aircraft_options(command_line: LineParser) -> None:
         complete_aircraft,
     )
     parser.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
-    new_group = parser.group("an aircraft of your own")
+    new_group = parser.add_group("an aircraft of your own")
     new_group.add_argument("--new", dest="folder", metavar="FOLDER", help="folder to make; it must not exist yet")
     with_completer(
         new_group.add_argument(
@@ -60,8 +60,8 @@ def aircraft_options(command_line: LineParser) -> None:
         ),
         complete_aircraft,
     )
-    _data_sheet_options(parser)
-    log_group = parser.group("flight logs: with --mass and --span, and --out for the folder to make")
+    _add_data_sheet_options(parser)
+    log_group = parser.add_group("flight logs: with --mass and --span, and --out for the folder to make")
     with_completer(
         log_group.add_argument(
             "--identify",
@@ -90,15 +90,16 @@ def aircraft_options(command_line: LineParser) -> None:
         type=number_parser("until"),
         help="with --identify: use only rows before this time of the log; 'planfly predict' judges the rest",
     )
-    result_options(
+    add_result_options(
         parser,
         "folder for the pictures (default: runs/aircraft-NAME; an existing one is replaced), "
         "or with --identify the aircraft's folder",
     )
 
 
-def _data_sheet_options(parser: CommandParser) -> None:
-    group = parser.group("a data sheet: with --new; mass, span, cruise and stall are required, the rest is guessed")
+def _add_data_sheet_options(parser: CommandParser) -> None:
+    """Add the options for the values of a data sheet."""
+    group = parser.add_group("a data sheet: with --new; mass, span, cruise and stall are required, the rest is guessed")
     numbers = {
         "mass": ("KG", "mass, 0.5 to 25 kg"),
         "span": ("M", "wing span, m"),
@@ -162,6 +163,7 @@ def _json_answer(entries: "Sequence[Aircraft]", numbers: "AircraftNumbers | None
 
 
 def _make_folder(args: argparse.Namespace) -> int:
+    """Make the folder of a new aircraft, from a data sheet or as a copy of another aircraft."""
     if args.name is not None:
         message = f"{args.name}: --new takes only the folder; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
@@ -288,6 +290,7 @@ def _print_sheet(aircraft: "Aircraft") -> None:
 
 
 def _print_numbers(numbers: "AircraftNumbers") -> None:
+    """Print limits, trims, modes, envelope and turns of an aircraft."""
     from flight.dynamics.characteristics import TRIM_AMSL
 
     aircraft, envelope = numbers.aircraft, numbers.envelope
@@ -301,6 +304,7 @@ def _print_numbers(numbers: "AircraftNumbers") -> None:
 
 
 def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
+    """Print mass, energy, speeds and control limits, and the accuracy of the model if known."""
     min_speed, max_speed = envelope.level_speeds(0.0)
     if aircraft.battery_voltage > 0.0:
         storage_text = f"battery {aircraft.battery_energy / 3600.0:g} Wh at {aircraft.battery_voltage:g} V"
@@ -321,9 +325,9 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
         f" level flight at sea level {min_speed:.1f}..{max_speed:.1f} m/s"
     )
     print(
-        f"  limits   bank {_degrees(aircraft.max_bank):.0f}, pitch {_degrees(aircraft.max_pitch):.0f}, elevator"
-        f" {_degrees(aircraft.max_elevator):.0f}, aileron {_degrees(aircraft.max_aileron):.0f}, rudder"
-        f" {_degrees(aircraft.max_rudder):.0f} deg either way; {braking}"
+        f"  limits   bank {math.degrees(aircraft.max_bank):.0f}, pitch {math.degrees(aircraft.max_pitch):.0f}, elevator"
+        f" {math.degrees(aircraft.max_elevator):.0f}, aileron {math.degrees(aircraft.max_aileron):.0f}, rudder"
+        f" {math.degrees(aircraft.max_rudder):.0f} deg either way; {braking}"
     )
     if envelope.source:
         climb_sd, descent_sd = math.degrees(envelope.climb_sd), math.degrees(envelope.descent_sd)
@@ -335,19 +339,21 @@ def _print_limits(aircraft: "Aircraft", envelope: "Envelope") -> None:
 
 
 def _print_trims(trims: "tuple[TrimRow, ...]", amsl: float) -> None:
+    """Print a table of trims in level flight, one row for each airspeed.  amsl: altitude, m AMSL."""
     print(f"\nlevel flight at {amsl:.0f} m AMSL (endurance and range: still air, 80 % of what it carries)")
     print("  airspeed   alpha  elevator  aileron  rudder  throttle    power  endurance   range")
     print("       m/s     deg       deg      deg     deg         %       kW          h      km")
     for row in trims:
         trim = row.trim
         print(
-            f"  {trim.airspeed:8.1f}{_degrees(trim.alpha):8.2f}{_degrees(trim.elevator):10.2f}"
-            f"{_degrees(trim.aileron):9.2f}{_degrees(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}"
+            f"  {trim.airspeed:8.1f}{math.degrees(trim.alpha):8.2f}{math.degrees(trim.elevator):10.2f}"
+            f"{math.degrees(trim.aileron):9.2f}{math.degrees(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}"
             f"{row.power / 1000.0:9.3f}{row.endurance / 3600.0:11.2f}{row.endurance * trim.airspeed / 1000.0:8.0f}"
         )
 
 
 def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> None:
+    """Print a table of dynamic modes at an airspeed (m/s) and an altitude (m AMSL)."""
     print(f"\nmodes at {airspeed:g} m/s and {amsl:.0f} m AMSL, controls fixed")
     print("  mode           root, 1/s             frequency  damping  half or double")
     for mode in modes:
@@ -357,15 +363,16 @@ def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> Non
 
 
 def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
-    heights = [float(amsl) for amsl in envelope.amsl[::2]]
-    header = "".join(f"{amsl:>13.0f} m" for amsl in heights)
-    print("\nsteepest climb / descent relative to the air, deg, by airspeed and height AMSL ('-': no steady flight)")
+    """Print the steepest climb and descent, relative to the air and to the ground, and the speeds of level flight."""
+    altitudes = [float(amsl) for amsl in envelope.amsl[::2]]
+    header = "".join(f"{amsl:>13.0f} m" for amsl in altitudes)
+    print("\nsteepest climb / descent relative to the air, deg, by airspeed and altitude AMSL ('-': no steady flight)")
     print(f"  m/s  {header}")
     for airspeed in envelope.airspeed.tolist():
-        cells = "".join(f"{_angle_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in heights)
+        cells = "".join(f"{_angle_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in altitudes)
         print(f"  {airspeed:5.1f}{cells}")
     for title, index in (("level, from", 0), ("level, to", 1)):
-        cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in heights)
+        cells = "".join(f"{envelope.level_speeds(amsl)[index]:11.1f} m/s" for amsl in altitudes)
         print(f"  {title:<5}{cells[len(title) - 5 :]}")
     print(f"\nsteepest climb / descent relative to the ground at {aircraft.airspeed:g} m/s and 500 m, deg")
     for title, tail, cross in (
@@ -378,6 +385,7 @@ def _print_envelope(aircraft: "Aircraft", envelope: "Envelope") -> None:
 
 
 def _print_turns(aircraft: "Aircraft") -> None:
+    """Print turn radii, and the shortest legs between two turns, by ground speed."""
     from aircraft.envelope import turn_radius
 
     speeds = [aircraft.airspeed_min, aircraft.airspeed, aircraft.airspeed_max]
@@ -386,7 +394,7 @@ def _print_turns(aircraft: "Aircraft") -> None:
     for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
         cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
         print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND_MPS else ""))
-    bank = _degrees(aircraft.max_bank)
+    bank = math.degrees(aircraft.max_bank)
     print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
     print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
     for speed in (*speeds, aircraft.airspeed + _WIND_MPS):
@@ -397,12 +405,10 @@ def _print_turns(aircraft: "Aircraft") -> None:
         )
 
 
-def _degrees(angle: float) -> float:
-    return math.degrees(angle)
-
-
 def _angle_pair(climb: float, descent: float) -> str:
+    """Return two angles (rad) as text in degrees, such as "5.2 / 8.0"; "-" replaces NaN."""
+
     def angle_text(angle: float) -> str:
-        return "-" if math.isnan(angle) else f"{_degrees(angle):.1f}"
+        return "-" if math.isnan(angle) else f"{math.degrees(angle):.1f}"
 
     return f"{angle_text(climb)} / {angle_text(descent)}"

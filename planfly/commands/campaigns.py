@@ -10,13 +10,13 @@ from pathlib import Path
 import planfly
 from planfly.terminal.arguments import complete_mission_or_scenario, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import CommandParser, LineParser
-from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_result_options,
+    add_steering_options,
+    add_world_options,
     call_api,
-    result_options,
-    steering_options,
-    world_options,
 )
 from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
@@ -24,19 +24,19 @@ from world.errors import PlanflyError
 from world.interruption import Interrupted
 
 # Exit code by the answer of a campaign.
-_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "no target": FLYABLE}
+_EXIT_CODES = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": INCOMPLETE, "no target": FLYABLE}
 
 
-def campaign_options(command_line: LineParser) -> None:
+def add_campaign_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly campaign``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "campaign",
         "fly a mission many times in varied weather with varied aircraft, to estimate how likely it is to succeed",
         "planfly campaign jacksboro-air --prove 0.99",
         extra="campaigns",
     )
     parser.alias_keyword("index", "--refly")
-    _shared_options(parser)
+    _add_shared_options(parser)
     goal = parser.add_mutually_exclusive_group()
     goal.add_argument(
         "--prove",
@@ -67,15 +67,15 @@ def campaign_options(command_line: LineParser) -> None:
     )
 
 
-def winds_options(command_line: LineParser) -> None:
+def add_winds_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly winds``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "winds",
         "for each wind direction, find the strongest wind in which a mission is flyable",
         "planfly winds jacksboro-air --prove 0.99 --directions 16",
         extra="campaigns",
     )
-    _shared_options(parser)
+    _add_shared_options(parser)
     parser.add_argument(
         "--prove",
         metavar="P",
@@ -112,16 +112,17 @@ def winds_options(command_line: LineParser) -> None:
     )
 
 
-def _shared_options(parser: CommandParser) -> None:
+def _add_shared_options(parser: CommandParser) -> None:
+    """Add the arguments and options that campaigns and searches for winds have in common."""
     with_completer(
         parser.add_argument(
             "target", metavar="SCENARIO|PLAN|MISSION", help="embedded name, TOML file, plan.json, .waypoints or .plan"
         ),
         complete_mission_or_scenario,
     )
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    steering_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_steering_options(parser)
     with_completer(
         parser.add_argument("--spread", metavar="FILE", help="dispersions, as TOML (default: planfly's own)"),
         file_completer("toml"),
@@ -141,7 +142,7 @@ def _shared_options(parser: CommandParser) -> None:
         help="fly on a running dask cluster: tls://HOST:PORT; requires planfly[cluster]",
     )
     parser.add_argument("--resume", action="store_true", help="continue the campaign in --out")
-    result_options(parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)")
+    add_result_options(parser, "folder for the files (default: runs/<name>-<command>; an existing one is kept)")
 
 
 def campaign(args: argparse.Namespace) -> int:
@@ -182,6 +183,7 @@ def _result_folder(args: argparse.Namespace, kind: str) -> Path:
 
 
 def _fly_again(args: argparse.Namespace, folder: Path) -> int:
+    """Repeat one flight of the campaign in a folder, with a log; return 4 if the flight was not flyable."""
     from logs.verdict.wording import place_text
 
     if args.json:

@@ -14,14 +14,14 @@ from planfly.terminal.arguments import (
     with_completer,
 )
 from planfly.terminal.command_parser import CommandParser, LineParser
-from planfly.terminal.exit_codes import LOSS, verdict_code
+from planfly.terminal.exit_codes import INCOMPLETE, verdict_code
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
-    autopilot_options,
+    add_aircraft_and_wind_options,
+    add_autopilot_options,
+    add_imported_log_options,
+    add_result_options,
+    add_world_options,
     call_api,
-    imported_log_options,
-    result_options,
-    world_options,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_returns_line, print_verdict, print_warnings
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
-def mission_or_log_argument(parser: CommandParser) -> None:
+def add_mission_or_log_argument(parser: CommandParser) -> None:
     """Add the argument for a mission, which is flown first, or for a flight log of planfly or another program."""
     with_completer(
         parser.add_argument(
@@ -45,9 +45,9 @@ def mission_or_log_argument(parser: CommandParser) -> None:
     )
 
 
-def check_options(command_line: LineParser) -> None:
+def add_check_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly check``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "check",
         "judge a flight from its log (planfly's or an autopilot's), or a mission by flying it, without writing files",
         "planfly check flight.mcap --json verdict.json",
@@ -61,10 +61,10 @@ def check_options(command_line: LineParser) -> None:
         ),
         file_completer("mcap", *MISSION_SUFFIXES, *IMPORTED_LOG_SUFFIXES),
     )
-    imported_log_options(parser)
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    group = autopilot_options(parser)
+    add_imported_log_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    group = add_autopilot_options(parser)
     group.add_argument(
         "--for",
         dest="autopilots",
@@ -78,7 +78,7 @@ def check_options(command_line: LineParser) -> None:
         action="store_true",
         help="judge a mission only by its geometry and the aircraft's envelope, without a flight (quick)",
     )
-    result_options(parser, junit=True)
+    add_result_options(parser, junit=True)
 
 
 def check(args: argparse.Namespace) -> int:
@@ -94,7 +94,7 @@ def check(args: argparse.Namespace) -> int:
     print_verdict(result.verdict, result.setup.notes)
     print_returns_line(result.returns_line)
     if result.lossy:
-        return LOSS
+        return INCOMPLETE
     return verdict_code(result.verdict)
 
 

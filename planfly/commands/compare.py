@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import planfly
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.options import log_argument, result_options
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.options import add_log_argument, add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
 from planfly.workflow.output_paths import COMPARE_FILES
@@ -17,17 +17,17 @@ if TYPE_CHECKING:
     from planfly import Comparison
 
 
-def compare_options(command_line: LineParser) -> None:
+def add_compare_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly compare``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "compare",
         "compare two flights: a table of differences, and pictures",
         "planfly compare calm.mcap windy.mcap --out both",
     )
-    log_argument(parser, "first", "A.mcap")
-    log_argument(parser, "second", "B.mcap", "another")
+    add_log_argument(parser, "first", "A.mcap")
+    add_log_argument(parser, "second", "B.mcap", "another")
     parser.add_argument("--svg", action="store_true", help="also write the pictures as SVG")
-    result_options(parser, "folder for pictures and compare.html (default: only the table)")
+    add_result_options(parser, "folder for pictures and compare.html (default: only the table)")
 
 
 def compare(args: argparse.Namespace) -> int:
@@ -44,7 +44,7 @@ def compare(args: argparse.Namespace) -> int:
     incomplete_logs = [log for log in logs if not log.complete]
     for log in incomplete_logs:
         warn_about_incomplete_log(log)
-    code = LOSS if incomplete_logs else FLYABLE
+    code = INCOMPLETE if incomplete_logs else FLYABLE
     write_json_if_requested(args, lambda: _json_answer(comparison, files, code))
     return code
 

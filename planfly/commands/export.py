@@ -5,15 +5,15 @@ import argparse
 import planfly
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.options import fence_option, result_options, time_option
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.options import add_fence_option, add_result_options, add_time_option
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 
 
-def export_options(command_line: LineParser) -> None:
+def add_export_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly export``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "export",
         "convert a plan, mission or log to the formats given by the suffixes of the files",
         "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
@@ -34,9 +34,9 @@ def export_options(command_line: LineParser) -> None:
         "landing and returns);"
         " from a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
     )
-    fence_option(parser)
-    time_option(parser)
-    result_options(parser)
+    add_fence_option(parser)
+    add_time_option(parser)
+    add_result_options(parser)
 
 
 def export(args: argparse.Namespace) -> int:
@@ -45,7 +45,7 @@ def export(args: argparse.Namespace) -> int:
     print_warnings(result.notes)
     for file, content in zip(result.files, result.contents, strict=True):
         print(f"{_content_kind(file.suffix.lower()):<9} {file} ({content})")
-    code = LOSS if result.loss else FLYABLE
+    code = INCOMPLETE if result.loss else FLYABLE
 
     def json_answer() -> object:
         from planfly.terminal.answers import ExportAnswer, ExportedFile

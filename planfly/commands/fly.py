@@ -8,7 +8,13 @@ import planfly
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import verdict_code
-from planfly.terminal.options import call_api, flight_options, log_rate_option, result_options, world_options
+from planfly.terminal.options import (
+    add_flight_options,
+    add_log_rate_option,
+    add_result_options,
+    add_world_options,
+    call_api,
+)
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_engine, print_returns_line, print_verdict, print_warnings
 from planfly.workflow.output_paths import FLY_LOG
@@ -17,9 +23,9 @@ if TYPE_CHECKING:
     from planfly import FlownMission
 
 
-def fly_options(command_line: LineParser) -> None:
+def add_fly_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly fly``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "fly",
         "fly a plan or any mission file, write the log, and judge the flight",
         "planfly fly mission.waypoints --terrain jacksboro --wind 8,270 --turbulence light",
@@ -28,9 +34,9 @@ def fly_options(command_line: LineParser) -> None:
         parser.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan"),
         file_completer(*MISSION_SUFFIXES),
     )
-    world_options(parser)
-    flight_options(parser)
-    log_group = parser.group("the log")
+    add_world_options(parser)
+    add_flight_options(parser)
+    log_group = parser.add_group("the log")
     log_group.add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
@@ -39,8 +45,8 @@ def fly_options(command_line: LineParser) -> None:
         metavar="FILE",
         help="file for the flight log (default: runs/<mission>-fly-seed<N>/flight.mcap, overwritten)",
     )
-    log_rate_option(log_group)
-    result_options(parser, junit=True)
+    add_log_rate_option(log_group)
+    add_result_options(parser, junit=True)
 
 
 def fly(args: argparse.Namespace) -> int:

@@ -8,14 +8,14 @@ import planfly
 from planfly.commands.check import LOGS
 from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, complete_aircraft, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, LOSS, verdict_code
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, verdict_code
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_imported_log_options,
+    add_result_options,
+    add_turbulence_option,
+    add_world_options,
     call_api,
-    imported_log_options,
-    result_options,
-    turbulence_option,
-    world_options,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_verdict, warn_about_incomplete_log
@@ -25,9 +25,9 @@ if TYPE_CHECKING:
     from planfly import ImportedFlight, Reflown
 
 
-def import_log_options(command_line: LineParser) -> None:
+def add_import_log_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly import``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "import",
         "convert an autopilot's log into a flight log, and judge the flight against its plan",
         "planfly import 00000042.BIN flight.mcap --terrain dem.tif --aircraft aerosonde",
@@ -54,10 +54,10 @@ def import_log_options(command_line: LineParser) -> None:
         ),
         file_completer("csv", "mat", "parquet", "h5", "hdf5"),
     )
-    imported_log_options(parser)
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    result_options(parser, junit=True)
+    add_imported_log_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_result_options(parser, junit=True)
 
 
 def import_log(args: argparse.Namespace) -> int:
@@ -69,7 +69,7 @@ def import_log(args: argparse.Namespace) -> int:
     flight = call_api(planfly.import_log, args)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {Path(args.target)} ({len(flight.track)} rows)")
-    code = LOSS if flight.lossy else verdict_code(flight.verdict)
+    code = INCOMPLETE if flight.lossy else verdict_code(flight.verdict)
     write_json_if_requested(args, lambda: _import_answer(Path(args.target), flight, code))
     write_junit_if_requested(args, {args.log: flight.verdict})
     return code
@@ -98,9 +98,9 @@ def _import_answer(target: Path, flight: "ImportedFlight", code: int) -> object:
     return ImportAnswer(exit_code=code, log=str(target), rows=len(flight.track), verdict=verdict)
 
 
-def refly_options(command_line: LineParser) -> None:
+def add_refly_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly refly``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "refly",
         "fly the mission of an imported flight again in JSBSim, in the wind of its log, and compare both flights",
         "planfly refly flight.mcap --out refly",
@@ -115,8 +115,8 @@ def refly_options(command_line: LineParser) -> None:
         ),
         complete_aircraft,
     )
-    turbulence_option(parser)
-    result_options(
+    add_turbulence_option(parser)
+    add_result_options(
         parser, "folder for the pictures (default: <log>-refly next to the log; an existing one is replaced)"
     )
 
@@ -132,7 +132,7 @@ def refly(args: argparse.Namespace) -> int:
         print(f"refly     {file}")
     if not log.complete:
         warn_about_incomplete_log(log)
-    code = FLYABLE if log.complete else LOSS
+    code = FLYABLE if log.complete else INCOMPLETE
     write_json_if_requested(args, lambda: _refly_answer(result, code))
     return code
 

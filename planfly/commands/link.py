@@ -4,20 +4,20 @@ import argparse
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.commands.check import mission_or_log_argument
+from planfly.commands.check import add_mission_or_log_argument
 from planfly.terminal.arguments import (
     number_parser,
     parse_position,
 )
 from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_imported_log_options,
+    add_result_options,
+    add_steering_options,
+    add_world_options,
     call_api,
-    imported_log_options,
-    result_options,
-    steering_options,
-    world_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     from planfly import LinkResult
 
 
-def link_options(command_line: LineParser) -> None:
+def add_link_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly link``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "link",
         "compute the radio link to the ground station along a flight: margin, line of sight, outages behind the"
         " terrain, and what the autopilot does when the link is lost",
         "planfly link mission.waypoints --terrain jacksboro --frequency 915 --power 27 --sensitivity -105",
         "planfly link flight.mcap --scenario mine.toml --out pictures",
     )
-    mission_or_log_argument(parser)
-    group = parser.group("the link (each replaces an entry of the scenario's [link])")
+    add_mission_or_log_argument(parser)
+    group = parser.add_group("the link (each replaces an entry of the scenario's [link])")
     for name, unit, text in (
         ("frequency", "MHZ", "frequency, MHz"),
         ("power", "DBM", "output of the transmitter, dBm"),
@@ -50,24 +50,24 @@ def link_options(command_line: LineParser) -> None:
         type=parse_position,
         help="position of the station's antenna, degrees (default: the mission's home)",
     )
-    imported_log_options(parser)
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    steering_options(parser).add_argument(
+    add_imported_log_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_steering_options(parser).add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
-    result_options(parser, "folder for pictures of the link over time and on the map (default: none)")
+    add_result_options(parser, "folder for pictures of the link over time and on the map (default: none)")
 
 
 def link(args: argparse.Namespace) -> int:
     """Judge the link; the exit code is 0 if it is kept, 4 if it is lost for too long, and 3 if it is not known."""
-    from logs.verdict.conditions import flown_lines, setup_conditions
+    from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.link, args)
     ok = result.finding.ok
-    code = LOSS if ok is None else FLYABLE if ok else NOT_FLYABLE
+    code = INCOMPLETE if ok is None else FLYABLE if ok else NOT_FLYABLE
     print(f"link      {colour_text(result.finding.reason, 'warning' if ok is None else 'good' if ok else 'bad')}")
-    for text in (*flown_lines(setup_conditions(result.setup)), *result.outage_lines):
+    for text in (*flown_lines(judging_conditions(result.setup)), *result.outage_lines):
         print(f"  {text}")
     for path in result.files:
         print(f"  written {path}")
@@ -76,7 +76,7 @@ def link(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "LinkResult", code: int) -> object:
-    from logs.verdict.conditions import setup_conditions
+    from logs.verdict.conditions import judging_conditions
     from planfly.terminal.link_answers import LinkAnswer, OutageEntry
 
     outages = () if result.along is None else result.along.outages
@@ -85,7 +85,7 @@ def _json_answer(source: str, result: "LinkResult", code: int) -> object:
         what=source,
         headline=result.finding.reason,
         ok=result.finding.ok,
-        conditions=setup_conditions(result.setup),
+        conditions=judging_conditions(result.setup),
         facts={fact.what: fact.value for fact in result.finding.facts},
         outages=[OutageEntry(first_s=round(outage.start, 2), last_s=round(outage.end, 2)) for outage in outages],
         files=[str(path) for path in result.files],

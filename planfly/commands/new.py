@@ -8,20 +8,20 @@ from planfly.arguments import CHOICES
 from planfly.terminal.arguments import complete_aircraft, number_parser, parse_position, with_completer
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
-from planfly.terminal.options import call_api, result_options, terrain_option
+from planfly.terminal.options import add_result_options, add_terrain_option, call_api
 from planfly.terminal.output import write_json_if_requested
 
 
-def new_options(command_line: LineParser) -> None:
+def add_new_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly new``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "new",
         "write a commented scenario for a flight from one place to another, and plan it once",
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --terrain dem.tif",
         "planfly new ./site --from 46.52,8.01 --to 46.60,8.12 --aircraft x8 --height 100",
     )
     parser.add_argument("folder", metavar="FOLDER", help="folder for the scenario file, which gets the folder's name")
-    route_group = parser.group("the way")
+    route_group = parser.add_group("route")
     for option, keyword in (("--from", "start"), ("--to", "destination")):
         route_group.add_argument(
             option,
@@ -38,8 +38,8 @@ def new_options(command_line: LineParser) -> None:
         default=120.0,
         help="height of both ends above ground, m (default: 120)",
     )
-    terrain_option(parser.group("where it flies"))
-    flight_group = parser.group("aircraft and autopilot")
+    add_terrain_option(parser.add_group("where it flies"))
+    flight_group = parser.add_group("aircraft and autopilot")
     with_completer(
         flight_group.add_argument(
             "--aircraft",
@@ -52,7 +52,7 @@ def new_options(command_line: LineParser) -> None:
     flight_group.add_argument(
         "--autopilot", choices=CHOICES["autopilot"], help="simulated autopilot (default: ardupilot)"
     )
-    result_options(parser)
+    add_result_options(parser)
 
 
 def new(args: argparse.Namespace) -> int:

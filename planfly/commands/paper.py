@@ -9,14 +9,14 @@ from planfly.arguments import CHOICES
 from planfly.terminal.arguments import number_parser, parse_problems
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import call_api, result_options
+from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.workflow.output_paths import RESULTS
 
 
-def paper_options(command_line: LineParser) -> None:
+def add_paper_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly paper``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "paper",
         "reproduce section V of the paper: tables and figures of seeded plans in three encodings",
         "planfly paper --problems 7,60 --runs 5 --out my-paper",
@@ -42,7 +42,7 @@ def paper_options(command_line: LineParser) -> None:
         help="algorithm to compare with the two baselines (default: umda, the paper's)",
     )
     parser.add_argument("--jobs", metavar="N", type=number_parser("jobs"), help="processes (default: one per core)")
-    result_options(parser, "folder for tables and figures (default: runs/paper; an existing one is replaced)")
+    add_result_options(parser, "folder for tables and figures (default: runs/paper; an existing one is replaced)")
 
 
 def paper(args: argparse.Namespace) -> int:

@@ -12,11 +12,11 @@ from planfly.terminal.arguments import file_completer, number_parser, parse_budg
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
-    autopilot_options,
+    add_aircraft_and_wind_options,
+    add_autopilot_options,
+    add_result_options,
+    add_scenario_argument,
     call_api,
-    result_options,
-    scenario_argument,
 )
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
@@ -30,9 +30,9 @@ if TYPE_CHECKING:
     from planfly import Plan
 
 
-def plan_options(command_line: LineParser) -> None:
+def add_plan_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly plan``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "plan",
         "plan a path, or plan again in flight, without flying it",
         "planfly plan jacksboro --seed 3 --out plan.json",
@@ -41,8 +41,8 @@ def plan_options(command_line: LineParser) -> None:
     )
     parser.extra_help = _algorithms_help
     parser.alias_keyword("seconds", "--budget")
-    scenario_argument(parser, help="TOML file or embedded name")
-    planning_group = parser.group("planning")
+    add_scenario_argument(parser, help="TOML file or embedded name")
+    planning_group = parser.add_group("planning")
     planning_group.add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the planner (default: the scenario's, or 1)"
     )
@@ -67,7 +67,7 @@ def plan_options(command_line: LineParser) -> None:
             "and pictures (default: runs/<name>-seed<N>-front; an existing one is replaced)"
         ),
     )
-    replanning_group = parser.group("planning again in flight")
+    replanning_group = parser.add_group("planning again in flight")
     with_completer(
         replanning_group.add_argument("--from", dest="old", metavar="PLAN.json", help="plan that is being flown"),
         file_completer("json"),
@@ -83,9 +83,9 @@ def plan_options(command_line: LineParser) -> None:
         action="append",
         help="a new threat: east, north, kill radius and detection radius, m; repeatable",
     )
-    aircraft_and_wind_options(parser)
-    autopilot_options(parser)
-    result_options(
+    add_aircraft_and_wind_options(parser)
+    add_autopilot_options(parser)
+    add_result_options(
         parser, "the plan file (default: runs/<name>-seed<N>/plan.json; an existing one is replaced)", "FILE"
     )
 

@@ -10,11 +10,11 @@ from planfly.terminal.arguments import IMPORTED_LOG_SUFFIXES, file_completer, nu
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_imported_log_options,
+    add_result_options,
+    add_world_options,
     call_api,
-    imported_log_options,
-    result_options,
-    world_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from planfly import Predicted
 
 
-def predict_options(command_line: LineParser) -> None:
+def add_predict_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly predict``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "predict",
         "predict a logged flight that a model has not seen, as bands of 95 %%, and count how often it is inside",
         "planfly predict flight.columns.toml --aircraft ./mine --out predicted",
@@ -33,7 +33,7 @@ def predict_options(command_line: LineParser) -> None:
         parser.add_argument("log", metavar=LOGS, help="a log, or a flight log written by 'planfly import'"),
         file_completer("mcap", *IMPORTED_LOG_SUFFIXES),
     )
-    group = parser.group("prediction: --aircraft is required")
+    group = parser.add_group("prediction: --aircraft is required")
     group.add_argument(
         "--by",
         choices=("controls", "mission"),
@@ -48,10 +48,10 @@ def predict_options(command_line: LineParser) -> None:
         help="with --by controls: start of the judged part, s of the log; the rows before it calibrate the bands"
         " (default: the --until of the identification, or the middle of the log)",
     )
-    imported_log_options(parser)
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    result_options(parser, "folder for predict.html and predict.png (default: none)")
+    add_imported_log_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_result_options(parser, "folder for predict.html and predict.png (default: none)")
 
 
 def predict(args: argparse.Namespace) -> int:

@@ -5,21 +5,21 @@ from pathlib import Path
 
 import planfly
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.options import call_api, log_argument, result_options
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
+from planfly.terminal.options import add_log_argument, add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
 
 
-def recover_options(command_line: LineParser) -> None:
+def add_recover_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly recover``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "recover",
         "write a new, complete log from what can be read of an unfinished or damaged one",
         "planfly recover flight.mcap --out recovered.mcap",
     )
-    log_argument(parser)
-    result_options(parser, "the new log (default: <log>-recovered.mcap next to the log)", "FILE")
+    add_log_argument(parser)
+    add_result_options(parser, "the new log (default: <log>-recovered.mcap next to the log)", "FILE")
 
 
 def recover(args: argparse.Namespace) -> int:
@@ -34,11 +34,11 @@ def recover(args: argparse.Namespace) -> int:
     print(f"log       {target} ({len(log.track)} rows, to {log.end_time:.1f} s)")
     warn_about_incomplete_log(log)
     write_json_if_requested(args, lambda: _json_answer(target, len(log.track), log.end_time))
-    return LOSS
+    return INCOMPLETE
 
 
 def _json_answer(target: Path | None, rows: int | None, end_time: float | None) -> object:
     from planfly.terminal.answers import RecoverAnswer
 
-    code = FLYABLE if target is None else LOSS
+    code = FLYABLE if target is None else INCOMPLETE
     return RecoverAnswer(exit_code=code, log=None if target is None else str(target), rows=rows, end_s=end_time)

@@ -1,8 +1,8 @@
 """List the commands, from which the parser, the help, the schemas and the dispatch are made.
 
-A command is a module of this package with two functions: ``NAME_options`` adds its parser to the command line's parser,
-and ``NAME`` takes the parsed arguments, calls the API, prints, and returns the exit code. The API compiles the kernels
-that it needs.
+A command is a module of this package with two functions: ``add_NAME_parser`` adds its parser to the parser of the
+command line, and ``NAME`` takes the parsed arguments, calls the API, prints, and returns the exit code. The API
+compiles the kernels that it needs.
 All modules are light: the code that a command needs is imported when the command runs.
 """
 
@@ -34,10 +34,17 @@ class Command(NamedTuple):
     module: str = ""
     function: str = ""
 
-    def load(self, suffix: str = "") -> Any:
-        """Return the function of the command; with the suffix "_options", the function that adds its parser."""
+    def load_function(self) -> Any:
+        """Import the command's module, and return the function that executes the command."""
+        return self._load("{}")
+
+    def load_parser_function(self) -> Any:
+        """Import the command's module, and return the function that adds the command's parser."""
+        return self._load("add_{}_parser")
+
+    def _load(self, name_format: str) -> Any:
         module = import_module(f"planfly.commands.{self.module or self.name}")
-        return getattr(module, (self.function or self.name) + suffix)
+        return getattr(module, name_format.format(self.function or self.name))
 
 
 # Section titles of the help.
@@ -94,8 +101,8 @@ def build_parser() -> LineParser:
         _FIRST_STEPS,
     )
     for command in COMMANDS:
-        parser.section(command.section)
-        command.load("_options")(parser)
+        parser.start_section(command.section)
+        command.load_parser_function()(parser)
     return parser
 
 
@@ -107,10 +114,11 @@ def find_command(name: str) -> CommandFunction:
     >>> find_command("scenarios").__module__
     'planfly.commands.shell'
     """
-    return _find_entry(name).load()
+    return _find_entry(name).load_function()
 
 
 def _find_entry(name: str) -> Command:
+    """Return the entry of a command.  Raises KeyError for an unknown name."""
     return {command.name: command for command in COMMANDS}[name]
 
 

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import number_parser, parse_time_or_stations
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.control_characters import without_controls
-from planfly.terminal.exit_codes import FLYABLE, LOSS
+from planfly.terminal.control_characters import escape_controls
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
 from planfly.terminal.options import (
+    add_log_argument,
+    add_result_options,
+    add_vehicle_link_options,
     call_api,
-    log_argument,
-    own_link_options,
     print_and_flush,
-    result_options,
     watch_stop_signals,
 )
 from planfly.terminal.output import plain_stream, write_json_if_requested
@@ -42,17 +42,17 @@ _ERASE_LINE_END = "\x1b[K"
 _ERASE_SCREEN_END = "\x1b[J"
 
 
-def replay_options(command_line: LineParser) -> None:
+def add_replay_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly replay``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "replay",
         "replay a flight from its log: as instruments on a terminal, as a timeline elsewhere",
         "planfly replay flight.mcap --speed 20 --from 60",
         "planfly replay flight.mcap --to 127.0.0.1:14550",
     )
     parser.alias_keyword("end", "--to")
-    log_argument(parser)
-    part_group = parser.group("part and speed")
+    add_log_argument(parser)
+    part_group = parser.add_group("part and speed")
     part_group.add_argument(
         "--from", dest="start", metavar="S", type=number_parser("start"), help="start at this time of the flight, s"
     )
@@ -71,7 +71,7 @@ def replay_options(command_line: LineParser) -> None:
         "otherwise at once)",
     )
     part_group.add_argument("--at-once", action="store_true", help="print the timeline at once, also on a terminal")
-    output_group = parser.group("other outputs")
+    output_group = parser.add_group("other outputs")
     output_group.add_argument(
         "--movie",
         metavar="FILE|DIR",
@@ -99,8 +99,8 @@ def replay_options(command_line: LineParser) -> None:
         type=number_parser("wait"),
         help="wait S seconds for a ground station (default: 10) or for Foxglove (default: forever)",
     )
-    own_link_options(parser, bind="127.0.0.1:0")
-    result_options(parser)
+    add_vehicle_link_options(parser, bind="127.0.0.1:0")
+    add_result_options(parser)
 
 
 def replay(args: argparse.Namespace) -> int:
@@ -125,7 +125,7 @@ def replay(args: argparse.Namespace) -> int:
         _print_timeline(log, args)
     if not log.complete:
         warn_about_incomplete_log(log)
-    code = FLYABLE if log.complete else LOSS
+    code = FLYABLE if log.complete else INCOMPLETE
     write_json_if_requested(args, lambda: _json_answer(args, log, code))
     return code
 
@@ -161,7 +161,7 @@ def _show_instruments(log: "FlightLog", args: argparse.Namespace) -> None:
     try:
         for _, lines in frames:
             visible_lines = [*lines[: max(1, shutil.get_terminal_size().lines - 2)], f"x {speed:g}, Ctrl-C stops"]
-            text = "".join(without_controls(line) + _ERASE_LINE_END + "\n" for line in visible_lines)
+            text = "".join(escape_controls(line) + _ERASE_LINE_END + "\n" for line in visible_lines)
             print(_HOME + text + _ERASE_SCREEN_END, end="", flush=True, file=screen)
     finally:
         print(_LEAVE_SCREEN, end="", flush=True, file=screen)

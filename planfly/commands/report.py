@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import planfly
 from planfly.terminal.arguments import file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
-from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE, verdict_code
-from planfly.terminal.options import result_options
+from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, INCOMPLETE, NOT_FLYABLE, verdict_code
+from planfly.terminal.options import add_result_options
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import warn_about_incomplete_log
 from world.errors import PlanflyError
@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from planfly import Verdict
 
 
-def report_options(command_line: LineParser) -> None:
+def add_report_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly report``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "report",
         "write report.html, map.png and profile.png from a log, or write the layout for Foxglove",
         "planfly report flight.mcap --out report --pictures",
@@ -32,7 +32,9 @@ def report_options(command_line: LineParser) -> None:
     parser.add_argument("--pictures", action="store_true", help="write every figure of the page as PNG")
     parser.add_argument("--svg", action="store_true", help="also write the same figures as SVG")
     parser.add_argument("--layout", metavar="FILE", help="write only the layout file for Foxglove")
-    result_options(parser, "folder for the files (default: <log>-report next to the log; an existing one is replaced)")
+    add_result_options(
+        parser, "folder for the files (default: <log>-report next to the log; an existing one is replaced)"
+    )
 
 
 def report(args: argparse.Namespace) -> int:
@@ -57,7 +59,7 @@ def report(args: argparse.Namespace) -> int:
     code = NOT_FLYABLE if result.verdict is None else verdict_code(result.verdict)
     if not log.complete:
         warn_about_incomplete_log(log)
-        code = LOSS
+        code = INCOMPLETE
     write_json_if_requested(args, lambda: _json_answer(result.files, result.verdict, code))
     return code
 
@@ -70,6 +72,7 @@ def _json_answer(files: Sequence[Path], verdict: "Verdict | None", code: int) ->
 
 
 def _write_layout(args: argparse.Namespace) -> int:
+    """Write the layout file for Foxglove.  Raises PlanflyError if a log is named, too."""
     if args.log is not None:
         message = f"{args.log}: --layout writes only the layout; name no log with it"
         raise PlanflyError(message, file=args.log, field="--layout", value=args.layout)

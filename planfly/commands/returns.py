@@ -5,20 +5,20 @@ import math
 from typing import TYPE_CHECKING
 
 import planfly
-from planfly.commands.check import mission_or_log_argument
+from planfly.commands.check import add_mission_or_log_argument
 from planfly.terminal.arguments import (
     number_parser,
 )
 from planfly.terminal.command_parser import LineParser, colour_text
-from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE, NOT_FLYABLE
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_imported_log_options,
+    add_result_options,
+    add_sitl_option,
+    add_steering_options,
+    add_world_options,
     call_api,
-    imported_log_options,
-    program_option,
-    result_options,
-    steering_options,
-    world_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -29,9 +29,9 @@ if TYPE_CHECKING:
 _MAX_LISTED_RANGES = 20
 
 
-def returns_options(command_line: LineParser) -> None:
+def add_returns_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly returns``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "returns",
         "simulate a return to launch from points all along the route: is each safe, where does it end and why; and"
         " what can the aircraft reach without its engine",
@@ -39,8 +39,8 @@ def returns_options(command_line: LineParser) -> None:
         "planfly returns flight.mcap --every 5 --out pictures",
         "planfly returns flight.mcap --sitl ./arduplane --points 5",
     )
-    mission_or_log_argument(parser)
-    group = parser.group("the returns")
+    add_mission_or_log_argument(parser)
+    group = parser.add_group("the returns")
     group.add_argument(
         "--every",
         metavar="S",
@@ -54,7 +54,7 @@ def returns_options(command_line: LineParser) -> None:
         help="find the lowest RTL_ALTITUDE, a climb before the turn, or the fewest rally points that make all "
         "returns safe",
     )
-    program_option(
+    add_sitl_option(
         group,
         "also fly the worst returns with ArduPlane itself, and say whether it agrees with the"
         " simulation: path of its program,"
@@ -66,13 +66,13 @@ def returns_options(command_line: LineParser) -> None:
         type=number_parser("points"),
         help="number of the worst returns that the program flies, spaced far apart (default: 3)",
     )
-    imported_log_options(parser)
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    steering_options(parser).add_argument(
+    add_imported_log_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_steering_options(parser).add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: the plan's, or 1)"
     )
-    result_options(
+    add_result_options(
         parser,
         "folder for pictures: the route coloured by the outcome of returns, the worst returns in profile,"
         " the lowest height from which a return is safe, and the glide's footprint (default: none)",
@@ -81,14 +81,14 @@ def returns_options(command_line: LineParser) -> None:
 
 def returns(args: argparse.Namespace) -> int:
     """Judge every return; the exit code is 0 if all are safe, 4 if one is unsafe, and 3 if some are undecided."""
-    from logs.verdict.conditions import flown_lines, setup_conditions
+    from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.returns, args)
-    code = FLYABLE if result.safe else LOSS if result.undecided else NOT_FLYABLE
+    code = FLYABLE if result.safe else INCOMPLETE if result.undecided else NOT_FLYABLE
     print(
         f"returns   {colour_text(result.headline, 'good' if result.safe else 'warning' if result.undecided else 'bad')}"
     )
-    for text in flown_lines(setup_conditions(result.setup)):
+    for text in flown_lines(judging_conditions(result.setup)):
         print(f"  {text}")
     for text in result.cause_lines:
         print(f"  {text}")
@@ -117,7 +117,7 @@ def returns(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
-    from logs.verdict.conditions import setup_conditions
+    from logs.verdict.conditions import judging_conditions
     from planfly.terminal.returns_answers import (
         CauseEntry,
         ReturnsAnswer,
@@ -133,7 +133,7 @@ def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
         what=source,
         headline=result.headline,
         safe=result.safe,
-        conditions=setup_conditions(result.setup),
+        conditions=judging_conditions(result.setup),
         every_s=judged_returns.interval,
         least_clearance_m=judged_returns.limit,
         causes=[

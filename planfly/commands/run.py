@@ -8,12 +8,12 @@ from planfly.terminal.arguments import number_parser
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import verdict_code
 from planfly.terminal.options import (
+    add_flight_options,
+    add_log_rate_option,
+    add_result_options,
+    add_scenario_argument,
+    add_terrain_option,
     call_api,
-    flight_options,
-    log_rate_option,
-    result_options,
-    scenario_argument,
-    terrain_option,
 )
 from planfly.terminal.output import write_json_if_requested, write_junit_if_requested
 from planfly.terminal.results import print_engine, print_returns_line, print_verdict
@@ -22,16 +22,18 @@ if TYPE_CHECKING:
     from planfly import Round, RunResult
 
 
-def run_options(command_line: LineParser) -> None:
+def add_run_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly run``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "run",
         "plan, export, fly, log, judge and report",
         "planfly run jacksboro --seed 3 --out my-run",
         "planfly run tight --wind 8,270 --turbulence light --refine 3",
     )
-    scenario_argument(parser, nargs="?", default="jacksboro", help="TOML file or embedded name (default: jacksboro)")
-    planning = parser.group("planning")
+    add_scenario_argument(
+        parser, nargs="?", default="jacksboro", help="TOML file or embedded name (default: jacksboro)"
+    )
+    planning = parser.add_group("planning")
     planning.add_argument(
         "--seed",
         metavar="N",
@@ -45,10 +47,10 @@ def run_options(command_line: LineParser) -> None:
         default=0,
         help="if the plan is not flyable, tighten the limits and plan again, up to N times (default: 0)",
     )
-    terrain_option(planning)
-    flight_options(parser)
-    log_rate_option(parser.group("the log"))
-    result_options(
+    add_terrain_option(planning)
+    add_flight_options(parser)
+    add_log_rate_option(parser.add_group("the log"))
+    add_result_options(
         parser, "folder for the files (default: runs/<name>-seed<N>; an existing one is replaced)", junit=True
     )
 
@@ -85,6 +87,7 @@ def _json_answer(result: "RunResult", has_rounds: bool, code: int) -> object:
 
 
 def _print_round(finished_round: "Round") -> None:
+    """Print the verdict on a round, the line on returns, the flight model, and the written files."""
     print_verdict(finished_round.verdict, finished_round.notes)
     print_returns_line(finished_round.returns_line)
     print_engine(finished_round.engine)
@@ -96,6 +99,7 @@ def _print_round(finished_round: "Round") -> None:
 
 
 def _print_rounds(result: "RunResult") -> None:
+    """Print a line for each round, with the changed limits and the verdict, and the reason for the end."""
     print("rounds")
     for finished_round in result.rounds:
         changes = "; ".join(finished_round.changes) or "as given"

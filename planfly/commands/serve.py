@@ -7,13 +7,13 @@ from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_steering_options,
+    add_vehicle_link_options,
+    add_world_options,
     call_api,
-    own_link_options,
     print_and_flush,
-    steering_options,
     watch_stop_signals,
-    world_options,
 )
 
 # Help text on the modes and commands of the vehicle.
@@ -23,9 +23,9 @@ Parameters are read, listed and set by name before a flight: those of the simula
 which at 1 lets the vehicle arm and fly even a mission that is judged not flyable (default: 0)."""
 
 
-def serve_options(command_line: LineParser) -> None:
+def add_serve_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly serve``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "serve",
         "simulate a MAVLink vehicle: a ground station uploads a mission, arms and starts the vehicle, and monitors it",
         "planfly serve mission.waypoints --terrain jacksboro",
@@ -36,16 +36,16 @@ def serve_options(command_line: LineParser) -> None:
         parser.add_argument("mission", metavar="MISSION", nargs="?", help="mission to load at start-up"),
         file_completer(*MISSION_SUFFIXES),
     )
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    steering_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_steering_options(parser)
     parser.add_argument(
         "--to",
         metavar="IP:PORT,...",
         default="127.0.0.1:14550",
         help="address at which ground stations listen (default: 127.0.0.1:14550)",
     )
-    own_link_options(parser, bind="127.0.0.1:14580")
+    add_vehicle_link_options(parser, bind="127.0.0.1:14580")
     parser.add_argument(
         "--speed",
         metavar="X",

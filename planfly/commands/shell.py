@@ -7,7 +7,7 @@ import planfly
 from planfly.terminal.arguments import SHELLS, shell_script, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE
-from planfly.terminal.options import json_option
+from planfly.terminal.options import add_json_option
 from planfly.terminal.output import write_json_if_requested
 from world.files import did_you_mean
 
@@ -22,9 +22,9 @@ to enable completion in this shell and in new ones:
 # ``planfly completion``: the completion script of a shell.
 
 
-def completion_options(command_line: LineParser) -> None:
+def add_completion_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly completion``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "completion",
         "print a script that makes a shell complete planfly's commands, options and names",
         "planfly completion bash",
@@ -43,9 +43,9 @@ def completion(args: argparse.Namespace) -> int:
 # ``planfly help``: the help of a command, or the JSON schema of its answer.
 
 
-def show_help_options(command_line: LineParser) -> None:
+def add_show_help_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly help``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "help", "show the help of a command, or list the commands", "planfly help fly", "planfly help fly --schema"
     )
     with_completer(
@@ -88,10 +88,10 @@ def _report_bad_usage(reason: str) -> int:
 # ``planfly scenarios``: the embedded scenarios, one line each.
 
 
-def scenarios_options(command_line: LineParser) -> None:
+def add_scenarios_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly scenarios``."""
-    parser = command_line.command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
-    json_option(parser.group("results"), "scenarios")
+    parser = command_line.add_command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
+    add_json_option(parser.add_group("results"), "scenarios")
 
 
 def scenarios(args: argparse.Namespace) -> int:

@@ -13,12 +13,12 @@ from planfly.terminal.arguments import (
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
-    autopilot_options,
+    add_aircraft_and_wind_options,
+    add_autopilot_options,
+    add_world_options,
     call_api,
     print_and_flush,
     watch_stop_signals,
-    world_options,
 )
 
 # Help text on mouse and keyboard.
@@ -30,9 +30,9 @@ redo, Escape cancels a drag.
 The page can be reached only from this machine, at the printed address."""
 
 
-def studio_options(command_line: LineParser) -> None:
+def add_studio_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly studio``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "studio",
         "open a page on which you drag a mission while it is judged, fly it, and save it",
         "planfly studio jacksboro",
@@ -74,9 +74,9 @@ def studio_options(command_line: LineParser) -> None:
     parser.add_argument(
         "--keep", metavar="DIR", help="folder of the session that the next start restores (default: runs/studio)"
     )
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    autopilot_options(parser)
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_autopilot_options(parser)
 
 
 def studio(args: argparse.Namespace) -> int:

@@ -10,11 +10,11 @@ from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_
 from planfly.terminal.command_parser import LineParser, colour_text
 from planfly.terminal.exit_codes import NOT_FLYABLE, verdict_code
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_result_options,
+    add_steering_options,
+    add_world_options,
     call_api,
-    result_options,
-    steering_options,
-    world_options,
 )
 from planfly.terminal.output import write_json_if_requested
 
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from planfly import SurveyResult
 
 
-def survey_options(command_line: LineParser) -> None:
+def add_survey_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly survey``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "survey",
         "fly a survey: how much of each photo line can be used, and what would help the lines that are lost",
         "planfly survey field.plan --terrain dem.tif --aircraft x8 --autopilot ardupilot --wind 5,250",
@@ -34,7 +34,7 @@ def survey_options(command_line: LineParser) -> None:
         parser.add_argument("what", metavar="MISSION|LOG", help=".waypoints or .plan, or a flight log (.mcap)"),
         file_completer(*MISSION_SUFFIXES, "mcap"),
     )
-    group = parser.group("the survey")
+    group = parser.add_group("the survey")
     group.add_argument(
         "--camera",
         metavar="WxH,FOCAL",
@@ -52,17 +52,19 @@ def survey_options(command_line: LineParser) -> None:
         help="look for turn-arounds, an order or a course of the lines, a parameter or an airspeed that makes "
         "all lines usable; each is flown",
     )
-    world_options(parser)
-    aircraft_and_wind_options(parser)
-    steering_options(parser).add_argument(
+    add_world_options(parser)
+    add_aircraft_and_wind_options(parser)
+    add_steering_options(parser).add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the turbulence (default: 1)"
     )
-    result_options(parser, "folder for a picture of the lines, and for each mission that would help (default: none)")
+    add_result_options(
+        parser, "folder for a picture of the lines, and for each mission that would help (default: none)"
+    )
 
 
 def survey(args: argparse.Namespace) -> int:
     """Judge every photo line; return 4 if one is not usable, otherwise the exit code of the verdict on the flight."""
-    from logs.verdict.conditions import flown_lines, setup_conditions
+    from logs.verdict.conditions import flown_lines, judging_conditions
 
     result = call_api(planfly.survey, args)
     code = verdict_code(result.verdict)
@@ -70,7 +72,7 @@ def survey(args: argparse.Namespace) -> int:
         code = NOT_FLYABLE
     print(f"survey    {colour_text(result.headline, 'good' if result.usable else 'bad')}")
     print(f"flight    {result.verdict.headline}")
-    for text in flown_lines(setup_conditions(result.setup)):
+    for text in flown_lines(judging_conditions(result.setup)):
         print(f"  {text}")
     for text in result.survey_lines:
         print(f"  {text}")
@@ -94,7 +96,7 @@ def survey(args: argparse.Namespace) -> int:
 
 
 def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
-    from logs.verdict.conditions import setup_conditions
+    from logs.verdict.conditions import judging_conditions
     from planfly.terminal.survey_answers import (
         SurveyAnswer,
         near_miss_entry,
@@ -108,7 +110,7 @@ def _json_answer(source: str, result: "SurveyResult", code: int) -> object:
         what=source,
         headline=result.headline,
         usable=result.usable,
-        conditions=setup_conditions(result.setup),
+        conditions=judging_conditions(result.setup),
         surveys=[
             [photo_line_entry(result.setup, line, measure) for line, measure in zip(survey.lines, lines, strict=True)]
             for survey, lines in zip(result.surveys, result.lines, strict=True)

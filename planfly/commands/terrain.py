@@ -7,7 +7,7 @@ import planfly
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, number_parser, parse_area, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.options import call_api, result_options
+from planfly.terminal.options import add_result_options, call_api
 from planfly.terminal.output import write_json_if_requested
 from planfly.terminal.results import print_warnings
 
@@ -15,15 +15,15 @@ from planfly.terminal.results import print_warnings
 _MAX_LISTED_CELLS = 4
 
 
-def terrain_options(command_line: LineParser) -> None:
+def add_terrain_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly terrain``."""
-    parser = command_line.command(
+    parser = command_line.add_command(
         "terrain",
         "write the ground of an area as a GeoTIFF, from a folder of tiles or the Copernicus DEM's server",
         "planfly terrain --around field.waypoints --out dem.tif",
         "planfly terrain --box 46.4,7.9,46.7,8.3 --source ./tiles --out dem.tif",
     )
-    area_group = parser.group("the area")
+    area_group = parser.add_group("the area")
     with_completer(
         area_group.add_argument(
             "--around", metavar="MISSION", help=".waypoints or .plan file, all of whose positions are covered"
@@ -38,7 +38,7 @@ def terrain_options(command_line: LineParser) -> None:
         default=3.0,
         help="margin around the area, km (default: 3)",
     )
-    tile_group = parser.group("the tiles")
+    tile_group = parser.add_group("the tiles")
     tile_group.add_argument(
         "--source",
         metavar="DIR|URL",
@@ -53,7 +53,7 @@ def terrain_options(command_line: LineParser) -> None:
             "countries are not published)"
         ),
     )
-    result_options(parser, "the file to write (default: dem.tif)", "FILE")
+    add_result_options(parser, "the file to write (default: dem.tif)", "FILE")
 
 
 def terrain(args: argparse.Namespace) -> int:

@@ -44,7 +44,8 @@ _TABLE_ROWS = 15
 def base_model(aircraft: Aircraft) -> BaseModel:
     """Return the model values of an aircraft.
 
-    A motor in the form of the Aerosonde's or of the Zagi's and X8's keeps that form; another one becomes tables.
+    An electric motor modelled as in the Aerosonde, or a propeller disc modelled as in the Zagi and the X8, keeps its
+    formulas; any other motor is tabulated.
 
     Raises FlightError for an aircraft without steady flight at cruise.
 
@@ -58,7 +59,7 @@ def base_model(aircraft: Aircraft) -> BaseModel:
 
 
 def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
-    """Return the model values of an aircraft with a variation, its motor as tables.
+    """Return the model values of an aircraft with varied properties; its motor is tabulated.
 
     Raises FlightError for an aircraft without steady flight at cruise.
     """
@@ -129,7 +130,7 @@ class _Probe:
 
     def coefficients(self) -> Coefficients:
         """Return coefficients by central differences about the trim at closed throttle; the propeller may windmill."""
-        zero = self._coefficients_at(0.0)
+        at_zero = self._coefficients_at(0.0)
         # Fit drag over lift on the straight part of the lift curve.
         angles = np.radians([-2.0, 0.0, 2.0, 4.0, 6.0])
         table = np.array([self._coefficients_at(angle)[:2] for angle in angles])
@@ -149,7 +150,7 @@ class _Probe:
             drag_zero=float(constant - induced * min_drag_lift * min_drag_lift),
             drag_induced=float(induced),
             drag_elevator=float(elevator[0]),
-            lift_zero=float(zero[1]),
+            lift_zero=float(at_zero[1]),
             lift_alpha=float(alpha[1]),
             lift_rate=float(pitch[1]),
             lift_elevator=float(elevator[1]),
@@ -161,7 +162,7 @@ class _Probe:
             roll_yaw=float(yaw[3]),
             roll_aileron=float(aileron[3]),
             roll_rudder=float(rudder[3]),
-            pitch_zero=float(zero[4]),
+            pitch_zero=float(at_zero[4]),
             pitch_alpha=float(alpha[4]),
             pitch_rate=float(pitch[4]),
             pitch_elevator=float(elevator[4]),
@@ -184,12 +185,18 @@ class _Probe:
         return self._coefficients_at(0.0, rates=rate * np.eye(3)[axis])
 
     def _derivative(self, function: Callable[[float], Floats], step: float) -> Floats:
+        """Return the derivative of a function at 0 by a central difference."""
         return np.asarray((function(step) - function(-step)) / (2.0 * step))
 
     def _coefficients_at(
         self, alpha: float, beta: float = 0.0, rates: Floats | None = None, surfaces: Floats | None = None
     ) -> Floats:
-        """Return the coefficients of drag, lift, side force and moments at closed throttle, (6,)."""
+        """Return the coefficients of drag, lift, side force, roll, pitch and yaw moment at closed throttle, (6,).
+
+        alpha, beta: angles of attack and sideslip, rad.
+        rates: angular rates p, q, r, rad/s, zero by default.
+        surfaces: deflections of elevator, aileron and rudder, rad, zero by default.
+        """
         angular_rates = np.zeros(3) if rates is None else rates
         deflections = np.zeros(3) if surfaces is None else surfaces
         speed = self._airspeed
@@ -212,7 +219,7 @@ def is_flying_wing(aircraft: Aircraft) -> bool:
 
 
 def _has_torque_reaction(aircraft: Aircraft) -> bool:
-    """Return True if a model includes the reaction to propeller torque.
+    """Return True if a model includes the reaction to propeller torque, or cannot be parsed.
 
     Models of flying wings leave out this reaction.
     """
@@ -242,10 +249,15 @@ def read_motor(aircraft: Aircraft) -> Motor | None:
 
 
 def _function_values(function: ElementTree.Element) -> list[float]:
+    """Return the constants of a JSBSim function, in the order of the file; NaN for an empty element."""
     return [float(value.text or "nan") for value in function.iter("v")]
 
 
 def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float) -> PropellerDisc:
+    """Return the propeller disc of a model, from its JSBSim functions by name.
+
+    Raises KeyError or ValueError for functions of another form.
+    """
     exit_function, thrust_function, power = (
         functions[f"motor/{name}"] for name in ("exit-mps", "thrust-n", "battery-power-w")
     )
@@ -260,31 +272,36 @@ def _read_propeller_disc(functions: dict[str, ElementTree.Element], volts: float
 
 
 def _read_electric_motor(functions: dict[str, ElementTree.Element], volts: float) -> ElectricMotor:
+    """Return the electric motor of a model, from its JSBSim functions by name.
+
+    Raises KeyError, ValueError, IndexError or StopIteration for functions of another form.
+    """
+
     def numbers(name: str) -> list[float]:
         return _function_values(functions[name])
 
     (q2,), (q1,), (q0,) = (numbers(f"motor/q{k}") for k in (2, 1, 0))
     (damping,) = numbers("motor/b")
-    driven = numbers("motor/driven-rad_sec")
-    per_volt = -next(value for value in driven if value < 0.0)
+    speed_constants = numbers("motor/driven-rad_sec")
+    torque_per_volt = -next(value for value in speed_constants if value < 0.0)
     # The no-load torque is in this function or in a separate function.
     loss_function = functions.get("motor/loss-n_m")
     no_load_torque = (
         numbers("motor/loss-n_m")[0]
         if loss_function is not None
-        else next(value for value in driven if 0.0 < value < 2.0)
+        else next(value for value in speed_constants if 0.0 < value < 2.0)
     )
     # A data sheet's model has the ratio of battery power to these formulas, and the power of the avionics.
     power_numbers = numbers("motor/battery-power-w")
     power_ratio, avionics = power_numbers if len(power_numbers) == 2 else (1.0, 0.0)
-    back_voltage = damping / per_volt
+    back_voltage = damping / torque_per_volt
     thrust_name = "motor/pull-n" if "motor/pull-n" in functions else "motor/thrust-n"
     thrust = numbers(thrust_name)
     return ElectricMotor(
         torque=(q2, q1, q0),
         thrust=(thrust[0], thrust[1], thrust[2]),
         back_voltage=back_voltage,
-        resistance=back_voltage / per_volt,
+        resistance=back_voltage / torque_per_volt,
         idle_current=no_load_torque / back_voltage,
         voltage=volts,
         windmill=numbers("motor/thrust-n")[1] if thrust_name == "motor/pull-n" else 1.0,

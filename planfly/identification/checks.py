@@ -27,7 +27,7 @@ _BLOCK_SECONDS = 30.0
 
 
 def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
-    """Raise LogError for a voltage in flight that no battery of this nominal voltage has.
+    """Raise LogError if the median voltage in flight is impossible for a battery of this nominal voltage.
 
     volts: nominal voltage of the battery, V.
     """
@@ -40,7 +40,7 @@ def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
 
 
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:
-    """Raise LogError for an estimate that no aircraft can have.
+    """Raise LogError for an implausible estimate: a reversed control, a value at its bound, or a changing mass.
 
     outputs: servo output number of each control that has its own output.
     source: name of the logs, for the one-line message.
@@ -83,17 +83,17 @@ def mass_change(estimate: Estimate, base: BaseModel) -> tuple[float, float]:
 
     An aircraft that burns fuel or drops a load needs an ever smaller angle of attack than its assumed mass requires.
     The change is the trend of the measured minus the predicted angle of attack, divided by the predicted angle above
-    zero lift.
+    zero lift.  Returns 0 and infinity if the logs are too short.
     """
     equation = estimate.equations[0]
     c = base.coefficients
     slope = c.lift_alpha * estimate.values[INDEX["lift-slope"]]
-    zero = -(c.lift_zero + estimate.values[INDEX["lift-offset"]]) / slope
+    zero_lift_angle = -(c.lift_zero + estimate.values[INDEX["lift-offset"]]) / slope
     length = round(_BLOCK_SECONDS * equation.hertz)
     count = len(equation.measured) // length
     if count < 6:
         return 0.0, np.inf
-    relative_error = (equation.measured - equation.predicted) / np.maximum(0.02, equation.predicted - zero)
+    relative_error = (equation.measured - equation.predicted) / np.maximum(0.02, equation.predicted - zero_lift_angle)
     means = relative_error[: count * length].reshape(count, length).mean(axis=1)
     time = (np.arange(count) + 0.5) / count - 0.5
     trend = float(time @ means / (time @ time))

@@ -24,9 +24,9 @@ from flight.dynamics.trim import steady_flight
 from flight.guidance.model_gains import gains_from_model, gains_text
 from flight.mission_files.wpl import waypoints_text
 from logs.importers.motion import MotionLog
-from planfly.identification.drive_check import DriveConflict, drive_conflict
 from planfly.identification.manoeuvres import identification_mission
 from planfly.identification.model_text import identified_xml
+from planfly.identification.propulsion_check import PowerConflict, power_conflict
 from planfly.identification.servos import ServoOutput
 from world.arrays import Floats
 from world.errors import LogError
@@ -90,7 +90,7 @@ class Identified:
     until: float | None = None
 
     def performance(self) -> tuple[Performance, Performance]:
-        """Return the performance of the estimate, (1,), and of all draws, (512,)."""
+        """Return the performance of the estimate, arrays (1,), and the performance of all draws, arrays (512,)."""
         best, samples = (
             performance(self.numbers, values, self.cruise, DENSITY) for values in (self.estimate.values, self.draws)
         )
@@ -102,16 +102,16 @@ class Identified:
         return draw_drive_power(self.estimate, len(self.draws))
 
     def aircraft_draws(self) -> Draws:
-        """Return the draws as the model's properties; the factor on the battery's power only if it is not known."""
+        """Return the draws as properties of the model, with the factor on battery power if no current was logged."""
         properties = tuple(parameter.property_name for parameter in PARAMETERS)
         if self.estimate.with_current:
             return Draws(properties, self.draws)
         return Draws((*properties, DRIVE_POWER), np.column_stack([self.draws, self.drive_power]))
 
-    def drive_conflict(self) -> DriveConflict | None:
-        """Return the conflict of the estimate's drag and power in level flight, or None."""
+    def power_conflict(self) -> PowerConflict | None:
+        """Return the conflict between the estimated drag and power in level flight, or None without a conflict."""
         best, _ = self.performance()
-        return drive_conflict(float(best.drag[0]) * self.cruise, float(best.power[0]), self.numbers.mass)
+        return power_conflict(float(best.drag[0]) * self.cruise, float(best.power[0]), self.numbers.mass)
 
 
 def make_identified(
@@ -122,19 +122,24 @@ def make_identified(
     outputs: Mapping[str, ServoOutput],
     until: float | None = None,
 ) -> Identified:
-    """Return an identification with 512 draws, at the last log's cruise speed, a true airspeed at `AMSL`."""
+    """Return an identification: the estimate, 512 draws from it, and the cruise speed of the last log.
+
+    numbers: model values of the base, scaled to the aircraft.
+    outputs: servo output of each control.
+    until: end of the used part of the logs, s, or None if all rows were used.
+    """
     cruise = _airspeeds(logs[-1], base)[0]
     return Identified(base, numbers, estimate, draw_aircraft(estimate), logs, outputs, cruise, until)
 
 
 def folder_files(identified: Identified, name: str, battery: tuple[float, float]) -> dict[str, str]:
-    """Return the files of the folder by name, except the page.
+    """Return the text of each file of an identified aircraft's folder by file name, except the HTML page.
 
     The mission of manoeuvres starts at the home position of the last log that has one; without a home position it is
     left out.
 
     battery: voltage, V, and energy, J.
-    Raises LogError for an aircraft that holds no level flight.
+    Raises LogError if the identified model has no level flight at cruise.
     """
     xml = identified_xml(identified.base, name, identified.numbers, identified.estimate.values)
     with temporary_folder("planfly-identified-") as parent:
@@ -166,20 +171,20 @@ def folder_files(identified: Identified, name: str, battery: tuple[float, float]
 
 
 def _check_level_flight(identified: Identified, aircraft: Aircraft) -> None:
-    """Raise LogError, with the reason, if the identified model holds no level flight at cruise."""
+    """Raise LogError, with the reason, if the identified model has no level flight at cruise."""
     if steady_flight(Fdm(aircraft), identified.cruise, AMSL) is not None:
         return
     numbers, source = identified.numbers, identified.logs[-1].source
     elevator, throttle = level_controls(numbers, identified.estimate.values, identified.cruise, DENSITY)
     stop = math.degrees(aircraft.max_elevator)
     if throttle > _FULL_THROTTLE:
-        reason = "full throttle does not hold its drag"
+        reason = "full throttle gives less thrust than its drag"
     elif abs(math.degrees(elevator)) > stop:
-        reason = f"its elevator would be at {math.degrees(elevator):.0f} deg, and its stop is {stop:.0f} deg"
+        reason = f"it needs {math.degrees(elevator):.0f} deg of elevator, beyond the stop at {stop:.0f} deg"
     else:
         lift = numbers.mass * GRAVITY / (0.5 * DENSITY * identified.cruise**2 * numbers.area)
         reason = f"it needs a lift coefficient of {lift:.2f}"
-    message = f"the identified aircraft holds no level flight at {identified.cruise:.1f} m/s: {reason}"
+    message = f"the identified aircraft cannot fly level at {identified.cruise:.1f} m/s: {reason}"
     allowed = "check the mass, span and area of these logs, and the base"
     raise LogError(f"{source}: {message}: {allowed}", file=source, field="mass", value=numbers.mass, allowed=allowed)
 
@@ -205,8 +210,9 @@ def _airspeeds(log: MotionLog, base: Aircraft) -> tuple[float, float, float]:
 def _metadata_text(
     identified: Identified, battery: tuple[float, float], min_level_speed: float, max_level_speed: float = math.inf
 ) -> str:
-    """Return the text of ``name.toml``.
+    """Return the text of ``name.toml``, the metadata of the aircraft.
 
+    battery: voltage, V, and energy, J.
     min_level_speed, max_level_speed: minimum and maximum airspeed of level flight, m/s.
     """
     base, value = identified.base, flown_parameters(identified.logs[-1]).get
@@ -266,13 +272,14 @@ def _parameter_file(identified: Identified) -> dict[str, str]:
     parameters = flown_parameters(log)
     if not parameters:
         return {AIRCRAFT_FILE: base_file.read_text(encoding="utf-8")} if base_file.is_file() else {}
-    lines = [f"# As {Path(log.source).name} was flown: parameters of flying; those of its hardware are left out."]
+    lines = [f"# Parameters of {Path(log.source).name} that determine flight; hardware parameters are left out."]
     lines += [f"{name} {value:.9g}" for name, value in sorted(parameters.items())]
     return {AIRCRAFT_FILE: "\n".join(lines) + "\n"}
 
 
 def _servo_file_text(outputs: Mapping[str, ServoOutput]) -> str:
-    lines = ["# Which servo output moves what, and the control at these pulses.", ""]
+    """Return the text of ``ardupilot.toml``: output number, pulses (us) and deflections of each control."""
+    lines = ["# Servo output of each control, and the value of the control at each pulse.", ""]
     for name, output in outputs.items():
         values = output.value if name == "throttle" else [math.degrees(angle) for angle in output.value]
         unit = "value" if name == "throttle" else "value_deg"
@@ -292,7 +299,7 @@ def posterior_text(identified: Identified) -> str:
     _, samples = identified.performance()
     # Standard deviation of the logarithm; if it exceeds 1, nothing is known of the value.
     power = min(1.0, float(np.std(np.log(np.maximum(samples.power, 1.0)))))
-    if (conflict := identified.drive_conflict()) is not None:
+    if (conflict := identified.power_conflict()) is not None:
         power = min(1.0, max(power, math.log(conflict.largest_power / conflict.power) / 1.96))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
     fastest = fastest_level(identified.numbers, identified.draws, DENSITY)
@@ -327,7 +334,9 @@ def posterior_text(identified: Identified) -> str:
     correlation = estimate.covariance / np.outer(estimate.sds, estimate.sds)
     if not estimate.with_current:
         numbers = 1.0, EFFICIENCY_LOG_SD, 1.0, EFFICIENCY_LOG_SD, 0.0
-        lines += _quantity_lines(DRIVE_POWER, "factor", numbers, "power of the drive, which only the current shows")
+        lines += _quantity_lines(
+            DRIVE_POWER, "factor", numbers, "battery power of the motor, which only the current shows"
+        )
         correlation = np.block([[correlation, np.zeros((len(correlation), 1))], [np.zeros(len(correlation)), 1.0]])
     lines += ["", "[correlation]", "# Rows and columns in the order of the quantities.", "matrix = ["]
     lines += [f"  [{', '.join(f'{value:.4f}' for value in row)}]," for row in correlation]
@@ -335,9 +344,10 @@ def posterior_text(identified: Identified) -> str:
 
 
 def _quantity_lines(name: str, unit: str, numbers: tuple[float, float, float, float, float], reason: str) -> list[str]:
-    """Return the lines of a quantity.
+    """Return the lines of a ``[[quantity]]`` table.
 
-    numbers: prior, its standard deviation, estimate, its standard deviation, and the share that is the logs'.
+    numbers: prior, standard deviation of the prior, estimate, standard deviation of the estimate, and the fraction of
+        the prior variance that the logs removed.
     """
     prior, prior_sd, value, sd, log_share = numbers
     return [
@@ -355,4 +365,5 @@ def _quantity_lines(name: str, unit: str, numbers: tuple[float, float, float, fl
 
 
 def _toml_safe(text: str) -> str:
+    """Replace backslashes and double quotes, so that the text needs no escapes in a TOML string."""
     return text.replace("\\", "/").replace('"', "'")

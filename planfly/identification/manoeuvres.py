@@ -27,15 +27,15 @@ _START_HEIGHT_M = 150.0
 def identification_mission(
     aircraft: Aircraft, envelope: Envelope, lat_deg: float, lon_deg: float, ground: float, repeats: int = 1
 ) -> Mission:
-    """Return the mission around a home position.
+    """Return the mission of manoeuvres for an identification, around a home position.
 
     lat_deg, lon_deg, ground: home position, degrees and m AMSL.
     repeats: number of times that the sequence is flown.
 
     The legs form squares, so that every manoeuvre is flown with the wind and against it.
     """
-    places = list(_waypoints(aircraft, envelope, ground + _START_HEIGHT_M, repeats))
-    east, north = np.array([place[:2] for place in places]).T
+    waypoints = list(_waypoints(aircraft, envelope, ground + _START_HEIGHT_M, repeats))
+    east, north = np.array([waypoint[:2] for waypoint in waypoints]).T
     lats, lons = to_geo(GeoOrigin(lat_deg, lon_deg), east, north)
     items: list[MissionItem] = []
 
@@ -48,7 +48,7 @@ def identification_mission(
         )
 
     speed = math.nan
-    for (_, _, altitude, leg_airspeed), lat, lon in zip(places, lats.tolist(), lons.tolist(), strict=True):
+    for (_, _, altitude, leg_airspeed), lat, lon in zip(waypoints, lats.tolist(), lons.tolist(), strict=True):
         if leg_airspeed != speed and items:
             add_item(int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), (0.0, leg_airspeed, -1.0, 0.0), 0.0, 0.0, 0.0)
         speed = leg_airspeed
@@ -63,7 +63,11 @@ def identification_mission(
 def _waypoints(
     aircraft: Aircraft, envelope: Envelope, base: float, repeats: int
 ) -> Iterator[tuple[float, float, float, float]]:
-    """Yield east, north and altitude of each waypoint, m, and the airspeed on the leg to the waypoint, m/s."""
+    """Yield east, north and altitude of each waypoint, m, and the airspeed on the leg to the waypoint, m/s.
+
+    base: altitude of the first waypoint, m AMSL.
+    repeats: number of times that the sequence is flown.
+    """
     cruise = aircraft.airspeed
     slow_speed = aircraft.airspeed_min + 0.15 * (cruise - aircraft.airspeed_min)
     fast_speed = cruise + 0.6 * (aircraft.airspeed_max - cruise)

@@ -28,7 +28,7 @@ _MAX_ALPHA_RAD = 0.25
 
 
 def identified_xml(base: Aircraft, name: str, numbers: BaseModel, values: Floats) -> str:
-    """Return the text of ``name.xml``.
+    """Return the text of ``name.xml``, the base's JSBSim model with the identified changes.
 
     base: the aircraft whose model is extended.
     numbers: model values of the base, scaled to the aircraft.
@@ -88,9 +88,10 @@ def check_base(base: Aircraft) -> None:
 
 
 def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementTree.Element:
+    """Return the element at a path of the base's model.  Raises FlightError if the model lacks it."""
     element = root.find(path)
     if element is None:
-        allowed = "a model to identify from needs it, as aircraft/aerosonde/aerosonde.xml has it"
+        allowed = "the model of a base aircraft needs this element; for an example see aircraft/aerosonde/aerosonde.xml"
         raise FlightError(
             f"{base.model_file}: no <{path.replace('/', '><')}>: {allowed}",
             file=base.model_file,
@@ -101,6 +102,7 @@ def _find_part(root: ElementTree.Element, path: str, base: Aircraft) -> ElementT
 
 
 def _set_sizes(root: ElementTree.Element, numbers: BaseModel, base: Aircraft) -> None:
+    """Write the wing's dimensions, the moments of inertia and the mass into a model."""
     ixx, iyy, izz, ixz = numbers.inertia
     sizes = {
         "metrics/wingarea": (numbers.area, "M2"),
@@ -128,11 +130,12 @@ def _factor_minus_one(name: str) -> str:
 
 
 def _product_term(coefficient: float, *factors: str) -> str:
+    """Return the XML product of a coefficient and factors, which are XML themselves."""
     return f"<product> <v> {number(coefficient)} </v> {' '.join(factors)} </product>"
 
 
 def _lift_functions(numbers: BaseModel) -> str:
-    """Return the functions of lift coefficient by angle of attack, of base and estimate, up to `_MAX_ALPHA_RAD`."""
+    """Return JSBSim functions for the lift coefficient of the base and of the estimate, up to `_MAX_ALPHA_RAD`."""
     c = numbers.coefficients
     return f"""
     <function name="ident/alpha-rad"> <min> <v> {_MAX_ALPHA_RAD} </v>
@@ -145,7 +148,10 @@ def _lift_functions(numbers: BaseModel) -> str:
 
 
 def _added_function(base: Aircraft, numbers: BaseModel, axis: str, drag: str, control: str) -> str:
-    """Return the function added to an axis, or "" for an axis without estimated terms."""
+    """Return the JSBSim function that adds the estimated terms to an axis, or "" for an axis without such terms.
+
+    drag, control: XML factors that the base applies to drag and to control deflections, or "".
+    """
     c = numbers.coefficients
     surfaces = [
         f"<product> <p> {reading.name} </p> <v> {number(reading.factor)} </v> </product>{control}"
@@ -253,6 +259,7 @@ def _motor_functions(motor: Motor) -> dict[str, str]:
 
 
 def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
+    """Return JSBSim functions for a propeller disc: exit speed, thrust, torque, battery power and current."""
     exit_property = "<p> motor/exit-mps </p>"
     full_speed = f"<product> <v> {number(disc.exit_speed)} </v> <p> ident/motor-speed </p> </product>"
     exit_speed = f"<product> <p> motor/throttle-norm </p> {full_speed} </product>"
@@ -274,7 +281,11 @@ def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
 
 
 def _table_functions(motor: MotorTable) -> dict[str, str]:
-    """Return functions that look up the tables at the airspeed that has the same advance ratio at the base's speed."""
+    """Return JSBSim functions that look up the tables of a motor.
+
+    A factor s on motor speed keeps the advance ratio: the tables are read at 1/s of the airspeed, and thrust and torque
+    are multiplied by s squared, the power by s cubed.
+    """
     speed = "<p> ident/motor-speed </p>"
     density_ratio = f"<quotient> {_RHO} <v> {number(motor.density)} </v> </quotient>"
 
@@ -302,6 +313,10 @@ def _table_functions(motor: MotorTable) -> dict[str, str]:
 
 
 def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
+    """Return JSBSim functions for an electric motor with its propeller.
+
+    The speed of the propeller is the positive root of the balance of motor and propeller torque.
+    """
     q2, q1, q0 = (number(value) for value in motor.torque)
     kv, resistance = motor.back_voltage, motor.resistance
     # Divide by the factor on motor speed: KV is divided by it, and its square is KQ KV.
@@ -315,7 +330,7 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
         f"<quotient> <v> {number(kv * kv / resistance)} </v> <product> {speed} {speed} </product> </quotient>"
     )
 
-    def root(b: str, c: str) -> str:
+    def positive_root(b: str, c: str) -> str:
         discriminant = f"""<difference> <product> {b} {b} </product>
           <product> <v> 4 </v> <p> motor/q2 </p> <sum> <p> motor/q0 </p> {c} </sum> </product> </difference>"""
         return f"""<quotient> <difference> <sqrt> <max> <v> 0 </v> {discriminant} </max> </sqrt> {b} </difference>
@@ -334,8 +349,8 @@ def _electric_functions(motor: ElectricMotor) -> dict[str, str]:
         "q1": f"<product> <v> {q1} </v> {torque} {_RHO} {_AIR} </product>",
         "q0": f"<product> <v> {q0} </v> {torque} {_RHO} {_AIR} {_AIR} </product>",
         "b": f"<sum> <p> motor/q1 </p> {back_voltage_damping} </sum>",
-        "driven-rad_sec": root("<p> motor/b </p>", f"{loss_torque} {drive_torque}"),
-        "windmill-rad_sec": root("<p> motor/q1 </p>", loss_torque),
+        "driven-rad_sec": positive_root("<p> motor/b </p>", f"{loss_torque} {drive_torque}"),
+        "windmill-rad_sec": positive_root("<p> motor/q1 </p>", loss_torque),
         "propeller-rad_sec": "<max> <v> 0 </v> <p> motor/driven-rad_sec </p>"
         " <difference> <p> motor/windmill-rad_sec </p>"
         " <product> <v> 1000000000 </v> <p> motor/braking </p> </product> </difference> </max>",

@@ -80,10 +80,10 @@ def flight_records(
     min_seconds: float = MIN_SECONDS,
     until: float = math.inf,
 ) -> list[FlightRecord]:
-    """Return the stretches of a log that an identification can use, in which only the wing carries the aircraft.
+    """Return the segments of a log that an identification can use: flight on the wing, without lifting motors.
 
-    servos: output of each control, if known better than from the SERVOn_* parameters of the log.
-    min_seconds: shortest usable flight, s.
+    servos: output of each control; None to derive the outputs from the SERVOn_* parameters of the log.
+    min_seconds: minimum total duration of the segments, s.
     until: end of the part that is used, s of the log.
     Raises LogError, with a one-line message, for a log that cannot be used.
     """
@@ -128,12 +128,14 @@ def flight_records(
         voltage=battery[:, 0],
         source=log.source,
     )
-    records = [flight.rows(slice(begin, end)) for begin, end in _find_stretches(usable)]
-    _check_length(log, records, min_seconds, until, cut=bool(_vtol_rows(log, grid, pulses).any()))
+    records = [flight.rows(slice(begin, end)) for begin, end in _find_segments(usable)]
+    _check_duration(log, records, min_seconds, until, cut=bool(_vtol_rows(log, grid, pulses).any()))
     return records
 
 
-def _check_length(log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, cut: bool) -> None:
+def _check_duration(
+    log: MotionLog, records: list[FlightRecord], min_seconds: float, until: float, *, cut: bool
+) -> None:
     """Raise LogError for too little usable flight.
 
     until: end of the part that is used, s of the log.
@@ -141,9 +143,9 @@ def _check_length(log: MotionLog, records: list[FlightRecord], min_seconds: floa
     """
     seconds = sum(record.seconds for record in records)
     if seconds < min_seconds:
-        vtol_note = "; flight on its lifting motors is cut" if cut else ""
+        vtol_note = "; flight on lifting motors is not used" if cut else ""
         until_note = f" before {until:g} s" if math.isfinite(until) else ""
-        message = f"{seconds:.0f} s of it{until_note} are flight on the wing that can be used{vtol_note}"
+        message = f"only {seconds:.0f} s{until_note} are usable flight on the wing{vtol_note}"
         allowed = f"at least {min_seconds:g} s are needed"
         if min_seconds == MIN_SECONDS:
             allowed += f" to identify an aircraft, and {MIN_CHECK_SECONDS:g} s to check one"
@@ -189,11 +191,11 @@ _SERIES = {
     "px4": {
         "inertial": "sensor_combined, the inertial sensors",
         "outputs": "actuator_servos and actuator_motors, nor actuator_controls_0: actuator_outputs do not state"
-        " what they move",
+        " which control an output moves",
         "attitude": "vehicle_attitude, the attitude",
         "velocity": "vehicle_local_position, the velocity",
         "height": "vehicle_global_position, the height",
-        "airspeed": "airspeed_validated of a sensor in use, the airspeed",
+        "airspeed": "airspeed_validated from a sensor in use, the airspeed",
         "wind": "wind, the wind",
     },
     "telemetry": {
@@ -212,7 +214,7 @@ _SERIES = {
         "velocity": "velocity_north and velocity_east, the velocity",
         "height": "altitude, the height",
         "airspeed": "airspeed",
-        "wind": "wind_north and wind_east, and too short a flight to estimate the wind",
+        "wind": "wind_north and wind_east, and no flight long enough to estimate the wind",
     },
 }
 
@@ -232,18 +234,20 @@ def _check_usable(log: MotionLog) -> None:
     if missing := [series_names[name] for samples, name in air_series if len(samples.time) < 2]:
         raise LogError(f"{log.source}: no {'; no '.join(missing)}", file=log.source)
     if np.ptp(log.airspeed.values) == 0.0:
-        message = f"{log.source}: the airspeed stays at {log.airspeed.values[0, 0]:.3g} m/s: expected that of a sensor"
+        message = (
+            f"{log.source}: the airspeed stays at {log.airspeed.values[0, 0]:.3g} m/s: expected a sensor's airspeed"
+        )
         raise LogError(message, file=log.source, field="airspeed")
     for number, function in _servo_functions(log).items():
         if function in _FLAPS:
             min_pulse, max_pulse = _pulse_range(log, number)
             if max_pulse - min_pulse > 20.0:
                 message = f"output {number} (SERVO{number}_FUNCTION {function}, {_FLAPS[function]}) moves in flight"
-                raise LogError(f"{log.source}: {message}, and no model is estimated for that", file=log.source)
+                raise LogError(f"{log.source}: {message}, but its effect is not modelled", file=log.source)
 
 
 def slowest_rows(log: MotionLog) -> float:
-    """Return the lower of the rates of inertial sensors and surface commands, rows per second."""
+    """Return the lower of two log rates, inertial sensors and surface commands, rows per second."""
     return min(log.inertial.rate, log.surface_commands.rate)
 
 
@@ -255,7 +259,7 @@ def recording_setting(log: MotionLog) -> str:
 
 
 def _recording_hint(log: MotionLog) -> str:
-    """Describe the setting that records the missing series, or the entries of a table of columns."""
+    """Return a hint for a log without a required series: the setting that records the series."""
     if log.program_kind == "columns":
         return "expected in [columns] of its table"
     if log.program_kind == "telemetry":
@@ -267,6 +271,7 @@ def _recording_hint(log: MotionLog) -> str:
 
 
 def _pulse_range(log: MotionLog, number: int) -> tuple[float, float]:
+    """Return the shortest and the longest pulse of an output in the log, us, or zeros without pulses."""
     pulses = log.outputs.values[:, number - 1]
     pulses = pulses[pulses > 0.0]
     return (float(pulses.min()), float(pulses.max())) if len(pulses) else (0.0, 0.0)
@@ -283,6 +288,7 @@ def _servo_functions(log: MotionLog) -> dict[int, int]:
 
 
 def _first_output(log: MotionLog, function: int) -> int:
+    """Return the number of the first output with a SERVOn_FUNCTION, or 0 without one."""
     return next((number for number, output_function in _servo_functions(log).items() if output_function == function), 0)
 
 
@@ -298,7 +304,7 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
     for number, kind in functions.items():
         if kind in _MIXED_FUNCTIONS:
             message = f"output {number} (SERVO{number}_FUNCTION {kind}) is one half of {_MIXED_FUNCTIONS[kind]}"
-            raise LogError(f"{log.source}: {message}: its mix is not modelled", file=log.source)
+            raise LogError(f"{log.source}: {message}: this mix is not modelled", file=log.source)
     has_elevons = [kind in functions.values() for kind in (_ELEVON_LEFT, _ELEVON_RIGHT)]
     if any(has_elevons):
         _check_flying_wing_base(log, aircraft)
@@ -324,19 +330,20 @@ def log_outputs(log: MotionLog, aircraft: Aircraft) -> dict[str, ServoOutput]:
         outputs["throttle"] = ServoOutput(number, (min_pulse, max_pulse), (0.0, 1.0))
     for name in ("throttle",) if LEFT in outputs else ("elevator", "aileron", "throttle"):
         if name not in outputs:
-            raise LogError(f"{log.source}: no SERVOn_FUNCTION is the {name}'s", file=log.source)
+            raise LogError(f"{log.source}: no output has the SERVOn_FUNCTION of the {name}", file=log.source)
     return outputs
 
 
 def _check_flying_wing_base(log: MotionLog, aircraft: Aircraft) -> None:
+    """Raise LogError if the base of an aircraft with elevons is not a flying wing."""
     if not is_flying_wing(aircraft):
-        advice = "expected a flying wing as base: x8, zagi, or one of planfly aircraft --new FOLDER --layout wing"
-        message = f"flown with elevons, and the base {aircraft.name} has a tail: {advice}"
+        advice = "choose a flying wing as base: x8, zagi, or one made by planfly aircraft --new FOLDER --layout wing"
+        message = f"flown with elevons, but the base {aircraft.name} has a tail: {advice}"
         raise LogError(f"{log.source}: {message}", file=log.source)
 
 
 def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, float]:
-    """Return the minimum, trim and maximum pulse of an output, us, and its sign."""
+    """Return the minimum, trim and maximum pulse of an output, us, and its sign: -1 if the output is reversed."""
     value = log.parameters.get
     min_pulse, max_pulse = value(f"SERVO{number}_MIN", 1100.0), value(f"SERVO{number}_MAX", 1900.0)
     trim_pulse = min(max(value(f"SERVO{number}_TRIM", 1500.0), min_pulse + 1.0), max_pulse - 1.0)
@@ -344,13 +351,14 @@ def _pulse_travel(log: MotionLog, number: int) -> tuple[float, float, float, flo
 
 
 def _time_grid(log: MotionLog) -> Floats:
-    """Return the time grid over the span that all series cover."""
+    """Return times at `GRID_HZ` over the period that all series cover, s, (n,)."""
     series = (log.inertial, log.surface_commands, log.attitude, log.velocity, log.height, log.airspeed, log.wind)
     start_time, end_time = max(samples.time[0] for samples in series), min(samples.time[-1] for samples in series)
     return np.arange(start_time, end_time, 1.0 / GRID_HZ)
 
 
 def _interpolate(samples: Samples, grid: Floats) -> Floats:
+    """Interpolate each column linearly at the times of the grid, (n, columns)."""
     return np.column_stack([np.interp(grid, samples.time, column) for column in samples.values.T])
 
 
@@ -366,6 +374,7 @@ def _airspeed_ratio(amsl: Floats) -> Floats:
 
 
 def _has_current(log: MotionLog) -> bool:
+    """Return True if the log has battery samples and the current ever exceeds 0.5 A."""
     return len(log.battery.time) > 10 and bool(np.any(log.battery.values[:, 1] > 0.5))
 
 
@@ -396,12 +405,13 @@ def _usable_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, puls
         for k in np.flatnonzero(steps > max_gap):
             is_flying &= ~((grid > samples.time[k]) & (grid < samples.time[k + 1]))
     is_usable = is_flying.copy()
-    for begin, end in _find_stretches(is_flying, 0.0):
+    for begin, end in _find_segments(is_flying, 0.0):
         is_usable[begin : min(end, begin + round(_SETTLING_TIME_S * GRID_HZ))] = False
     return is_usable
 
 
-def _find_stretches(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:
+def _find_segments(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:
+    """Return first row and end row of each run of True of at least a duration, s."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    pairs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
-    return [(begin, end) for begin, end in pairs if end - begin >= min_duration * GRID_HZ]
+    runs = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [(begin, end) for begin, end in runs if end - begin >= min_duration * GRID_HZ]

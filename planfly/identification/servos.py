@@ -35,7 +35,7 @@ class ServoOutput:
 
 
 def read_servos(file: Path) -> Mapping[str, ServoOutput]:
-    """Read the servo outputs of a file, by control (elevator, aileron, rudder, throttle).
+    """Read a file of servo outputs, and return the output of each control (elevator, aileron, rudder, throttle).
 
     Raises FlightError for an invalid file.
 

@@ -38,7 +38,7 @@ Interval = tuple[float, float, float]
 
 
 def wide_numbers(sink: Interval, power: Interval, *, with_current: bool) -> tuple[WideNumber, ...]:
-    """Return the sink and the power, each if its interval (lower end, estimate, upper end) is wide.
+    """Return those of the two quantities, sink rate and power, that the logs determine only within a wide interval.
 
     with_current: True if the battery's current was logged; without it the propeller power is unknown.
 

@@ -15,7 +15,7 @@ from planfly.runtime.process_setup import prepare_process, with_large_stack
 
 
 def answer_requests() -> int:
-    """Process one unit after another until standard input ends."""
+    """Compile the units named on standard input, one after another, until the input ends."""
     # Ctrl-C reaches all processes of a terminal: this process ends with the process that started it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     requested: queue.Queue[str] = queue.Queue()
@@ -35,12 +35,14 @@ def answer_requests() -> int:
 
 
 def _queue_requests(requested: queue.Queue[str]) -> None:
+    """Queue the lines of standard input; end the process when the input ends."""
     for line in sys.stdin:
         requested.put(line.strip())
     os._exit(0)
 
 
 def _report(line: str) -> None:
+    """Print a line for the process that started this one."""
     print(line, flush=True)
 
 

@@ -73,15 +73,18 @@ MISSION_TEXT = """QGC WPL 110
 
 
 def _make_scenario() -> Scenario:
+    """Return a small scenario whose only purpose is to compile kernels."""
     return from_spec(tomllib.loads(SCENARIO_TEXT), "field")
 
 
 def _make_world() -> tuple[Scenario, Airframe]:
+    """Return the small scenario and its airframe."""
     scenario = _make_scenario()
     return scenario, load_airframe(scenario)
 
 
 def _make_problem() -> None:
+    """Compile the kernels that prepare a planning problem."""
     scenario = _make_scenario()
     aircraft, _ = find_airframe(scenario)
     limits = make_limits(
@@ -91,19 +94,23 @@ def _make_problem() -> None:
 
 
 def _compute_tracking_error() -> None:
+    """Compile the kernels of ArduPlane's tracking error."""
     tracking_error(ArduPilotParameters.defaults(), load_aircraft("aerosonde").airspeed, "gnss")
 
 
 def _rank_scores() -> None:
+    """Compile the kernels that rank the scores of paths."""
     best_first(np.zeros((SAMPLE_COUNT, SCORE_COLUMNS)))
 
 
 def _plan_part(part: str) -> None:
+    """Compile the kernels of one part of the planner."""
     scenario, airframe = _make_world()
     call_kernels(part, scenario, airframe.limits)
 
 
 def _fly_mission() -> None:
+    """Compile the kernels that fly, judge and record a mission."""
     scenario, airframe = _make_world()
     setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     flight = fly_and_judge(setup, airframe, None)
@@ -114,6 +121,7 @@ def _fly_mission() -> None:
 
 
 def _judge_glides() -> None:
+    """Compile the kernels that judge returns and glides."""
     scenario, airframe = _make_world()
     setup = make_setup(scenario, airframe, parse_mission(MISSION_TEXT, "field.waypoints"), 1)
     return_summary(setup, None).data_for_pictures()
@@ -131,7 +139,7 @@ UNITS: dict[str, Callable[[], None]] = {
 
 
 def run_unit(unit: str, report: Callable[[str], None]) -> None:
-    """Run a unit of work; report ``ready KERNEL`` for each of its kernels as soon as the next kernel is compiled.
+    """Run a unit, which compiles its kernels; report ``ready KERNEL`` for each kernel that has been compiled.
 
     Raises KeyError for an unknown unit.
     """
@@ -148,7 +156,7 @@ def run_unit(unit: str, report: Callable[[str], None]) -> None:
 
 
 def is_ready(kernel: str) -> bool:
-    """Return True if a kernel, "module.name", has been compiled, or loaded from the cache, in this process.
+    """Return True if a kernel has been compiled, or loaded from the cache, in this process.  kernel: "module.name".
 
     >>> is_ready("world.terrain.steepest_slopes") in (True, False)
     True

@@ -50,7 +50,7 @@ from logs.verdict.verdict import Verdict
 from logs.verdict.wording import deciding_text, place_text
 from planfly.flight_options import MissionOptions, load_scenario_with_options
 from planfly.named_fences import read_named_fences
-from planfly.workflow.airframe import Airframe, airframe_of, choose_seed, load_airframe
+from planfly.workflow.airframe import Airframe, airframe_for_setup, choose_seed, load_airframe
 from planfly.workflow.open_flight import make_setup, open_flight
 from planfly.workflow.reference_flights import judge_with_reference_flights
 from world.arrays import Floats
@@ -93,10 +93,13 @@ class ServedScenario:
 
 
 def load_served_scenario(options: ServeOptions) -> ServedScenario:
-    """Load the scenario and the mission that the options name.  Raises PlanflyError for bad input."""
+    """Load the scenario in which a vehicle is served, and its first mission if the options name one.
+
+    Raises PlanflyError for bad input.
+    """
     if options.mission:
         setup = open_flight(options.mission, options.flight_options)
-        return ServedScenario(setup.scenario, airframe_of(setup), setup.seed, setup.mission)
+        return ServedScenario(setup.scenario, airframe_for_setup(setup), setup.seed, setup.mission)
     scenario_name = options.flight_options.get("scenario")
     if scenario_name is None:
         allowed = "expected a mission, or a scenario in which to wait for an upload: `scenario` NAME"
@@ -120,7 +123,7 @@ def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float])
 
 
 def fly_process(connection: Connection, options: ServeOptions) -> None:
-    """Run the process that flies."""
+    """Fly missions on request until the connection closes; the main function of a flight process."""
     in_service = threading.Event()
     end_with_parent(in_service)
     factory = ServedFlights(options)
@@ -148,7 +151,7 @@ class ServedFlights:
         self.speed = options.speed
 
     def warm_up(self) -> None:
-        """Fly and judge half a second, so that no station has to wait for compilers later."""
+        """Fly and judge half a second, so that all kernels are compiled before a station sends a mission."""
         scenario = self._served.scenario
         points = np.linspace(scenario.start, scenario.destination, 3)
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
@@ -172,7 +175,11 @@ class ServedFlights:
             judge_flight(setup, as_track(rows), "warm")
 
     def prepare(self, request: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
-        """Judge the geometry of a mission, and check that the flight can be started."""
+        """Judge the geometry of a mission, and check that its flight can start.
+
+        Returns the prepared flight and the answer for the vehicle; None and an answer with the reason for a mission
+        that cannot be flown.
+        """
         served_scenario = self._served
         try:
             if request.parameters != self._parameters:
@@ -198,7 +205,11 @@ class ServedFlights:
         return PreparedFlight(setup, flight.map), mission_judged
 
     def divert(self, request: DivertFlight, position: Floats) -> PreparedFlight:
-        """Prepare the flight that a station requests at the current position; a loiter lasts `LOITER_DURATION_S`."""
+        """Prepare a flight in another mode, which starts at the current position.
+
+        position: east, north and altitude, m, (3,).
+        The mission is flown from its first item in AUTO; RTL returns home; other modes loiter for `LOITER_DURATION_S`.
+        """
         served_scenario = self._served
         lat, lon = (
             round_to_grid(float(value)) for value in to_geo(served_scenario.scenario.origin, position[0], position[1])
@@ -255,13 +266,13 @@ class ServedLog:
 
     def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft, mode: int) -> None:
         self._path, self._setup, self._aircraft = path, setup, aircraft
-        self._level = "flown" if mode == AUTO else f"flown in {MODE_NAMES[mode]}"
+        self._verdict_basis = "flown" if mode == AUTO else f"flown in {MODE_NAMES[mode]}"
         self._recorder = Recorder(path, setup)
-        self._blocks: list[Track] = []
+        self._track_blocks: list[Track] = []
 
     def write(self, block: Track) -> None:
         """Append rows, and flush them to the file."""
-        self._blocks.append(block)
+        self._track_blocks.append(block)
         self._recorder.write(block)
         self._recorder.flush()
 
@@ -272,7 +283,7 @@ class ServedLog:
         not judged; `planfly check` can judge it.
         should_abort: see `planfly.workflow.reference_flights.judge_with_reference_flights`.
         """
-        track = join_tracks(self._blocks)
+        track = join_tracks(self._track_blocks)
         was_abandoned = end_reason.startswith((DIVERTED_TEXT, STILL_LOITERING_TEXT))
         end_time = float(track.time[-1]) if len(track) else 0.0
         if was_abandoned and end_time < 1.0:
@@ -294,7 +305,9 @@ class ServedLog:
             verdict, reference = judge_flight(self._setup, track, end_reason), None
         self._recorder.finish(end_reason, verdict, reference)
         texts = (
-            unfinished_texts(self._level, end_reason, verdict) if was_abandoned else verdict_texts(self._level, verdict)
+            unfinished_texts(self._verdict_basis, end_reason, verdict)
+            if was_abandoned
+            else verdict_texts(self._verdict_basis, verdict)
         )
         return FlightJudged(verdict.flyable, (*texts, StatusText(f"log {self._path}", INFO)))
 
@@ -316,30 +329,34 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
 _RULES_OF_UNFINISHED_PATHS = ("completion", "loiter", "waypoint", "turn", "survey")
 
 
-def unfinished_texts(level: str, end_reason: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Return texts on the flown part of a path that the aircraft left early."""
+def unfinished_texts(basis: str, end_reason: str, verdict: Verdict) -> tuple[StatusText, ...]:
+    """Return texts with the verdict on the flown part of a path that the aircraft left early.
+
+    basis: basis of the verdict, such as "flown in GUIDED".
+    """
     failed_findings = [
         finding
         for finding in verdict.findings
         if finding.ok is False and finding.rule not in _RULES_OF_UNFINISHED_PATHS
     ]
     count_text = "1 finding" if len(failed_findings) == 1 else f"{len(failed_findings) or 'no'} findings"
-    first_text = StatusText(f"verdict ({level}): {end_reason}; {count_text} failed until then", INFO)
+    first_text = StatusText(f"verdict ({basis}): {end_reason}; {count_text} failed until then", INFO)
     return (first_text, *_finding_texts(failed_findings))
 
 
-def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
-    """Describe a verdict in a few lines, the worst finding first."""
+def verdict_texts(basis: str, verdict: Verdict) -> tuple[StatusText, ...]:
+    """Return texts that describe a verdict, the worst finding first.  basis: basis of the verdict, such as "flown"."""
     failed_findings = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
-        return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
+        return (StatusText(f"verdict ({basis}): FLYABLE", INFO),)
     if verdict.undecided:
-        return (StatusText(f"verdict ({level}): NOT JUDGED IN FULL: {verdict.unjudged}", WARNING),)
+        return (StatusText(f"verdict ({basis}): NOT JUDGED IN FULL: {verdict.unjudged}", WARNING),)
     deciding_texts = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
-    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding_texts, *_finding_texts(failed_findings))
+    return (StatusText(f"verdict ({basis}): NOT FLYABLE", WARNING), *deciding_texts, *_finding_texts(failed_findings))
 
 
 def _finding_texts(findings: list[Finding]) -> list[StatusText]:
+    """Return a text for each of the first findings, and the number of the others."""
     texts = [
         StatusText(f"{_finding_heading(finding)}: {finding.reason}", WARNING)
         for finding in findings[:_MAX_TEXTS_PER_VERDICT]

@@ -30,7 +30,7 @@ def serve_vehicle(
     stop: Callable[[], bool],
     on_message: Callable[[str], None],
 ) -> None:
-    """Serve the vehicle until ``stop`` returns True.  on_message: called with each message, in one line."""
+    """Serve a MAVLink vehicle until `stop` returns True.  on_message: called with one line for each event."""
     with contextlib.ExitStack() as exit_stack:
         link = Link(access)
         exit_stack.callback(link.close)
@@ -55,6 +55,7 @@ def serve_vehicle(
 def _make_vehicle(
     link: Link, pool: "_FlightPool", served_scenario: ServedScenario, speed: float, on_message: Callable[[str], None]
 ) -> Vehicle:
+    """Return the vehicle that stations see, without a mission.  speed: multiple of real time."""
     airframe = served_scenario.airframe
     autopilot_settings = airframe.autopilot.parameters
     parameters = vehicle_parameters(
@@ -87,7 +88,7 @@ class _FlightPool:
         self._children: list[multiprocessing.process.BaseProcess] = []
 
     def spawn(self) -> Connection:
-        """Start a process, and return the vehicle's end of its pipe."""
+        """Start a flight process, and return the vehicle's end of the pipe to it."""
         for child in self._children:
             child.join(timeout=0.0)
         self._children = [child for child in self._children if child.is_alive()]
@@ -105,7 +106,10 @@ class _FlightPool:
 
 
 def standby_at_start(scenario: Scenario) -> Standby:
-    """Return state and home of a vehicle without a mission: at the start, on the course to the destination."""
+    """Return state and home of a vehicle without a mission.
+
+    The vehicle is at the scenario's start, with the course to the destination; home is on the ground there.
+    """
     east, north, amsl = (float(value) for value in scenario.start)
     lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))
     terrain_altitude = math.nan if scenario.terrain is None else float(scenario.terrain.height(east, north))

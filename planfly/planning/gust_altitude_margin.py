@@ -79,9 +79,9 @@ class Shortfall(NamedTuple):
 
 
 def ensure_altitude_margin(plan: Plan, airframe: Airframe, search: Search | None = None) -> Plan:
-    """Return the plan if each leg has a margin for a one-in-a-hundred gust, otherwise another plan.
+    """Return a plan whose legs have an altitude margin for a one-in-a-hundred gust: the given plan or another one.
 
-    If no other plan is found, the given plan is returned as not safe, with the reason in its certificate.
+    If no such plan is found, the given plan is returned as not safe, with the reason in its certificate.
 
     search: function that plans the same scenario within other limits; None to search for no other path.
 
@@ -119,7 +119,10 @@ def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the relevant kinds of gusts, each with its displacement, m, as a function of the unused rate, m/s."""
+    """Return the kinds of gusts that matter, each with a function for the altitude displacement, m.
+
+    The function takes the climb or sink rate that the aircraft does not use, m/s, and the turbulence.
+    """
     deviations = autopilot.deviations
     displacements: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", deviations.gust_sink)]
     # Above a path there are no hazards other than a maximum height or a zone.
@@ -129,16 +132,17 @@ def _gust_displacements(
 
 
 def _with_problems(plan: Plan, problems: list[str]) -> Plan:
+    """Return a plan with problems added to its certificate, which make the plan not safe."""
     certificate = plan.certificate
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, *problems)))
 
 
 def _climb_problem(plan: Plan, airframe: Airframe) -> str:
-    """Return the reason why no margin is enough for downdrafts at the plan's altitude, or "" if a margin is enough.
+    """Return a problem if the aircraft climbs too slowly for any margin against downdrafts, otherwise "".
 
-    With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, several downdrafts follow before the aircraft has climbed
-    back.  Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8,
-    none did.
+    With a climb rate of less than `MIN_SPARE_RATE_SIGMAS`, more downdrafts arrive before the aircraft has climbed back.
+    Of 24 flights of a Zagi with a climb rate of 0.57 standard deviations, 3 lost more than 47 m; of 24 with 0.8, none
+    did.
     """
     amsl, turbulence = float(plan.waypoints[:, 2].max()), plan.scenario.wind.turbulence
     climb_rate, min_climb_rate = (
@@ -148,14 +152,17 @@ def _climb_problem(plan: Plan, airframe: Airframe) -> str:
     if climb_rate >= min_climb_rate or not airframe.autopilot.deviations.gust_sink(climb_rate, turbulence):
         return ""
     return (
-        f"climbs {climb_rate:.2f} m/s at {amsl:.0f} m at most; with less than {min_climb_rate:.2f} m/s downdrafts of"
-        f" {turbulence} turbulence may push it down further than any height margin covers; less turbulence, a lower"
-        " mission or an aircraft that climbs better would help"
+        f"the aircraft climbs at most {climb_rate:.2f} m/s at {amsl:.0f} m; with less than {min_climb_rate:.2f} m/s,"
+        f" downdrafts of {turbulence} turbulence may push it down further than any height margin covers; less"
+        " turbulence, a lower mission or an aircraft that climbs better would help"
     )
 
 
 def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfalls: list[Shortfall]) -> Plan | None:
-    """Search for a plan with the margin that gusts need; return None if there is none."""
+    """Search for a plan with the altitude margin that gusts need; return None if none is found.
+
+    shortfalls: shortfalls of the given plan.
+    """
     fractions = [_UNUSED_CLIMB_FRACTION]
     if _exceeds_height_limit(plan, limits_in_gusts(plan, airframe).reserve_height):
         fractions.append(_UNUSED_CLIMB_FRACTION_BELOW_A_LIMIT)
@@ -182,7 +189,7 @@ def _search_other_plan(plan: Plan, airframe: Airframe, search: Search, shortfall
 
 
 def _with_margin_at_threats(limits: Limits) -> Limits:
-    """Return limits that also require the margin at missiles and zones."""
+    """Return limits that require the altitude margin also above and below missiles and zones."""
     return replace(limits, reserve_threats=max(limits.reserve_height, limits.reserve_above))
 
 
@@ -257,7 +264,11 @@ class _Parts(NamedTuple):
 
 
 def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
-    """Find the deepest displacement by gusts into each kind of hazard."""
+    """Find for each kind of hazard the place where a gust displaces the aircraft deepest into it.
+
+    Hazards are the required clearance, the maximum height, missiles and zones; only displacements into them are
+    returned.
+    """
     limits, autopilot, turbulence = airframe.limits.with_margin(), airframe.autopilot, plan.scenario.wind.turbulence
     problem = make_problem(plan.scenario, limits)
     rates = np.array([limits.rates(float(amsl)) for amsl in plan.waypoints[:, 2]])
@@ -287,7 +298,7 @@ def find_shortfalls(plan: Plan, airframe: Airframe) -> list[Shortfall]:
 
 
 def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Floats, end_margins: Floats) -> _Parts:
-    """Cut the legs of a path near its ends into parts, but not within a turn.
+    """Cut the legs near the ends of a path into short parts, except within turns, because the margin grows there.
 
     waypoints: (w, 3), m.
     margins: altitude that gusts may cost or add on each leg, (w - 1,), m.
@@ -321,7 +332,7 @@ def _cut_into_parts(problem: Problem, waypoints: Floats, gust: Gust, margins: Fl
 
 
 def _heights_at_ends(problem: Problem, parts: _Parts) -> list[tuple[str, float, int]]:
-    """Return the name, the height above ground, m, and the index of the points at both ends."""
+    """Return for both ends of a path the name, the height above ground (m) and the index of the point."""
     terrain = problem.scenario.terrain
     if terrain is None:  # pragma: no cover - a problem has one
         return []
@@ -423,5 +434,5 @@ def _shortfall_text(shortfall: Shortfall, plan: Plan, airframe: Airframe) -> str
         remedies += " or a higher limit on its height"
     else:
         remedies = f"less turbulence, or an aircraft that {ability_text},"
-    effect_text = f"in {plan.scenario.wind.turbulence} turbulence {shortfall.gust} may take it"
+    effect_text = f"in {plan.scenario.wind.turbulence} turbulence {shortfall.gust} may take the aircraft"
     return f"{effect_text} {shortfall.depth:.0f} m {shortfall.hazard} {shortfall.place}; {remedies} would help"

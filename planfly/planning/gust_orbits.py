@@ -35,7 +35,9 @@ def limit_waypoint_orbits(
     search: Callable[[Scenario], Plan] | None = None,
     search_limits: Limits | None = None,
 ) -> Plan:
-    """Return the plan if it has few enough waypoints for its turbulence, otherwise a plan with fewer waypoints.
+    """Return a plan with so few waypoints that gusts rarely make the aircraft orbit at one of them.
+
+    The given plan is returned if it has few enough waypoints, otherwise a plan with fewer waypoints.
 
     If no plan with fewer waypoints is found, the given plan is returned as not safe, with the reason in its
     certificate.
@@ -79,6 +81,7 @@ def limit_waypoint_orbits(
 
 
 def _with_problem(plan: Plan, problem: str) -> Plan:
+    """Return a plan with a problem added to its certificate, which makes the plan not safe."""
     certificate = plan.certificate
     return replace(plan, certificate=replace(certificate, problems=(*certificate.problems, problem)))
 
@@ -108,7 +111,7 @@ def _corner_excursions(plan: Plan, airframe: Airframe) -> list[float]:
 
 
 def _corridor_problem(plan: Plan, airframe: Airframe) -> str:
-    """Return a line on the corner at which the aircraft leaves the corridor."""
+    """Describe the corner at which the aircraft leaves the corridor most."""
     excursions = _corner_excursions(plan, airframe)
     max_excursion = max(excursions)
     return (
@@ -152,7 +155,7 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
 
 
 def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
-    """Return a line on the orbits that make a plan unsafe in its turbulence, and on the remedies."""
+    """Describe the orbits that make a plan unsafe in its turbulence, and a remedy."""
     count, name = len(plan.waypoints) - 2, autopilot.deviations.altitude_parameter
     orbits = expected_orbits(plan, autopilot, limits)
     radius = first_that_passes(
@@ -163,7 +166,7 @@ def _orbit_problem(plan: Plan, autopilot: Autopilot, limits: Limits) -> str:
     )
     remedy = "Less turbulence" if radius is None else f"{name} of {radius} m"
     return (
-        f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles where gusts push it off a waypoint's"
-        f" height, at one of {count} in {min(orbits, 1.0):.0%} of flights; up to {MAX_EXPECTED_ORBITS:.0%} count"
-        f" as safe. {remedy} would help"
+        f"in {plan.scenario.wind.turbulence} turbulence {autopilot.title} circles at a waypoint if gusts push it off"
+        f" the waypoint's altitude: at one of {count} waypoints in {min(orbits, 1.0):.0%} of flights, and at most"
+        f" {MAX_EXPECTED_ORBITS:.0%} is accepted as safe. {remedy} would help"
     )

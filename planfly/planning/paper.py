@@ -106,10 +106,10 @@ def problem_name(threats: int) -> str:
 
 
 def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """Return 1 minus the product of (1 - p) over all points and the units in reach; p = (scale / d)^4, at most 1.
+    """Return the probability of a kill or detection on a path, from independent chances at points of its legs.
 
-    The points are the dividing points of the legs.  The sums of the paper (eq. 9, 10) have no upper bound, but this
-    probability has one.
+    The chance at distance d from a unit in reach is (scale / d)^4, at most 1, at each of six points of a leg.  The
+    paper's sums (eq. 9, 10) over the same points have no upper bound.
 
     waypoints: (w, 3), m.
     kind: "kill" or "detection".
@@ -128,7 +128,11 @@ def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> fl
 
 
 def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
-    """Plan once, and return the values for tables and figures.  algorithm: name of a planner, or `STRIP_ALGORITHM`."""
+    """Plan a problem of the paper once, and return the values for tables and figures.
+
+    threats: number of threats, which names the problem.
+    algorithm: name of a planner, or `STRIP_ALGORITHM`.
+    """
     scenario = load_scenario(problem_name(threats))
     searched_algorithm = algorithm
     if algorithm == STRIP_ALGORITHM:
@@ -159,7 +163,9 @@ def plan_once(threats: int, algorithm: str, seed: int) -> SeededPlan:
 def plan_section(
     problems: Sequence[int], seeds: int, algorithm: str, jobs: int | None = None, advance: Advance | None = None
 ) -> list[SeededPlan]:
-    """Make all plans, in the order of problem, algorithm and seed 1..seeds for any number of processes.
+    """Make the plans of section V of the paper, in the order of problem, algorithm and seed 1..seeds.
+
+    The order does not depend on the number of processes.
 
     algorithm: algorithm in place of the paper's; the strip and the baselines are always planned, too.
     jobs: number of processes; None for one for each core that this process may use.
@@ -214,11 +220,12 @@ def _plan_in_processes(tasks: list[tuple[int, str, int]], count: int) -> Iterato
 
 
 def _plan_task(task: tuple[int, str, int]) -> SeededPlan:
+    """Plan once in a worker process.  task: number of threats, algorithm and seed."""
     return plan_once(*task)
 
 
 def make_table(plans: Sequence[SeededPlan]) -> list[TableRow]:
-    """Make the table, with one row for each problem and algorithm, in the order of planning."""
+    """Make the table of the paper, with one row for each problem and algorithm, in the order of planning."""
     groups: dict[tuple[int, str], list[SeededPlan]] = {}
     for seeded_plan in plans:
         groups.setdefault((seeded_plan.threats, seeded_plan.algorithm), []).append(seeded_plan)
@@ -226,6 +233,7 @@ def make_table(plans: Sequence[SeededPlan]) -> list[TableRow]:
 
 
 def _table_row(group: list[SeededPlan]) -> TableRow:
+    """Summarise the plans of one problem and algorithm with all seeds."""
     lengths = [seeded_plan.objectives.length_ratio for seeded_plan in group if seeded_plan.safe]
     kills = _seed_values(group, lambda seeded_plan: seeded_plan.objectives.kill_exposure)
     return TableRow(
@@ -247,6 +255,7 @@ def _table_row(group: list[SeededPlan]) -> TableRow:
 
 
 def _seed_values(group: list[SeededPlan], value: Callable[[SeededPlan], float]) -> Floats:
+    """Return a value of each plan, (n,).  value: function that computes it."""
     return np.array([value(seeded_plan) for seeded_plan in group])
 
 
@@ -260,7 +269,7 @@ TABLE_FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.p
 
 
 def file_names(problems: Sequence[int]) -> list[str]:
-    """Return the names of all files in a folder for these problems."""
+    """Return the names of all files that a run writes for some problems.  problems: numbers of threats."""
     pictures = [f"{kind}-{threats:02d}.png" for threats in problems for kind in ("paths", "encodings")]
     return [*TABLE_FILES, *pictures]
 
@@ -280,19 +289,20 @@ def table_text(rows: Sequence[TableRow]) -> str:
             f"{row.detection_median:>10.3g}  {row.seconds_median:>6.2f}"
         )
     lines += [
-        "safe: no violation and no kill exposure on the paper's six points a leg; certified: safe along the "
+        "safe: no violation and no kill exposure at the paper's six points of each leg; certified: safe along the "
         "whole path.",
-        "PLR: of the safe runs; PKill and PRD: the paper's sums, of all runs; CPU s: median of one run.",
+        "PLR: over the safe runs; PKill and PRD: the paper's sums, over all runs; CPU s: median time of a run.",
     ]
     return "\n".join(lines)
 
 
 def _number_text(value: float | None, digits: int) -> str:
+    """Return a number with a number of decimals, or "-" for None."""
     return "-" if value is None else f"{value:.{digits}f}"
 
 
 def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
-    """Write table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv."""
+    """Write the tables of a run: table.csv, runs.csv and runs.json, which depend only on the seeds, and times.csv."""
     columns = [field.name for field in fields(TableRow) if field.name != "seconds_median"]
     write_atomically(
         folder / "table.csv", _csv_text(columns, ([getattr(row, name) for name in columns] for row in rows))
@@ -319,6 +329,7 @@ def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededP
 
 
 def _plan_row(seeded_plan: SeededPlan) -> dict[str, Any]:
+    """Return the values of a plan, keyed by column."""
     row: dict[str, Any] = {
         "threats": seeded_plan.threats,
         "algorithm": seeded_plan.algorithm,
@@ -350,6 +361,7 @@ _PLAN_COLUMNS = [
 
 
 def _csv_text(columns: Sequence[str], rows: Any) -> str:
+    """Return CSV text with a header."""
     buffer = io.StringIO()
     writer = csv.writer(buffer, lineterminator="\n")
     writer.writerow(columns)

@@ -20,11 +20,11 @@ def make_pareto_plans(
     stop: StopCondition | None = None,
     continues: bool = False,
 ) -> Front:
-    """Return up to `count` plans of a front, each safe by all checks of `planfly.workflow.make_plan.make_plan`.
+    """Plan a Pareto front of at most `count` plans, each safe by all checks of `make_plan`.
 
-    The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are unsafe after
-    their completion are omitted.  If gusts make the autopilot orbit, alternatives have no more waypoints than gusts
-    allow.
+    The default plan is made by `make_plan`; if it is not safe, the front is empty.  Alternatives that are unsafe with
+    their departure and approach are omitted.  If gusts make the autopilot orbit, alternatives have no more waypoints
+    than gusts allow.
     stop, continues: see `make_plan`.
     """
     default_plan = make_plan(scenario, airframe, seed, advance=advance, stop=stop, continues=continues)

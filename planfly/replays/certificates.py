@@ -20,7 +20,7 @@ class Certificate(NamedTuple):
 
 
 def temporary_certificate() -> Certificate:
-    """Return a certificate for ``localhost`` with a new key (elliptic curve P-256), different in each call.
+    """Return a new self-signed certificate for ``localhost`` with a new private key (elliptic curve P-256).
 
     >>> one, other = temporary_certificate(), temporary_certificate()
     >>> one.certificate.splitlines()[0], one.key == other.key

@@ -42,7 +42,7 @@ def play_to_foxglove(
     should_stop: ShouldStop,
     on_message: OnMessage,
 ) -> None:
-    """Play a log's messages from ``start`` to ``end`` (s) to the clients of a Foxglove server.
+    """Start a Foxglove server, and play the messages of a log from `start` to `end` (s) to its clients.
 
     allowed: origins of web pages that are accepted in addition to `planfly.replays.origin_gate.VIEWERS`.
 
@@ -65,7 +65,10 @@ def play_to_foxglove(
 
 
 def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: OriginGate) -> Any:
-    """Start the server behind the gate; no page can bypass the gate, because no browser trusts the certificate."""
+    """Start the Foxglove server behind a gate that checks the origin of each page.
+
+    No page can bypass the gate, because no browser trusts the certificate of the server.
+    """
     certificate = temporary_certificate()
     try:
         server = foxglove.start_server(
@@ -85,10 +88,13 @@ def _start_server(foxglove: Any, name: str, broadcast: "_Broadcast", gate: Origi
 
 
 def _wait_for_listener(broadcast: "_Broadcast", timeout: float | None, should_stop: ShouldStop) -> None:
+    """Wait for the first subscriber.  Raises FlightError after `timeout` seconds; None waits without limit."""
     clock = RunningClock()
     while not broadcast.listeners and not should_stop():
         if timeout is not None and clock() > timeout:
-            raise FlightError.of_argument("foxglove", timeout, f"nobody has subscribed within {timeout:g} s", shown="")
+            raise FlightError.of_argument(
+                "foxglove", timeout, f"no viewer has subscribed within {timeout:g} s", shown=""
+            )
         time.sleep(_POLL_INTERVAL_S)
 
 
@@ -100,6 +106,10 @@ def _play_messages(
     speed: float,
     should_stop: ShouldStop,
 ) -> None:
+    """Send messages at their times until `end_ns` or until `should_stop` returns True.
+
+    speed: multiple of real time.
+    """
     playback_clock, first_time, latest_time = RunningClock(), None, 0
     for message in messages:
         if message.log_time > end_ns:
@@ -142,7 +152,7 @@ class _Broadcast:
         self._waiting: list[tuple[float, str]] = []
 
     def record_scenes_until(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
-        """Record the messages before ``start_ns`` as scenes, and return the rest."""
+        """Keep the newest scene of each topic before `start_ns`, and return the remaining messages."""
         for message in messages:
             if message.log_time >= start_ns:
                 return itertools.chain([message], messages)
@@ -171,6 +181,7 @@ class _Broadcast:
         ]
 
     def _record_scene(self, message: LogMessage) -> None:
+        """Keep a message if it contains a scene, for clients that subscribe later."""
         if message.channel.topic.startswith(("/scene/", "/points/")):
             self._scenes[message.channel.topic] = message
 

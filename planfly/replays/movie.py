@@ -61,6 +61,7 @@ def write_movie(
 
 
 def _draw_frames(film: MovieFrames) -> Iterator[Image.Image]:
+    """Yield the frames of a film as images, and report the progress."""
     with stage("drawing", "drawing frames") as advance:
         for number, frame in enumerate(film.frames(), 1):
             yield Image.fromarray(frame)
@@ -82,7 +83,7 @@ def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
 
 
 def _make_palette(frame: Image.Image) -> Image.Image:
-    """Return an image whose palette has the exact drawing colors, and blends of the frame's other colors.
+    """Return an image with a palette for all frames: the exact drawing colours, and the main other colours.
 
     If colors were chosen only by area, thin lines and small marks would get the colors of the ground.
     """
@@ -98,7 +99,7 @@ def _make_palette(frame: Image.Image) -> Image.Image:
 
 
 def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
-    """Return the frame in the colors of the palette, without transparent pixels."""
+    """Return a frame with its colours replaced by the nearest colours of a palette, without transparent pixels."""
     image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
     numbers = np.asarray(image)
     opaque = Image.fromarray(np.where(numbers == _TRANSPARENT, 0, numbers).astype(np.uint8))
@@ -107,7 +108,7 @@ def _apply_palette(frame: Image.Image, palette: Image.Image) -> Image.Image:
 
 
 def _encode_gif(film: MovieFrames) -> bytes:
-    """Encode all frames in the same colors, to prevent flicker; each frame contains only changed pixels."""
+    """Encode a film as GIF; all frames have the same colours, and each contains only the changed pixels."""
     images = _draw_frames(film)
     first_frame = next(images)
     palette = _make_palette(first_frame)
@@ -136,7 +137,7 @@ def _encode_gif(film: MovieFrames) -> bytes:
 
 
 def _find_ffmpeg(target: Path) -> str:
-    """Return the encoder: ffmpeg on the path, or from the extra.  Raises MissingExtraError without either."""
+    """Return the path of ffmpeg, installed or from the extra `films`.  Raises MissingExtraError without either."""
     program = shutil.which("ffmpeg")
     if program is not None:
         return program
@@ -147,7 +148,7 @@ def _find_ffmpeg(target: Path) -> str:
 
 
 def _encode_mp4(film: MovieFrames, program: str) -> bytes:
-    """Encode frames by ffmpeg, as raw pixels on its input.  Raises OSError with ffmpeg's last line if it fails."""
+    """Encode a film as MP4 with ffmpeg, which reads raw pixels.  Raises OSError with ffmpeg's last line if it fails."""
     frames = film.frames()
     first_frame = next(frames)
     height, width = first_frame.shape[:2]
@@ -190,5 +191,5 @@ def _encode_mp4(film: MovieFrames, program: str) -> bytes:
         messages.seek(0)
         lines = messages.read().decode("utf-8", "replace").strip().splitlines()
         if status or not out.exists():
-            raise OSError(errno.EIO, f"status {status}: {lines[-1] if lines else 'it says nothing'}", "ffmpeg")
+            raise OSError(errno.EIO, f"status {status}: {lines[-1] if lines else 'no message'}", "ffmpeg")
         return out.read_bytes()

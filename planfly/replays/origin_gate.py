@@ -38,8 +38,9 @@ _MAX_REPORTED_LENGTH = 80
 def refusal_reason(head: bytes, port: int, allowed: Collection[str]) -> str:
     r"""Return the reason why a WebSocket request is refused; "" if it is accepted.
 
-    head: first line and headers of the request.  port: port of arrival.
-    allowed: origins of pages; a program other than a browser states no origin, and is accepted.
+    head: first line and headers of the request.
+    port: port at which the request arrived.
+    allowed: accepted origins of web pages; a request without an origin is from a program, and is accepted.
 
     >>> page = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: https://example.com\r\n\r\n"
     >>> refusal_reason(page, 8765, VIEWERS), refusal_reason(page, 8765, ["https://example.com"])
@@ -66,9 +67,10 @@ class OriginGate:
     """Listener on a port of this machine that forwards accepted connections to a server behind it."""
 
     def __init__(self, port: int, allowed: Collection[str], on_refused: Callable[[str], None]) -> None:
-        """Take the port, 0 for any that is free.
+        """Open the port of the gate.
 
-        allowed: origins of pages that are accepted.
+        port: port number; 0 for any free port.
+        allowed: origins of web pages that are accepted.
         on_refused: called, from another thread, with each new `refusal_reason`.
         Raises OSError for a port in use.
         """
@@ -91,17 +93,19 @@ class OriginGate:
         self._thread.start()
 
     def close(self) -> None:
-        """Forward pending messages, and end.  The server behind has closed its connections before."""
+        """Forward pending messages, and close all connections; the server must be stopped before."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._closed.set)
             self._thread.join(2.0 * _CLOSE_TIMEOUT_S)
         self._socket.close()
 
     def _run_loop(self) -> None:
+        """Run the event loop in the gate's thread until the gate is closed."""
         with contextlib.closing(self._loop):
             self._loop.run_until_complete(self._serve_until_closed())
 
     async def _serve_until_closed(self) -> None:
+        """Accept connections until the gate is closed, then wait for open connections to end."""
         server = await asyncio.start_server(self._accept_connection, sock=self._socket, limit=_MAX_HEAD_BYTES)
         await self._closed.wait()
         server.close()
@@ -112,6 +116,7 @@ class OriginGate:
             await asyncio.gather(*open_connections, return_exceptions=True)
 
     def _accept_connection(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        """Serve a new connection, or close it if there are too many."""
         if len(self._connections) >= _MAX_CONNECTIONS:
             writer.close()
             return
@@ -120,7 +125,7 @@ class OriginGate:
         connection.add_done_callback(self._connections.discard)
 
     async def _serve_connection(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        """Read a request, and refuse it or forward everything, both ways."""
+        """Read a request; refuse it, or forward all data between the client and the server."""
         with contextlib.closing(writer), contextlib.suppress(OSError, asyncio.IncompleteReadError):
             try:
                 head = await asyncio.wait_for(reader.readuntil(b"\r\n\r\n"), _HEAD_TIMEOUT_S)
@@ -138,13 +143,14 @@ class OriginGate:
             await asyncio.gather(_forward_data(reader, server_writer), _forward_data(server_reader, writer))
 
     def _report_refusal(self, reason: str) -> None:
+        """Report a reason for a refusal once; after too many different reasons, report nothing."""
         if reason not in self._reported and len(self._reported) < _MAX_REPORTED:
             self._reported.add(reason)
             self._on_refused(reason)
 
 
 async def _forward_data(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Forward all data to the other end, and close it at the end of the data."""
+    """Forward data from a reader to a writer until the end, then close the writer."""
     with contextlib.closing(writer), contextlib.suppress(OSError):
         while piece := await reader.read(_PIECE_BYTES):
             writer.write(piece)

@@ -32,7 +32,11 @@ OnMessage = Callable[[str], None]
 def play_to_stations(
     log: FlightLog, access: Access, *, speed: float, wait: float, should_stop: ShouldStop, on_message: OnMessage
 ) -> None:
-    """Play a log to ground stations as a live flight.  Raises FlightError if none answers in ``wait`` s."""
+    """Play a log to ground stations as if the flight were live.
+
+    speed: multiple of real time.
+    wait: maximum time to wait for the first station, s; FlightError is raised if none answers.
+    """
     link = Link(access)
     snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
     track = log.track
@@ -77,7 +81,7 @@ class _Player:
         self._text_count = 0
 
     def announce(self, text: str) -> None:
-        """Send a text to the stations and to on_message."""
+        """Send a text to all stations, and report it to the caller."""
         self._on_message(text)
         self._text_count += 1
         for peer in self._link.peers.values():
@@ -91,13 +95,13 @@ class _Player:
             self.step(0.05)
 
     def continue_sending(self, seconds: float, should_stop: ShouldStop) -> None:
-        """Continue sending the last snapshot."""
+        """Send the last snapshot for a number of seconds."""
         end = self._link.clock() + seconds
         while self._link.clock() < end and not should_stop():
             self.step(0.02)
 
     def step(self, pause: float) -> None:
-        """Read messages of stations, send due messages, and pause, s."""
+        """Handle messages from the ground stations, send the messages that are due, and sleep for `pause` seconds."""
         now = self._link.clock()
         self._status.boot, self._status.wall = now - self._start_time, time.time()
         self._link.receive()

@@ -47,10 +47,10 @@ class NearestApproaches(NamedTuple):
 
 
 def fly_return(world: ReturnWorld, start: Record) -> tuple[float, float] | None:
-    """Fly a return in JSBSim, and return the minimum height above ground and distance outside a kill sphere, m.
+    """Simulate a return in JSBSim; return its minimum height above ground and minimum distance from kill spheres, m.
 
-    The flight has exact navigation and only the mean wind, as with the point mass.  Returns None for a return that
-    cannot be flown.
+    The navigation is exact, and the wind has no gusts, as in the simulation with a point mass.  Returns None for a
+    return that cannot be flown.
 
     start: a record of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
     """
@@ -80,7 +80,10 @@ def return_setup(
 
 
 def positions_from_start(track: Track, start: Record) -> Floats | None:
-    """Return the positions (t, 3) from the start of the return on, or None if the flight does not reach the start."""
+    """Return the positions of a flight from the start of the return to the end, (t, 3), m.
+
+    Returns None if the flight does not reach the start of the return.
+    """
     start_position = np.array([float(start["east"]), float(start["north"])])
     distances = np.hypot(*(track.position[: round(2.0 * LEAD_IN_LENGTH_M / 10.0 * 60.0), :2] - start_position).T)
     if not distances.size or float(distances.min()) > _MAX_START_DISTANCE_M:
@@ -90,7 +93,7 @@ def positions_from_start(track: Track, start: Record) -> Floats | None:
 
 
 def nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproaches:
-    """Find the nearest approaches of a path to ground and missiles.  position: path points, (t, 3), m."""
+    """Find the points of a path that are closest to the ground and to missiles.  positions: path points, (t, 3), m."""
     clearance, lowest_position = math.nan, (math.nan, math.nan, math.nan)
     if world.scenario.terrain is not None:
         heights = positions[:, 2] - world.scenario.terrain.height(positions[:, 0], positions[:, 1])
@@ -109,7 +112,7 @@ def nearest_approaches(world: ReturnWorld, positions: Floats) -> NearestApproach
 
 
 def _return_mission(world: ReturnWorld, start: Record, landing: LandingStart | None) -> Mission:
-    """Make a mission that passes the start of a return on its course and slope, and then returns to launch."""
+    """Make a mission that flies through the start of a return, on the same course and slope, and then commands RTL."""
     east, north, altitude = (float(start[name]) for name in ("east", "north", "up"))
     velocity_east, velocity_north, velocity_up = (float(start[f"velocity_{name}"]) for name in ("east", "north", "up"))
     ground_speed = max(1.0, math.hypot(velocity_east, velocity_north))

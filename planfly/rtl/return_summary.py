@@ -13,7 +13,10 @@ from world.errors import PlanflyError
 
 
 def return_starts(setup: FlightSetup, track: Track | None, interval: float) -> ReturnStarts:
-    """Return the starts of returns on the track, or on the planned path if nothing was flown.  interval: s."""
+    """Return the states from which returns start, on the track, or on the planned path if nothing was flown.
+
+    interval: time between two returns, s.
+    """
     if track is not None and len(track):
         return flown_starts(setup, track, interval)
     return planned_starts(setup, interval)
@@ -37,20 +40,20 @@ class ReturnSummary:
     returns: Returns | None = None
 
     def data_for_pictures(self) -> DrawnReturns | None:
-        """Return the data of the pictures, including glides without the engine, which take some seconds to compute."""
+        """Return the data for pictures of returns and glides, in a few seconds, or None without judged returns."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns(self.world, self.starts, self.returns, judge_glides(self.world, self.starts))
 
     def drawn_returns_without_glides(self) -> DrawnReturns | None:
-        """Return the data of the pictures without glides and minimum heights, within some hundredths of a second."""
+        """Return the data for pictures of returns only, in well under a second, or None without judged returns."""
         if self.world is None or self.starts is None or self.returns is None or not self.returns.each:
             return None
         return drawn_returns_without_glides(self.world, self.starts, self.returns)
 
 
 def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
-    """Judge returns of a flight or of the planned path; the summary is empty without a home or a terrain."""
+    """Judge returns from a few points of a flight or planned path; the summary is empty without home or terrain."""
     if setup.mission.home is None or setup.scenario.terrain is None:
         return ReturnSummary()
     try:
@@ -63,9 +66,9 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
         returns = judge_returns(world, starts, interval)
     except PlanflyError as error:
         return ReturnSummary(f"not judged: {error}")
-    names_stand_in = world.stands_in and not world.has_other_law
-    stand_in_text = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if names_stand_in else ""
-    return ReturnSummary(headline(returns) + stand_in_text, world, starts, returns)
+    is_replaced = world.stands_in and not world.has_other_law
+    replacement_text = f" (by the simulated ArduPlane in place of {setup.autopilot.title})" if is_replaced else ""
+    return ReturnSummary(headline(returns) + replacement_text, world, starts, returns)
 
 
 def returns_line(setup: FlightSetup, track: Track | None) -> str:

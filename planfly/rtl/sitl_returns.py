@@ -20,7 +20,7 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     RETURN_TIMEOUT,
 )
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
-from flight.autopilots.catalog import program_autopilot
+from flight.autopilots.catalog import program_class_for
 from flight.mission.return_path import ReturnTarget
 from flight.simulation.track import Track
 from logs.verdict.returns.judge_returns import (
@@ -87,7 +87,7 @@ class ProgramReturn:
 class ProgramReturns:
     """Returns that the program flew.
 
-    program: name and version of the program; "" if it flew no return.
+    program: name and version of the program; "" if the program flew none of the returns.
     pairs: the returns, the worst first.
     """
 
@@ -103,10 +103,10 @@ class ProgramReturns:
         """Return a one-line summary.
 
         >>> ProgramReturns("", ()).headline()
-        'the program could fly no return'
+        'the program could not fly any of the returns'
         """
         if not self.flown_pairs:
-            return "the program could fly no return"
+            return "the program could not fly any of the returns"
         agreeing_count = sum(pair.agrees for pair in self.flown_pairs)
         worse_count = sum(pair.worse for pair in self.flown_pairs)
         comparison = (
@@ -114,11 +114,11 @@ class ProgramReturns:
             if agreeing_count == len(self.flown_pairs)
             else f"{agreeing_count} of them agree with the simulation"
         )
-        comparison += f"; {worse_count} worse than simulated, where the simulation errs" if worse_count else ""
-        return f"by {self.program} itself: {len(self.flown_pairs)} of the worst flown, {comparison}"
+        comparison += f"; {worse_count} ended worse than in the simulation" if worse_count else ""
+        return f"by {self.program} itself: {len(self.flown_pairs)} of the worst returns flown, {comparison}"
 
     def lines(self, returns: Returns, scenario: Scenario) -> list[str]:
-        """Return a line on each return, with its start, both outcomes, and their agreement."""
+        """Return a line for each return: its start, the simulated outcome, the program's outcome, and which applies."""
         texts = []
         for pair in self.pairs:
             east, north, _ = pair.simulated.start
@@ -139,7 +139,7 @@ class ProgramReturns:
         return texts
 
     def with_worse_results(self, returns: Returns) -> Returns:
-        """Replace each simulated result by the program's result if the program's result is worse."""
+        """Return the returns with each simulated result replaced by the program's result where that is worse."""
         worse_result_by_id = {id(pair.simulated): pair.flown for pair in self.pairs if pair.worse}
         return replace(
             returns,
@@ -151,7 +151,7 @@ class ProgramReturns:
 
 def check_is_arduplane(program: Path) -> None:
     """Raise ArgumentError for a program other than ArduPlane, whose returns planfly does not simulate."""
-    autopilot_class = program_autopilot(program)
+    autopilot_class = program_class_for(program)
     if not issubclass(autopilot_class, ArduPlaneSitl):
         allowed = f"expected ArduPlane's program; returns of {autopilot_class.title} are not supported"
         raise ArgumentError.of_argument("autopilot", str(program), allowed)
@@ -160,10 +160,10 @@ def check_is_arduplane(program: Path) -> None:
 def worst_separated_returns(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, points: int
 ) -> list[tuple[SimulatedReturn, int]]:
-    """Choose at most `points` of the worst returns that can be flown, the worst first, with the index of each start.
+    """Choose the worst returns for the program to fly, the worst first, at most `points`, with the index of each start.
 
-    Starts closer to a chosen start than half the path length divided by `points` are skipped, because neighbouring
-    returns are alike.
+    Starts closer to a chosen start than half the path length divided by `points` are skipped, because returns from
+    neighbouring starts are alike, and so are starts that the program cannot reach safely.
     """
     start_rows = starts.rows
     positions = np.column_stack([start_rows["east"], start_rows["north"]])
@@ -190,7 +190,7 @@ def worst_separated_returns(
 
 
 def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
-    """Return the sort key of a return: `badness`, or for a safe return how near it is to a limit."""
+    """Return a sort key that puts the worst outcome first, and safe returns last, the closest to a limit first."""
     return (KINDS.index("safe"), distance_to_limit(candidate)) if candidate.safe else badness(candidate)
 
 
@@ -208,10 +208,10 @@ def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:
 def fly_by_program(
     world: ReturnWorld, starts: ReturnStarts, returns: Returns, program: Path, points: int, folder: Path | None
 ) -> ProgramReturns:
-    """Fly at most `points` of the worst returns by the ArduPlane program, in the mean wind, with exact navigation.
+    """Fly at most `points` of the worst returns with the ArduPlane program, in the mean wind, with exact navigation.
 
     folder: folder for the flight logs of planfly and of the program; None writes no logs.
-    Raises FlightError if the program does not start or breaks off.
+    Raises FlightError if the program does not start or stops during the flight.
     """
     program_returns, version = [], ""
     for number, (simulated_return, start_index) in enumerate(
@@ -229,7 +229,7 @@ def fly_by_program(
         program_return = _judge_flown_return(
             world, simulated_return, starts.rows[start_index], flight.track, flight.ended
         )
-        reason = "" if program_return else f"it does not reach the start of the return ({flight.ended})"
+        reason = "" if program_return else f"the flight does not reach the start of the return ({flight.ended})"
         program_returns.append(ProgramReturn(simulated_return, program_return, reason, log))
     return ProgramReturns(version, tuple(program_returns))
 
@@ -237,7 +237,12 @@ def fly_by_program(
 def _judge_flown_return(
     world: ReturnWorld, simulated_return: SimulatedReturn, start: Record, track: Track, end_reason: str
 ) -> SimulatedReturn | None:
-    """Judge a return flown by the program; return None if the flight did not reach the start of the return."""
+    """Judge a return flown by the program.
+
+    simulated_return: simulation of the same return, whose required height and energy at the start apply.
+    start: state at the start of the return.
+    Returns None if the flight did not reach the start.
+    """
     path = positions_from_start(track, start)
     if path is None:
         return None
@@ -289,9 +294,9 @@ def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:
-    """Identify the target where a path ends, or the target that it heads for.
+    """Identify the target of a return from its path: the target where the path ends, or to which it leads.
 
-    All possible targets of a return are tried.  If none fits, return the target of the simulated ArduPlane.
+    All possible targets of a return are tried.  If none fits, the target of the simulated ArduPlane is returned.
 
     position: path points, (t, 3), m.
     """

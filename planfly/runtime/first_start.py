@@ -30,7 +30,7 @@ _END_OF_OUTPUT = ""
 
 
 def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None]) -> None:
-    """Compile units into a cache folder; return when each unit is compiled or has failed.
+    """Compile the kernels of units in several processes; return when each unit is compiled or has failed.
 
     units: names of units, the longest first.  on_ready: called with the number of kernels that are ready.
     The processes end with this call, even if it raises an error, and with this process.
@@ -63,6 +63,7 @@ def compile_units(units: list[str], folder: Path, on_ready: Callable[[int], None
 
 
 def _start_process(folder: Path) -> "subprocess.Popen[str]":
+    """Start a process that compiles units named on its standard input.  folder: cache folder of the kernels."""
     home = str(Path(__file__).parents[2])
     path = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
     return subprocess.Popen(
@@ -79,7 +80,10 @@ def _start_process(folder: Path) -> "subprocess.Popen[str]":
 def _feed_process(
     process: "subprocess.Popen[str]", remaining_units: "deque[str]", lines: "queue.SimpleQueue[str]"
 ) -> None:
-    """Send a process one unit after another, and queue its output lines; an empty line marks the end of the process."""
+    """Send a process one unit after another, and queue the lines that it prints.
+
+    `_END_OF_OUTPUT` is queued when no unit remains or the process has died.
+    """
     requests, answers = process.stdin, process.stdout
     # The process may have died, or the other process may have taken the last unit.
     with contextlib.suppress(OSError, IndexError):
@@ -116,7 +120,7 @@ _compiled_units: set[str] = set()
 
 @contextmanager
 def warm_up(*units: str) -> Iterator[None]:
-    """Compile all kernels of units as soon as the code inside needs a kernel that is not cached.
+    """Compile all kernels of some units at the first call of a kernel that is not cached, within a ``with`` block.
 
     units: units of `planfly.kernel_units` that the code will call, longest first. They are compiled in two processes
     before the code continues; if the cache cannot be written, each kernel is compiled when it is called.
@@ -149,6 +153,7 @@ def with_warm_up(*units: str) -> Callable[[Callable[_Parameters, _Result]], Call
 
 
 def _report_and_compile(units: list[str]) -> None:
+    """Compile units with a progress report; if the cache cannot be written, only report the reason."""
     # Imported here: code that compiles kernels has already imported it.
     from world.kernels import IS_TEMPORARY, PREFERRED_FOLDER, cache_folder
 

@@ -15,7 +15,7 @@ _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
 
 def prepare_process() -> None:
-    """Collect garbage rarely, and limit linear algebra to one thread. Call this before NumPy is imported.
+    """Set rare garbage collection, and limit linear algebra to one thread; call this before NumPy is imported.
 
     Garbage collection during imports took a quarter of the start-up time, and spinning threads a tenth; no matrix in
     planfly is large enough for a second thread.
@@ -26,7 +26,7 @@ def prepare_process() -> None:
 
 
 def prepare_child() -> None:
-    """Collect garbage rarely in a process that planfly started, such as the worker of a campaign.
+    """Set rare garbage collection in a process that planfly started, such as the worker of a campaign.
 
     Garbage collection in the processes of a short campaign took a sixth of its time. If the address space is limited,
     import only modules that fit (`world.address_space`).
@@ -37,7 +37,7 @@ def prepare_child() -> None:
 
 
 def watch_address_space() -> None:
-    """If the address space of this process is limited, import only modules that fit."""
+    """Let imports fail early if a module does not fit into a limited address space; without a limit do nothing."""
     limit = address_space_limit()
     if limit is None:
         return
@@ -78,4 +78,5 @@ def with_large_stack(function: Callable[[], _Result]) -> _Result:
 
 
 def _call(function: Callable[[], _Result]) -> _Result:
+    """Call a function; `with_large_stack` gives a copy of this code a large frame."""
     return function()

@@ -41,7 +41,7 @@ def send_progress_to(receiver: Receiver) -> Iterator[None]:
 
 
 def stage(title: str, kind: str = "") -> AbstractContextManager[Advance]:
-    """Start a stage of work; its context yields a function that takes done, total and a remark.
+    """Return the context of a stage of work, which yields a function to report units done, total and a remark.
 
     kind: common name of stages with the same pace, if the title is more specific ("planning" for any scenario).
 
@@ -68,11 +68,11 @@ def report_replaced(*files: Path) -> None:
     """Report each existing file that will be replaced; for example, a program's log may replace a simulated flight."""
     for file in files:
         if file.exists():
-            report_line(f"{file} is there: replaced")
+            report_line(f"{file} exists and is replaced")
 
 
 def has_receiver() -> bool:
-    """Return True if stages are shown.
+    """Return True if somebody receives the progress of stages.
 
     >>> has_receiver()
     False
@@ -81,6 +81,7 @@ def has_receiver() -> bool:
 
 
 def _ignore_progress(_done: float, _total: float, _remark: str) -> None:
+    """Ignore the progress of a stage that has no receiver."""
     pass
 
 

@@ -32,11 +32,15 @@ def page_files() -> dict[str, tuple[bytes, str]]:
 
 
 def _media_type(name: str) -> str:
+    """Return the media type for a file name, by its suffix."""
     return f"{_MEDIA_TYPES[name[name.rindex('.') :]]}; charset=utf-8"
 
 
 def make_app(server: Server, port: int) -> App:
-    """Make the whole application, including its guard."""
+    """Make the web application: page files, the websocket of a session, and the guard in front of both.
+
+    port: port on which the application listens.
+    """
     files = page_files()
 
     def serve_file(request: Request) -> Response:

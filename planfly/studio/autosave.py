@@ -28,9 +28,11 @@ _SAVED_TABLES = ("wind", "flight", "limits", "area")
 
 
 def autosave_text(context: EditContext, first: Mission, mission: Mission, plan: Plan | None, name: str) -> str:
-    """Return the text of the autosave file.
+    """Return the JSON text of the autosave file.
 
     first: the mission that was opened.
+    mission: the edited mission.
+    name: name of the document.
     plan: the plan of the mission, or None if the mission was changed after planning.
     """
     spec = context.scenario.to_json()
@@ -52,6 +54,7 @@ def autosave_text(context: EditContext, first: Mission, mission: Mission, plan: 
 def read_autosave(file: Path, context: EditContext, first: Mission) -> tuple[Mission, EditContext] | None:
     """Return the saved mission and its editing context, or None if there is no autosave of this document.
 
+    first: the mission that was opened; the autosave of another mission is ignored.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
     """
     if not file.exists():
@@ -71,7 +74,11 @@ def read_autosave(file: Path, context: EditContext, first: Mission) -> tuple[Mis
 
 
 def sibling_autosave_path(file: Path, first: Mission) -> Path:
-    """Return the autosave path of a later document, next to the autosave `file` of the first document."""
+    """Return the autosave path for a document opened later, named by a digest of its mission.
+
+    file: autosave path of the first document, in the same folder.
+    first: the mission that was opened.
+    """
     digest = hashlib.sha256(json.dumps(mission_data(first)).encode()).hexdigest()[:8]
     return file.with_name(f"{file.stem}-{digest}{file.suffix}")
 
@@ -95,7 +102,7 @@ def _restore_settings(context: EditContext, data: Json) -> EditContext:
 
 
 def _restore_plan(context: EditContext, mission: Mission, data: Json) -> tuple[Mission, EditContext]:
-    """Return a mission and its editing context, with the saved plan if there is one."""
+    """Return a mission and its editing context, with the saved plan if it is the plan of this mission."""
     if not data.get("plan"):
         return mission, context
     plan = parse_plan(data["plan"], "kept", ground=context.scenario.terrain)

@@ -64,7 +64,7 @@ class FlightResults(NamedTuple):
 
 
 def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], seconds: float) -> FlightResults:
-    """Collect the results of a flight of a mission."""
+    """Collect the worst result of each rule at each place of a flight.  seconds: duration of the flight, s."""
     item_contents = tuple((float(item.command), item.lat_deg, item.lon_deg, item.alt) for item in mission.items)
     order = {item.seq: k for k, item in enumerate(mission.items)}
     results: _Results = {}
@@ -81,11 +81,16 @@ def flight_results(mission: Mission, route: Route, findings: Iterable[Finding], 
 
 
 def _severity_key(result: PlaceResult) -> tuple[int, float]:
+    """Return a key that sorts results from the worst to the best."""
     return _WORST_FIRST[result.ok], 0.0 if result.margin is None else result.margin
 
 
 def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) -> tuple[PlaceKey, str]:
-    """Return the identity of a place across missions, and its description with item numbers."""
+    """Return a key for a place that does not depend on item numbers, and a description with item numbers.
+
+    route_items: item number of each waypoint.
+    order: position of each item number in the mission.
+    """
     if place.kind == "leg" and place.index is not None:
         first_item, last_item = (route_items[place.index + k] for k in (0, 1))
         if first_item in order and last_item in order:
@@ -103,7 +108,7 @@ def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) 
 
 
 def match_items(old_items: Sequence[tuple[float, ...]], new_items: Sequence[tuple[float, ...]]) -> dict[int, int]:
-    """Map the position of each item in one mission to its position in another; removed items are omitted.
+    """Map the position of each item in an old mission to its position in a new mission; removed items are omitted.
 
     >>> a, b, c, d = [(16.0, 46.0, 8.0 + k, 100.0) for k in range(4)]
     >>> match_items([a, b, c], [a, d, b, c]), match_items([a, b, c], [a, c]), match_items([a, b, c], [a, d, c])
@@ -158,7 +163,7 @@ _REMOVED_POSITION = -1
 
 
 def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
-    """Return the previous results keyed by their current places; each result at a removed item gets a unique place."""
+    """Return the previous results, keyed by the current positions of items; a removed item gets a unique key."""
     new_positions, renumbered = match_items(previous.items, current.items), {}
     for number, ((rule, (kind, first, last)), result) in enumerate(previous.results.items()):
         if kind in _ITEM_PLACE_KINDS and first is not None and last is not None:
@@ -192,6 +197,7 @@ def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None, state_text: str) -> str:
+    """Describe a change at a place: the rule, the old and the new value, and the new state."""
     values = dict.fromkeys(
         shown_result.text for shown_result in (old_result, result) if shown_result is not None and shown_result.text
     )
@@ -200,7 +206,7 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe how the values of failures have changed, and then how the smallest margin of each rule has."""
+    """Describe changed values of failures that remain, and then changed smallest margins of rules."""
     failures = [
         (rule, old_results[rule, key], result)
         for (rule, key), result in new_results.items()
@@ -234,6 +240,7 @@ def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _closest_results(results: _Results) -> dict[str, PlaceResult]:
+    """Return the result with the smallest margin of each rule."""
     closest: dict[str, PlaceResult] = {}
     for (rule, _), result in results.items():
         if result.margin is not None and (rule not in closest or result.margin < (closest[rule].margin or 0.0)):

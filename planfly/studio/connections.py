@@ -31,12 +31,14 @@ class _UnknownConnection:
     number: int | None = None
 
     def _register(self) -> None:
+        """Count this connection as unknown; if there are too many unknown connections, close the oldest."""
         self.number = next(_numbers)
         unknown = [connection for connection in self.connections if getattr(connection, "number", None) is not None]
         if len(unknown) > MAX_UNKNOWN_CONNECTIONS:
             min(unknown, key=lambda connection: connection.number)._drop()
 
     def _drop(self) -> None:
+        """Close the connection at once."""
         self.number = None
         self.transport.abort()
 
@@ -45,12 +47,13 @@ class ShortLived(_UnknownConnection, H11Protocol):
     """HTTP on a connection that ends after `HTTP_LIFETIME_S`, so that silent connections make room for others."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
-        """Register the connection, and schedule its end."""
+        """Register the connection, and schedule its closing, unless a websocket replaces HTTP before."""
         super().connection_made(transport)
         self._register()
         asyncio.get_running_loop().call_later(HTTP_LIFETIME_S, self._close_if_http, transport)
 
     def _close_if_http(self, transport: asyncio.Transport) -> None:
+        """Close the connection if it still speaks HTTP."""
         # If a websocket has replaced this protocol, the connection stays open.
         if transport.get_protocol() is self:
             transport.abort()
@@ -75,10 +78,12 @@ class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
         scope[ALLOW_FULL_SIZE] = self._allow_full_size
 
     def _allow_full_size(self) -> None:
+        """Stop counting the connection as unknown, and allow messages of full size."""
         self.number = None
         self._limit_messages(self.config.ws_max_size)
 
     def _limit_messages(self, max_size: int) -> None:
+        """Set the maximum size of a received message, bytes."""
         # The first name is that of websockets 16 and later, the second that of earlier versions.
         for name in ("max_message_size", "max_size"):
             if hasattr(self.conn, name):

@@ -87,7 +87,7 @@ class Document:
 
 
 def open_document(target: str, options: MissionOptions) -> Document:
-    """Open a scenario, a plan, a mission or a log, by name or path. Raises PlanflyError."""
+    """Open a scenario, a plan, a mission or a log.  target: name of a scenario, or path.  Raises PlanflyError."""
     if target in embedded_names() or target.lower().endswith(".toml"):
         return _scenario_document(load_scenario_with_options(target, options), options.get("seed"))
     path = Path(target)
@@ -99,7 +99,7 @@ def open_document(target: str, options: MissionOptions) -> Document:
 
 
 def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
-    """Open a file that was dropped on the page, from its bytes; the suffix of its name tells its type.
+    """Open a file that was dropped on the page.  name: its file name, whose suffix is its type.  data: its content.
 
     Raises PlanflyError.
     """
@@ -150,16 +150,17 @@ def _check_plan_names_no_files(name: str, data: bytes) -> None:
         return
     for file in named_files:
         if file is not None and str(file) not in EMBEDDED:
-            allowed = "a plan that names other files is opened by the command: planfly studio plan.json"
+            allowed = "a plan that names other files can only be opened by the command: planfly studio plan.json"
             raise MissionError.at(name, "scenario", str(file)[:60], allowed)
 
 
 def _aircraft_folder(aircraft: Any) -> str | None:
+    """Return the aircraft entry of a scenario if it is a path, or None if it is a name."""
     return aircraft if isinstance(aircraft, str) and ("/" in aircraft or "\\" in aircraft) else None
 
 
 def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
-    """Return the setup of a plan, of a mission, or of the mission in a log."""
+    """Return the flight setup for a plan, a mission, or the mission in a log."""
     if path.is_file() and is_imported_log(path):
         setup = _read_imported_log(path, options).setup
         return _log_mission_setup(setup.scenario, setup.mission, setup.seed)
@@ -170,9 +171,9 @@ def _open_file(path: Path, options: MissionOptions) -> FlightSetup:
 
 
 def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
-    """Read the flight of another program's log.
+    """Read a log of another program.
 
-    Raises PlanflyError, for a track without a mission with a message for users of the studio.
+    Raises PlanflyError.  The message for a log without a mission is worded for users of the studio.
     """
     world: LogOptions = {
         "scenario": options.get("scenario"),
@@ -184,7 +185,7 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
     except LogError as error:
         if "contains no mission" not in str(error):
             raise
-        reason = "a flight's track without a mission: open the file of its mission"
+        reason = "contains a track but no mission: open the mission file instead"
         raise MissionError(f"{path}: {reason}", file=path) from None
 
 
@@ -194,7 +195,7 @@ def _log_mission_setup(scenario: Scenario, mission: Mission, seed: int) -> Fligh
 
 
 def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
-    """Make a document of a scenario, with a straight line from start to destination until a path is planned."""
+    """Make a document for a scenario; its mission is a straight line until a path is planned."""
     airframe, chosen_seed = load_airframe(scenario), choose_seed(scenario, seed)
     mission = planned_mission(straight_plan(scenario, chosen_seed), airframe)
     setup = make_setup(scenario, airframe, mission, chosen_seed)
@@ -202,7 +203,7 @@ def _scenario_document(scenario: Scenario, seed: int | None) -> Document:
 
 
 def straight_plan(scenario: Scenario, seed: int) -> Plan:
-    """Return the straight line from start to destination as a plan that is not certified."""
+    """Return a placeholder plan: the straight line from start to destination, not certified."""
     line = np.stack([scenario.start, scenario.destination])
     certificate = Certificate(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ("not planned yet",))
     counts, objectives = Violations(0, 0, 0, 0), Objectives(1.0, 0.0, 0.0, 0.0)
@@ -210,7 +211,7 @@ def straight_plan(scenario: Scenario, seed: int) -> Plan:
 
 
 def planned_mission(plan: Plan, airframe: Airframe) -> Mission:
-    """Return the mission of a plan, named after the scenario."""
+    """Return the mission that flies a plan, named after the scenario of the plan."""
     return mission_of_plan(plan, airframe, plan.scenario.name)
 
 
@@ -228,7 +229,9 @@ class SavedFile:
 
 
 def save_document(document: Document, context: EditContext, judged_mission: JudgedMission, kind: str) -> SavedFile:
-    """Return the edited mission as a file of a kind in `SAVED_SUFFIXES`. Raises PlanflyError if it cannot be stored.
+    """Return the edited mission as a file.  kind: one of `SAVED_SUFFIXES`.
+
+    Raises PlanflyError if this kind of file cannot store the mission.
 
     An unchanged mission in its original format is saved as the original bytes.
     """
@@ -253,6 +256,7 @@ def save_document(document: Document, context: EditContext, judged_mission: Judg
 
 
 def _to_bytes(text: str | bytes) -> bytes:
+    """Return text as UTF-8, and bytes unchanged."""
     return text.encode() if isinstance(text, str) else text
 
 
@@ -264,7 +268,7 @@ def _format_losses(context: EditContext, mission: Mission, text: str, name: str,
         "rally points": (len(mission.rally) - len(parsed.rally), "a .plan contains them"),
         "survey plans": (
             len(mission.survey_plans),
-            "their items stay; other data of the ground station is lost",
+            "their items are kept; other data of the ground station is lost",
         ),
     }
     losses += [
@@ -299,9 +303,9 @@ def _lost_parameters(context: EditContext) -> tuple[str, ...]:
 
 
 def _saved_parameters(name: str, context: EditContext) -> SavedFile:
-    """Return a file of the parameters set in the studio. Raises PlanflyError if no parameter was set."""
+    """Return a parameter file with the parameters set in the studio. Raises PlanflyError if no parameter was set."""
     if not context.parameters.values:
-        raise PlanflyError("no parameter was set here: Settings sets them", field="form")
+        raise PlanflyError("no parameter was set in the studio: set one under Settings", field="form")
     return SavedFile(
         name, context.parameters.text(f"set in planfly studio for {context.airframe.autopilot.title}").encode()
     )
@@ -316,9 +320,7 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
     has_changed_items = (
         not context.planned or planned_mission(new_plan, context.airframe).items != judged_mission.mission.items
     )
-    losses = (
-        ["the items: a plan contains only positions, from which its mission is made again"] if has_changed_items else []
-    )
+    losses = ["the items: a plan stores only positions, and its mission is made from them"] if has_changed_items else []
     if not new_plan.feasible:
         problem = (new_plan.certificate.problems or ("violations are counted",))[0]
         losses.append(f"the plan is not feasible: {problem}")
@@ -341,7 +343,7 @@ def _check_plain_waypoints(mission: Mission) -> None:
 
 
 def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> Plan:
-    """Make a plan of the waypoints of the route, scored and certified like plans of the planner.
+    """Make a plan from the waypoints of an edited route, scored and certified like the plans of the planner.
 
     Raises MissionError for a mission without a scenario, and for items that a plan cannot store.
     """
@@ -349,7 +351,7 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
     name = mission.source
     if scenario.external:
         raise MissionError(
-            f"{name}: a plan needs a scenario, and this mission came without one (--scenario)", file=name
+            f"{name}: a plan needs a scenario, but this mission was opened without one (--scenario)", file=name
         )
     has_unique_waypoints = (
         not route.arcs.any() and len(set(route.items[route.items >= 0].tolist())) == (route.items >= 0).sum()
@@ -369,6 +371,7 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
 
 
 def _scored_plan(context: EditContext, waypoints: Floats) -> Plan:
+    """Return a plan with the scores and the certificate of its path.  waypoints: (w, 3), m."""
     problem = make_problem(context.scenario, context.airframe.limits.with_margin())
     certificate = certify(problem, waypoints)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
@@ -377,7 +380,7 @@ def _scored_plan(context: EditContext, waypoints: Floats) -> Plan:
 
 
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
-    """Return the edited plan with its unchanged departure and approach, or None if it has neither.
+    """Return the edited plan with its unchanged departure and approach, or None if the opened plan has neither.
 
     Departure and approach were certified with the turns at their ends, so the adjacent legs must be unchanged. Raises
     MissionError if these legs were changed.
@@ -408,7 +411,7 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
         if _have_same_items(planned_mission(plan, context.airframe), mission):
             return plan
     reason = (
-        "its departure or landing, or a leg next to them, is no longer that of its plan: save a .plan, or plan again"
+        "its departure or landing, or a leg next to them, differs from the opened plan: save a .plan, or plan again"
     )
     raise MissionError(f"{mission.source}: {reason}", file=mission.source)
 

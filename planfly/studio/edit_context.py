@@ -9,7 +9,7 @@ from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup
 from planfly.named_fences import NamedFences
 from planfly.studio.settings import SetParameters
-from planfly.workflow.airframe import airframe_of
+from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.mission_context import MissionContext
 from planfly.workflow.open_flight import make_setup
 from planner.plan import Plan
@@ -41,7 +41,7 @@ class EditContext(MissionContext):
         """Make the editing context of an opened mission or plan."""
         return cls(
             setup.scenario,
-            airframe_of(setup),
+            airframe_for_setup(setup),
             setup.seed,
             setup,
             planned=setup.plan is not None,
@@ -59,12 +59,16 @@ class EditContext(MissionContext):
         return replace(self, scenario=scenario, airframe=airframe, opened_setup=setup, parameters=parameters)
 
     def with_plan(self, plan: Plan, mission: Mission) -> "EditContext":
-        """Return the context of a new plan; its certificate applies until the mission is changed."""
+        """Return the context with a new plan, whose certificate applies until the mission is changed."""
         setup = make_setup(self.scenario, self.airframe, mission, self.seed, plan=plan)
         return replace(self, opened_setup=setup, planned=True)
 
     def around_mission(self, mission: Mission) -> "EditContext":
-        """Return this context, or one with a new scenario if the mission has left the scenario made around it."""
+        """Return a context whose area contains the mission.
+
+        A scenario that planfly made around a mission is made again if the mission comes close to its edges; a named
+        scenario, and an area that is large enough, are kept.
+        """
         if not self.scenario.external:
             return self
         points = self.item_positions(mission)[:, :2]
@@ -88,14 +92,14 @@ class EditContext(MissionContext):
     # Verdicts while a mission is dragged.
 
     def route(self, mission: Mission) -> Route:
-        """Return the route of a mission, without the notes for the user."""
+        """Return the route that the autopilot flies in a mission, without notes for the user."""
         frame, fly_over = self.airframe, self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
         route = route_through_stops(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(route, self.scenario, frame.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:
-        """Return a setup for judging the legs and corners of ``route``, which may be a part of the mission's route."""
+        """Return a setup for judging a route, which may be a part of the mission's route."""
         frame = self.airframe
         return FlightSetup(
             scenario=self.scenario,

@@ -13,7 +13,9 @@ _READABLE_SUFFIXES = (*DROPPED_SUFFIXES, *PARAMETER_FILES)
 
 
 def folder_message(folder: Path | None) -> Json:
-    """List the missions, plans, logs and parameter files of a folder, except links to other folders.
+    """Return a message for the page with the missions, plans, logs and parameter files of a folder.
+
+    Links to files in other folders are left out.
 
     >>> folder_message(Path("no such folder"))["files"]
     []
@@ -52,7 +54,7 @@ def find_file_in_folder(folder: Path | None, name: str) -> Path:
     world.errors.MissionError: open: name: '../etc/passwd': expected a file in /tmp
     """
     if folder is None:
-        allowed = "the command named no file, so there is no folder to open from: drop the file here"
+        allowed = "the studio was started without a file, so there is no folder to open from: drop the file here"
         raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
     try:
         resolved_folder = folder.resolve(strict=True)

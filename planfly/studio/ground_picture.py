@@ -45,13 +45,13 @@ class GroundGrid:
 
 
 def sample_ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGrid:
-    """Return a coarse grid of the terrain heights of a map."""
+    """Return a coarse grid of terrain altitudes.  east, north: extent of the map, m."""
     heights = _sample_heights(terrain, east, north, _GRID_SIZE)
     return GroundGrid(east, north, heights.astype(np.float32))
 
 
 def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> bytes:
-    """Draw the terrain of a map as a WebP picture, north up."""
+    """Draw terrain as a WebP picture, north up.  east, north: extent of the map, m.  dark: True for dark colours."""
     heights = _sample_heights(terrain, east, north, _PICTURE_PIXELS)
     is_known = np.isfinite(heights)
     unknown = np.array(theme.rgba("unknown", dark=dark)[:3])
@@ -69,6 +69,7 @@ def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> b
 
 
 def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) -> Floats:
+    """Return terrain altitudes, m AMSL, (rows, columns); the longer side has `pixels` values, rows go north."""
     width, height = east[1] - east[0], north[1] - north[0]
     longer_side = max(width, height)
     columns, rows = (max(2, round(pixels * length / longer_side)) for length in (width, height))
@@ -76,7 +77,7 @@ def _sample_heights(terrain: Terrain, east: Range, north: Range, pixels: int) ->
 
 
 def _tint_by_height(heights: Floats, min_height: float, max_height: float, *, dark: bool) -> Floats:
-    """Return the color of each height, 0 to 1, (rows, columns, 3)."""
+    """Return the colour of each height, red, green and blue from 0 to 1, (rows, columns, 3)."""
     ramp = np.array([theme.rgb(text) for text in (theme.GROUND_DARK if dark else theme.GROUND)])
     ramp_position = np.nan_to_num((heights - min_height) / (max_height - min_height)) * (len(ramp) - 1)
     return np.stack([np.interp(ramp_position, np.arange(len(ramp)), ramp[:, k]) for k in range(3)], axis=-1)
@@ -99,6 +100,7 @@ def _draw_contours(picture: Floats, heights: Floats, step: float, *, dark: bool)
 
 
 def _to_webp(picture: Floats) -> bytes:
+    """Encode a picture as WebP.  picture: colours from 0 to 1, (rows, columns, 3), with the southern row first."""
     pixels = np.round(np.clip(picture[::-1], 0.0, 1.0) * 255.0).astype(np.uint8)
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, "WEBP", quality=_WEBP_QUALITY, method=2)

@@ -61,7 +61,7 @@ def check_request(scope: Scope, port: int) -> tuple[int, str]:
 
 
 def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-    """Return True for a visit of the page itself, which shows nothing before a token is given."""
+    """Return True for a request of a browser to show the page itself, which shows nothing without the token."""
     header_values = dict(headers)
     is_document = (
         header_values.get(b"sec-fetch-mode") == "navigate" and header_values.get(b"sec-fetch-dest") == "document"
@@ -77,7 +77,7 @@ class Guard:
         self._app, self._port = app, port
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request or websocket."""
+        """Serve one request or websocket, or refuse it with the reason of `check_request`."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return

@@ -50,9 +50,9 @@ class Window:
 def judge_windows(
     context: EditContext, mission: Mission, index: int, previous_setup: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """Judge windows around an item, or the whole route if this is necessary or no slower.
+    """Judge the parts of a mission's route near a moved item, or the whole route if this is necessary or no slower.
 
-    Returns the route and the windows.
+    Returns the route and the judged parts (windows).
 
     index: index of the item in the mission's list.
     previous_setup: setup before the move, if known.
@@ -88,7 +88,9 @@ def _may_contain_survey(context: EditContext, mission: Mission, route: Route) ->
 
 
 def _add_extreme_legs(context: EditContext, route: Route, part: Route, *, before_part: bool) -> tuple[Route, int]:
-    """Add the fastest legs of the whole route to a part; return the extended part and the number of legs before it.
+    """Add the fastest legs of the whole route to a part of it.
+
+    Returns the extended part, and the number of legs added before the part.
 
     The duration of a change of slope is computed from the highest airspeeds and the strongest wind of a whole route.
     Therefore legs with these values are added, in a straight line, at the end of the part that is inside the route.
@@ -143,6 +145,11 @@ def _speed_factor(context: EditContext, altitude: float) -> float:
 
 
 def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Window:
+    """Judge the waypoints `first` to `last` of a route.
+
+    setup: setup of a part of the route that contains these waypoints.
+    start: number of the part's first waypoint in the whole route.
+    """
     requirements = replace(route_requirements(setup), zone_check_legs=(first - start, last - start - 1))
     findings = tuple(
         finding for finding in place_findings(requirements) if _is_in_window(finding, first - start, last - start)
@@ -151,7 +158,7 @@ def _judge_window(setup: FlightSetup, first: int, last: int, start: int) -> Wind
 
 
 def _is_in_window(finding: Finding, first: int, last: int) -> bool:
-    """Return True for a finding on a leg or corner from `first` to `last`, and for a violated threat or zone."""
+    """Return True for a finding on a leg or corner between two waypoints, and for any violated threat or zone."""
     place = finding.place
     if finding.ok is False and place.kind in ("missile", "exclusion", "inclusion"):
         return True
@@ -161,8 +168,9 @@ def _is_in_window(finding: Finding, first: int, last: int) -> bool:
 
 
 def _find_affected_spans(route: Route, seq: int) -> list[tuple[int, int]] | None:
-    """Return the spans of waypoints that a move of an item may change, as (first, last), or None for the whole route.
+    """Return the first and last waypoint of each span that a move of an item may change; None for the whole route.
 
+    seq: number of the moved item.
     Overlapping spans are merged. Landing sequences and returns depend on the whole route.
     """
     rows = np.flatnonzero(route.items == seq)

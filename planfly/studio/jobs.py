@@ -68,7 +68,7 @@ class Jobs:
     _uses_first_path: bool = False
 
     def start_first_task(self, session: Session) -> None:
-        """Fly the opened mission, or plan a path if a scenario without a path was opened."""
+        """Start a flight of the opened mission, or a search for a path if a scenario was opened."""
         if session.document.to_plan and not session.is_changed:
             self._uses_first_path = True
             self._submit_task(
@@ -83,12 +83,12 @@ class Jobs:
             self.fly(session)
 
     def close(self) -> None:
-        """End both processes."""
+        """End the worker processes."""
         for worker in self._workers.values():
             worker.close()
 
     def choices(self) -> Json:
-        """Return the choices that a page offers."""
+        """Return page data of the aircraft, autopilots, turbulence levels and algorithms to choose from."""
         return {
             "aircraft": aircraft_names(),
             "autopilots": list(CHOICES["autopilot"]),
@@ -97,15 +97,15 @@ class Jobs:
         }
 
     def result_messages(self) -> list[Json]:
-        """Return the messages to a new page about the newest results."""
+        """Return the messages that show the newest results on a page that has just connected."""
         return [*([self._flight_message] if self._flight_message is not None else []), *self._other_messages]
 
     def progress_messages(self) -> list[Json]:
-        """Return the messages to a new page about tasks in progress."""
+        """Return the messages that show tasks in progress on a page that has just connected."""
         return [task.message for task in self._active.values()]
 
     def is_planning_first_path(self, session: Session) -> bool:
-        """Return True while a path is searched for an opened scenario, whose mission is still a placeholder."""
+        """Return True while a path is planned for an opened scenario, whose mission is a placeholder until then."""
         return self._uses_first_path and not session.is_changed
 
     def drop_results(self) -> None:
@@ -132,7 +132,7 @@ class Jobs:
         self._submit_task(LONG_WORKER, "plan", "planfly.studio.worker_tasks.plan", request, session.rev)
 
     def start_task(self, kind: str, session: Session) -> None:
-        """Fly, or start a long task."""
+        """Start a flight of the current mission, or a long task.  kind: "fly" or the name of the long task."""
         if kind == "fly":
             self.fly(session)
             return
@@ -151,11 +151,15 @@ class Jobs:
                 worker.cancel()
 
     def _plan_request(self, message: messages.Plan, session: Session) -> PlanRequest:
+        """Make the request for a search, and forget earlier planned paths.
+
+        Raises PlanflyError for an unknown algorithm, and for items between which no path can be planned.
+        """
         scenario, airframe = session.context.scenario, session.context.airframe
         if message.algorithm is not None and message.algorithm not in ALGORITHMS:
             raise PlanflyError.of_argument("algorithm", message.algorithm, f"allowed {', '.join(ALGORITHMS)}")
         if message.algorithm is not None and message.ways > 1:
-            raise PlanflyError.of_argument("ways", message.ways, "expected 1 with an algorithm of your own")
+            raise PlanflyError.of_argument("ways", message.ways, "expected 1 if an algorithm is named")
         request = PlanRequest(scenario, airframe, message.seed, message.algorithm, ways=message.ways)
         if message.first is None or message.last is None:
             if scenario.external:
@@ -165,12 +169,18 @@ class Jobs:
         ends = [session.item_position(index) for index in (message.first, message.last)]
         if message.first >= message.last:
             raise MissionError(
-                f"{session.document.name}: the second item to plan between comes after the first", field="last"
+                f"{session.document.name}: of the two items to plan between, the second must come later in the mission",
+                field="last",
             )
         session.plans = ([], (message.first, message.last))
         return replace(request, ends=(ends[0], ends[1]))
 
     def _submit_task(self, worker: str, name: str, function: str, payload: Any, rev: int) -> None:
+        """Send a task to a worker; a task in progress there is cancelled.
+
+        function: full name of the function that the worker calls with `payload`.
+        rev: revision of the mission.
+        """
         self._number += 1
         previous_task = self._active.get(worker)
         if previous_task is not None and previous_task.name != name:
@@ -179,6 +189,7 @@ class Jobs:
         self._worker(worker).submit(Task(self._number, function, payload))
 
     def _worker(self, name: str) -> WorkerProcess:
+        """Return a worker by its name, made when it is first used."""
         if name not in self._workers:
             self._workers[name] = WorkerProcess(
                 f"planfly studio: {name}", lambda answer: self.on_answer(name, answer), pack=self.pack
@@ -189,7 +200,10 @@ class Jobs:
     # Answers.
 
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages to the pages for an answer; for a replaced task only the message that it has ended."""
+        """Return the messages for the pages after an answer of a worker.
+
+        The end of a task that was replaced by another gives only the message that it has stopped.
+        """
         task = self._active.get(worker)
         if task is None or task.number != answer.number:
             replaced_name = None if answer.kind == "progress" else self._replaced.pop(answer.number, None)
@@ -209,7 +223,7 @@ class Jobs:
         if answer.kind == "fault":
             return [self._stopped_message(task.name), {"kind": "fault", "text": str(answer.value)}]
         if task.name == "plan" and task.rev != session.rev:
-            reason = "the mission was changed during the search for its path, so it stays as it is: plan again"
+            reason = "the mission was changed while its path was planned, so the path is not used: plan again"
             return [self._stopped_message("plan"), {"kind": "fault", "text": reason}]
         return [self._result_message(task, answer.value, session)]
 
@@ -220,6 +234,7 @@ class Jobs:
         return {"kind": "stopped", "job": name}
 
     def _result_message(self, task: _ActiveTask, value: Any, session: Session) -> Json:
+        """Store the result of a task, and return the message that shows it; after a failed flight, try suggestions."""
         if task.name == "fly":
             previous_results, self._last_results = self._last_results, value.pop("figures")
             judged_mission = value.pop("judged")
@@ -250,7 +265,7 @@ class Jobs:
         return message
 
     def pop_initial_plan(self, session: Session) -> bool:
-        """Return True once, as soon as the path that was planned at the start has arrived."""
+        """Return True, only once, when the path planned for the opened scenario has arrived."""
         has_path = self._uses_first_path and bool(session.plans[0])
         if has_path:
             self._uses_first_path = False
@@ -258,7 +273,7 @@ class Jobs:
 
 
 def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
-    """Return page data of the paths to choose from, each with the quantities in which it is the best."""
+    """Return page data of planned paths to choose from, each with the quantities in which it is the best."""
     quantities = {
         "shortest": [plan.length for plan in plans],
         "least seen by radars": [plan.exposure for plan in plans],

@@ -26,12 +26,13 @@ FLIGHT_COUNT = 24
 
 
 def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly the mission, and judge a return to launch from points along the whole flight."""
+    """Fly a mission, judge returns to launch from points along the flight, and return the outcome as page data."""
     context, mission = payload
     setup = context.setup(mission)
     if mission.home is None or context.scenario.terrain is None:
         missing_input = "home" if mission.home is None else "terrain"
-        raise MissionError(f"{mission.source}: returns are not judged without a {missing_input}", field=missing_input)
+        reason = f"returns cannot be judged without {missing_input}"
+        raise MissionError(f"{mission.source}: {reason}", field=missing_input)
     world = return_world(setup)
     flight = fly_and_judge(
         setup, context.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
@@ -54,7 +55,10 @@ def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str,
 
 
 def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly the mission `FLIGHT_COUNT` times, each time with another wind, aircraft, terrain error and start."""
+    """Fly a mission `FLIGHT_COUNT` times with varied conditions, and return the outcome as page data.
+
+    Wind, aircraft, terrain error and start position vary.
+    """
     require_extra("campaigns")
     from planfly.campaigns.statistics.decision import wilson
 

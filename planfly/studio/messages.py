@@ -195,7 +195,7 @@ _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 
 
 def read_message(text: str | bytes) -> Message:
-    """Parse a message. Raises pydantic's ValidationError, a ValueError, for anything else.
+    """Parse a message from a page. Raises ValidationError, a ValueError, for a message of no known kind.
 
     >>> read_message('{"kind": "undo"}').kind
     'undo'
@@ -211,7 +211,7 @@ def read_message(text: str | bytes) -> Message:
 
 
 def describe_error(error: ValidationError) -> str:
-    """Describe the error in a message in a line; return "" for a text that is no message of a known kind.
+    """Describe the invalid field of a message in one line; return "" if the kind of the message is unknown.
 
     >>> try:
     ...     read_message('{"kind": "raise", "rev": 1, "by": 1e9}')

@@ -32,9 +32,9 @@ _IRREGULAR_COMMANDS = frozenset(
 def update_moved_route(
     route: Route, previous_mission: Mission, mission: Mission, scenario: Scenario, airframe: Airframe
 ) -> Route | None:
-    """Return the route after a few waypoints were moved, or None if the route must be laid out again.
+    """Return the route after a few waypoints were moved, or None if the whole route must be computed again.
 
-    The route must be laid out again if a move may change more than the row of the waypoint: next to loiters, merged
+    The whole route must be computed again if a move may change more than the waypoint itself: next to loiters, merged
     waypoints and kept altitudes, and with jumps, gates, RTL, landings and courses at the ends.
 
     route: route of the previous mission.
@@ -115,5 +115,5 @@ def _map_position(item: MissionItem, mission: Mission, scenario: Scenario) -> tu
 
 
 def _is_near_previous(points: Floats, row: int) -> bool:
-    """Return True if a waypoint is so near to the previous waypoint that both may be merged."""
+    """Return True if a waypoint is so close to the previous waypoint that both may be merged."""
     return math.dist(points[row - 1, :2], points[row, :2]) < _MERGE_DISTANCE_M

@@ -33,6 +33,7 @@ _SHUTDOWN_TIMEOUT_S = 2
 
 
 def _never_stop() -> bool:
+    """Return False, so that the studio runs until it is interrupted."""
     return False
 
 
@@ -57,7 +58,7 @@ def open_studio(
     port: port of the server; None for 8790, or any free port if 8790 is taken.
     browser: True opens the page in the browser.
     keep: the folder of autosaves, which the next start restores.
-    stop: polled continuously.
+    stop: polled continuously; the studio ends when it returns True.
     on_message: called with the page's address, which contains the access token.
 
     A script must call this function under ``if __name__ == "__main__":``, because flight processes import the script.
@@ -74,7 +75,7 @@ def open_studio(
             on_message(f"earlier edits are restored (from {autosave_file}){undo_hint}")
         for file in session.unreadable:
             on_message(
-                f"{file}: not a readable autosave file; it is left unchanged, and edits are not saved automatically"
+                f"{file}: this autosave file cannot be read; it stays unchanged, and edits are not saved automatically"
             )
         # Imported here: only serving needs the extra.
         from planfly.studio.server import Server
@@ -128,7 +129,7 @@ def _open_page(address: str) -> Iterator[None]:
 
 
 async def _serve(server: "Server", listener: socket.socket, stop: Callable[[], bool]) -> None:
-    """Serve until `stop` returns True."""
+    """Serve pages on a socket until `stop` returns True."""
     import uvicorn
 
     from planfly.studio.app import make_app

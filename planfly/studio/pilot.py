@@ -54,7 +54,7 @@ INTERNAL = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeEr
 
 
 def internal_text(error: Exception) -> str:
-    """Describe an internal error of planfly in a line."""
+    """Describe an internal error of planfly in one line."""
     return f"this failed because of an error in planfly: {type(error).__name__}: {error}"
 
 
@@ -112,6 +112,10 @@ class WorkerProcess:
         self._set_newest_task(None)
 
     def _set_newest_task(self, task: Task | None) -> None:
+        """Replace the newest task, which cancels a task in progress; None only cancels.
+
+        If the cancelled task does not end in time, its process is killed.
+        """
         with self._condition:
             dropped_task = self._newest_task if not self._is_newest_sent else None
             self._newest_task, self._is_newest_sent = task, False
@@ -176,7 +180,7 @@ class WorkerProcess:
                         self._unanswered = [number for number in self._unanswered if number != task.number]
 
     def _fail_unsent(self, task: Task | None, reason: str) -> None:
-        """Answer `task`, which could not be sent, with `reason`."""
+        """Report a fault of a task that could not be sent to the process."""
         with self._condition:
             if task is None or self._is_closed:
                 return
@@ -185,7 +189,11 @@ class WorkerProcess:
         self._on_answer(Answer(task.number, "fault", reason))
 
     def _kill_if_stuck(self, pipe: Connection, number: int) -> None:
-        """Kill a process that is still doing a cancelled task; a new process then does the newest task."""
+        """Kill a process that still works on a cancelled task; a new process then gets the newest task.
+
+        pipe: pipe to the process.
+        number: number of the cancelled task.
+        """
         with self._condition:
             self._timer = None
             if self._is_closed or self._pipe is not pipe or number not in self._unanswered:
@@ -200,7 +208,7 @@ class WorkerProcess:
             self._on_answer(Answer(dropped_number, "cancelled"))
 
     def _drop_unanswered(self) -> list[int]:
-        """Clear the unanswered tasks of a lost process, and return their numbers without the newest task."""
+        """Forget the unanswered tasks of a lost process; return their numbers except the newest task's."""
         dropped_numbers = [
             number for number in self._unanswered if self._newest_task is None or number != self._newest_task.number
         ]
@@ -208,12 +216,13 @@ class WorkerProcess:
         return dropped_numbers
 
     def _cancel_timer(self) -> None:
+        """Cancel the timer that would kill a stuck process."""
         if self._timer is not None:
             self._timer.cancel()
         self._timer = None
 
     def _ensure_process(self) -> Connection:
-        """Return the pipe to a running process, started if necessary."""
+        """Return the pipe to the worker process; start the process if it is not running."""
         if self._pipe is not None and self._process is not None and self._process.is_alive():
             return self._pipe
         context = multiprocessing.get_context("spawn")
@@ -232,7 +241,7 @@ class WorkerProcess:
         return server_end
 
     def _forward_answers(self, pipe: Connection) -> None:
-        """Forward answers until the pipe closes; if the process ends without an answer, report a fault of its task."""
+        """Forward answers of the process until the pipe closes; a task without an answer gets a fault."""
         while True:
             try:
                 answer = pipe.recv()
@@ -271,7 +280,7 @@ class WorkerProcess:
 
 
 def run_worker(pipe: Connection) -> None:
-    """Run the newest task from the pipe, again and again, until the pipe closes."""
+    """Run the newest task from the pipe until the pipe closes; the main loop of a worker process."""
     import signal
 
     # An interrupt at the terminal is handled by the server.

@@ -119,6 +119,7 @@ class Server:
             await self._autosave()
 
     async def _autosave(self) -> None:
+        """Save changed edits; an error is reported to the pages once."""
         if self._autosave_file is not None and (self.session.needs_autosave or self.session.autosaved_rev):
             # On a full disk the studio goes on without autosave, and reports the error once.
             try:
@@ -138,6 +139,7 @@ class Server:
         self._draw_thread.shutdown(wait=False, cancel_futures=True)
 
     async def _run_judging(self, function: Callable[[], Result]) -> Result:
+        """Call a function in the judging thread, and return its result."""
         return await asyncio.get_running_loop().run_in_executor(self._judge_thread, function)
 
     def _pack_task(self, task: Task | None) -> bytes:
@@ -179,12 +181,14 @@ class Server:
             await asyncio.gather(*tasks, messages_task, overflow_task, return_exceptions=True)
 
     async def _handle_messages(self, page: Page) -> None:
+        """Send the initial messages to a page, then handle its messages until it disconnects."""
         await self._send_initial_messages(page)
         while True:
             await self._handle_message(page, await _receive_text(page.socket))
             await asyncio.sleep(MESSAGE_PAUSE_S)
 
     async def _wait_for_free_slot(self) -> None:
+        """Wait until fewer than `MAX_PAGES` pages are connected."""
         while len(self._pages) >= MAX_PAGES:
             await asyncio.sleep(_SLOT_CHECK_INTERVAL_S)
 
@@ -210,13 +214,14 @@ class Server:
         return None
 
     async def _write_frames(self, page: Page) -> None:
+        """Send the queued frames of a page; errors of a page that has disconnected are ignored."""
         while True:
             frame = await page.frames.get()
             with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await (page.socket.send_bytes(frame) if isinstance(frame, bytes) else page.socket.send_text(frame))
 
     async def _judge_drags(self, page: Page) -> None:
-        """Judge the newest position of a drag, one at a time."""
+        """Judge the newest position of a drag and send the result, one position at a time."""
         while True:
             await page.drag_received.wait()
             page.drag_received.clear()
@@ -238,6 +243,7 @@ class Server:
             await asyncio.sleep(_SEND_PAUSE_S)
 
     async def _send_initial_messages(self, page: Page) -> None:
+        """Send choices, world, mission, tasks, results and terrain to a page that has just connected."""
         page.send({"kind": "choices", **self.jobs.choices(), **folder_message(self._folder)})
         page.send(self.session.world_message())
         for message in (*self.jobs.progress_messages(), self._sheet_message(), *self.jobs.result_messages()):
@@ -245,7 +251,7 @@ class Server:
         await self._send_ground(page)
 
     def _sheet_message(self) -> Json:
-        """Return the mission as page data; "planning" is true for a placeholder until its path is found."""
+        """Return the message with the mission; "planning" is true while its first path is being planned."""
         return {**self.session.sheet(), "planning": self.jobs.is_planning_first_path(self.session)}
 
     async def _send_ground(self, page: Page) -> None:
@@ -302,6 +308,7 @@ class Server:
             page.send({"kind": "fault", "text": internal_text(error)})
 
     async def _dispatch(self, page: Page, message: messages.Message) -> None:
+        """Carry out a message of a page.  Raises StaleEdit for an edit of an outdated mission, and PlanflyError."""
         session = self.session
         match message:
             case messages.Ask(kind="stop"):
@@ -326,7 +333,7 @@ class Server:
                 await self._change_session(message)
 
     async def _change_session(self, message: messages.Message) -> None:
-        """Change the session and send the result to every page."""
+        """Change the session as a message requests, send the result to every page, and start a flight."""
         session = self.session
         async with self._change_lock:
             rev, world_rev = session.rev, session.world_rev
@@ -343,6 +350,7 @@ class Server:
                 await self._send_ground(page)
 
     def _apply_change(self, message: messages.Message) -> None:
+        """Change the session as a message requests; called in the judging thread."""
         session = self.session
         match message:
             case messages.Move() | messages.Insert() | messages.Delete() | messages.Raise() | messages.Apply():
@@ -370,16 +378,17 @@ class Server:
                 self.jobs.drop_results()
 
     def _open_file(self, message: messages.Open) -> Any:
+        """Return the document of a dropped file, or of a file in the folder if the message has no data."""
         if message.data is None:
             return open_document(str(find_file_in_folder(self._folder, message.name)), self.session.options)
         try:
             data = base64.b64decode(message.data, validate=True)
         except binascii.Error as error:
-            raise MissionError(f"{message.name[:60]}: the file did not arrive completely", field="data") from error
+            raise MissionError(f"{message.name[:60]}: the file was not received completely", field="data") from error
         return open_dropped(message.name, data, self.session.options)
 
     def _read_parameter_file(self, name: str) -> messages.Settings:
-        """Return the settings in a parameter file of the folder."""
+        """Read a parameter file of the folder, and return the message that changes the settings to it."""
         path = find_file_in_folder(self._folder, name)
         data = read_small_file(path, messages.MAX_MESSAGE_CHARACTERS, "parameter", PlanflyError)
         text = utf8_text(data, path, PlanflyError)
@@ -389,12 +398,13 @@ class Server:
     # Answers of the processes.
 
     def _forward_answer(self, worker: str, answer: Answer) -> None:
-        """Forward an answer from the thread of a process's pipe to the event loop."""
+        """Forward an answer of a worker from its thread to the event loop."""
         if self._loop is not None and not self._loop.is_closed():
             with contextlib.suppress(RuntimeError):
                 self._loop.call_soon_threadsafe(self._handle_answer, worker, answer)
 
     def _handle_answer(self, worker: str, answer: Answer) -> None:
+        """Send the result of a worker's answer to the pages, and use the first planned path."""
         for message in self.jobs.handle_answer(worker, answer, self.session):
             self._broadcast(message)
         if self.jobs.pop_initial_plan(self.session):
@@ -410,7 +420,7 @@ class Server:
                 {
                     "kind": "fault",
                     "job": "plan",
-                    "text": "the mission was edited meanwhile, so its first path is not used",
+                    "text": "the mission was edited while its first path was planned, so the path is not used",
                 }
             )
         except PlanflyError as error:
@@ -419,6 +429,7 @@ class Server:
             self._broadcast({"kind": "fault", "job": "plan", "text": internal_text(error)})
 
     def _broadcast(self, message: Json) -> None:
+        """Send a message to every page."""
         for page in self._pages:
             page.send(message)
 
@@ -435,6 +446,6 @@ async def _receive_text(socket: WebSocket) -> str:
 
 
 def _make_frame(kind: str, header: Json, body: bytes) -> bytes:
-    """Return a binary frame of its kind, the length of its head, the head as JSON, and the body."""
+    """Return a binary frame: kind (a letter), length of the header (4 bytes), header as JSON, and body."""
     text = json.dumps(header).encode()
     return kind.encode() + struct.pack("<I", len(text)) + text + body

@@ -82,7 +82,7 @@ class Session:
 
     @classmethod
     def from_document(cls, document: Document, options: MissionOptions) -> "Session":
-        """Return a session of an opened document."""
+        """Start a session with an opened document.  options: options of the command."""
         context = EditContext.from_setup(
             document.setup, options.get("terrain"), read_named_fences(options.get("fence") or ())
         )
@@ -102,10 +102,11 @@ class Session:
         self._restore_state((new_session.document, new_session.context, new_session.history))
 
     def _opened_state(self) -> _OpenedState:
+        """Return the document with its context and history, to restore it later."""
         return self.document, self.context, self.history
 
     def _restore_state(self, opened_state: _OpenedState) -> None:
-        """Restore a document as it was left; if it cannot be judged, nothing is changed."""
+        """Show a document with its earlier context and history; if it cannot be judged, nothing is changed."""
         _, context, history = opened_state
         judged_mission = context.judge(history.mission)
         self.document, self.context, self.history = opened_state
@@ -114,6 +115,7 @@ class Session:
         self.document_rev += 1
 
     def _add_to_history(self, mission: Mission, text: str) -> None:
+        """Record an edit, and forget undone documents.  text: description of the edit."""
         self.history.add(mission, text)
         self.undone_states = []
 
@@ -180,7 +182,11 @@ class Session:
             raise
 
     def preview(self, message: Drag) -> Json:
-        """Judge the windows around a dragged item, or the whole mission on request, without changing the mission."""
+        """Judge the mission with an item dragged to another position, without changing the mission.
+
+        Returns page data of the route near the item, or of the whole mission on request.  Raises StaleEdit if the
+        message refers to an outdated mission.
+        """
         if message.rev != self.rev:
             raise StaleEdit
         mission = self._move_item(message.k, message.east, message.north, message.up)
@@ -190,7 +196,10 @@ class Session:
         return {"sheet": sheet_json(self.context, judged_mission)}
 
     def replace_plan(self, message: Choose) -> None:
-        """Replace the whole mission, or the items between two items, by a planned path. Raises StaleEdit."""
+        """Replace the mission, or its items between two items, by a planned path.
+
+        Raises StaleEdit if the message refers to an outdated mission, and PlanflyError if the path no longer exists.
+        """
         if message.rev != self.rev:
             raise StaleEdit
         plans, item_range = self.plans
@@ -245,7 +254,10 @@ class Session:
                 return self._apply_suggestion(message)
 
     def _indices_to_raise(self, indices: list[int] | None) -> tuple[int, ...]:
-        """Return the given indices, or all for None, without landings unless there are only landings."""
+        """Return the indices of the items to raise, without landings unless all of them are landings.
+
+        indices: requested items; None for all items with a position.
+        """
         requested = edits.movable_indices(self.mission) if indices is None else tuple(indices)
         airborne = tuple(
             index for index in requested if edits.movable_item(self.mission, index).command not in LANDINGS
@@ -253,6 +265,7 @@ class Session:
         return airborne or requested
 
     def _move_item(self, index: int, east: float | None, north: float | None, altitude: float | None) -> Mission:
+        """Return the mission with an item at another position, m, or altitude, m AMSL; None keeps the old value."""
         mission = self.mission
         edits.movable_item(mission, index)
         if east is not None and north is not None:
@@ -267,7 +280,7 @@ class Session:
         return mission if mission is self.mission else self.context.with_updated_radii(mission, index)
 
     def _insert_waypoint(self, message: Insert) -> tuple[Mission, str]:
-        """Return the mission with a waypoint inserted, and the text of the edit.
+        """Return the mission with a waypoint inserted, and a description of the edit.
 
         The waypoint's altitude is the mean of the previous and next item's altitudes if both have the same frame.
         """
@@ -287,6 +300,7 @@ class Session:
         ), f"insert an item after {previous_item.seq}"
 
     def _delete_items(self, indices: list[int]) -> tuple[Mission, str]:
+        """Return the mission without some items, and a description of the edit."""
         mission = self.mission
         for index in sorted(set(indices), reverse=True):
             mission = edits.delete_item(mission, index)
@@ -296,6 +310,10 @@ class Session:
         return mission, f"delete {len(set(indices))} item{'s' if len(set(indices)) != 1 else ''}"
 
     def _apply_suggestion(self, message: Apply) -> tuple[Mission, str]:
+        """Return the mission changed by a suggestion, and a description of the edit.
+
+        Raises MissionError for a suggestion that no longer exists or does not pass its trial.
+        """
         if message.flown:
             return self._apply_flown_suggestion(message)
         findings = self.judged.verdict.findings
@@ -316,7 +334,10 @@ class Session:
         return mission, f"apply a suggestion of {finding.rule}"
 
     def _apply_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
-        """Return the mission as flown in the trial of a suggestion, and the text of the edit."""
+        """Return the mission as flown in the trial of a suggestion, and a description of the edit.
+
+        Raises MissionError if the mission was changed after the trial.
+        """
         rev, missions = self.flown_trials
         flown_mission = missions.get((message.finding, message.which)) if rev == self.rev else None
         if flown_mission is None:
@@ -374,7 +395,7 @@ class Session:
     # Page data, and files.
 
     def sheet(self) -> Json:
-        """Return the current mission with its verdict as page data."""
+        """Return the message with the current mission and its verdict."""
         return {
             "kind": "sheet",
             "rev": self.rev,
@@ -391,7 +412,7 @@ class Session:
         }
 
     def world_message(self) -> Json:
-        """Return the world as page data."""
+        """Return the message with the map, threats, zones and settings."""
         return {
             "kind": "world",
             "world": self.world_rev,
@@ -400,17 +421,20 @@ class Session:
         }
 
     def save(self, form: str) -> SavedFile:
-        """Return the mission as a file. Raises PlanflyError if the format cannot store it."""
+        """Return the mission as a file of a format. Raises PlanflyError if the format cannot store it."""
         saved_file = save_document(self.document, self.context, self.judged, form)
         if form != "kml":
             self.saved_mission = self.mission
         return saved_file
 
     def overwrite_file(self) -> SavedFile:
-        """Overwrite the file that the command named. Raises PlanflyError if there is none."""
+        """Overwrite the mission file that the studio was started with.
+
+        Raises PlanflyError if the studio was started without one, or if another program has changed it.
+        """
         path = self.document.path
         if path is None or not self.document.kind:
-            raise PlanflyError("no mission file was named: save it as a new one", field="over")
+            raise PlanflyError("the studio was started without a mission file: save as a new file", field="over")
         if path.exists() and path.read_bytes() != self.document.on_disk:
             message = f"{path.name} was changed by another program since it was opened: save it under another name"
             raise PlanflyError(message, file=path)
@@ -428,21 +452,26 @@ class Session:
         return self.is_changed or self.context.scenario is not self.document.setup.scenario
 
     def autosave_path(self, file: Path) -> Path:
-        """Return the autosave path: `file` for the first document, a file next to it for documents opened later."""
+        """Return the autosave path of the current document.
+
+        file: autosave path of the first document; later documents get another file in its folder.
+        """
         return sibling_autosave_path(file, self.history.first) if self.earlier_states else file
 
     def autosave(self, first_autosave_file: Path) -> None:
-        """Write the autosave file if anything has changed since the last autosave."""
+        """Write the autosave file if anything has changed since the last autosave.
+
+        first_autosave_file: autosave path of the first document.  A file that could not be read is not overwritten.
+        """
         if self.autosaved_rev == self.rev:
             return
-        first_autosave_file = self.autosave_path(first_autosave_file)
-        if first_autosave_file in self.unreadable:
+        file = self.autosave_path(first_autosave_file)
+        if file in self.unreadable:
             return
-        first_autosave_file.parent.mkdir(parents=True, exist_ok=True)
+        file.parent.mkdir(parents=True, exist_ok=True)
         plan = self.judged.setup.plan
-        write_atomically(
-            first_autosave_file, autosave_text(self.context, self.history.first, self.mission, plan, self.document.name)
-        )
+        text = autosave_text(self.context, self.history.first, self.mission, plan, self.document.name)
+        write_atomically(file, text)
         self.autosaved_rev = self.rev
 
     def restore(self, file: Path) -> bool:
@@ -468,6 +497,9 @@ class Session:
 
 
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:
-    """Open a target of the command; also return True if an autosave was restored. Raises PlanflyError."""
+    """Open the target of the command; return the session, and True if an autosave was restored.
+
+    Raises PlanflyError.
+    """
     session = Session.from_document(open_document(target, options), options)
     return session, autosave_file is not None and session.restore(autosave_file)

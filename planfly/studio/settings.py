@@ -42,7 +42,7 @@ class SetParameters:
         return parameters_text(self.values, title)
 
     def airframe(self, scenario: Scenario) -> Airframe:
-        """Load the airframe of a scenario with these parameters and their source. Raises PlanflyError."""
+        """Load the airframe of a scenario, with these parameters in its autopilot. Raises PlanflyError."""
         airframe = load_airframe(scenario, self.values)
         stored_autopilot = airframe.autopilot.store()
         if not self.values or stored_autopilot.parameters is None:
@@ -109,7 +109,10 @@ def apply_parameter_settings(current: SetParameters, scenario: Scenario, setting
 
 
 def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
-    """Read autopilot parameters from the text of a file. Raises PlanflyError, which names the file."""
+    """Parse the text of a parameter file for the autopilot of a scenario.  name: file name for messages.
+
+    Raises PlanflyError for an invalid file.
+    """
     scenario_values = _load_autopilot_parameters(scenario).by_origin("file")
     with temporary_folder("planfly-studio-") as folder:
         file = folder / "set.parm"

@@ -45,9 +45,10 @@ class PlaceStates(NamedTuple):
 
 
 def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *, shift: int = 0) -> PlaceStates:
-    """Return the states of legs, corners, threats and zones; a failed threat or zone also fails the legs that enter it.
+    """Return the states of legs, corners, threats and zones according to findings.
 
-    shift: number added to the legs and corners of a part of a route.
+    A violated threat or zone also fails the legs that enter it.
+    shift: number added to the numbers of legs and corners, for the findings on a part of a route.
     """
     legs: dict[int, State] = {}
     corners: dict[int, State] = {}
@@ -71,6 +72,7 @@ def place_states(requirements: RouteRequirements, findings: Sequence[Finding], *
 
 
 def _set_worse_state(states: dict[int, State], numbers: Iterable[int], state: State) -> None:
+    """Set the state of some legs or corners, unless their present state is worse."""
     for number in numbers:
         previous = states.get(number)
         if previous is None or (_SEVERITY_ORDER[state.state], state.closeness) < (
@@ -106,10 +108,12 @@ def finding_state(finding: Finding, *, unjudged: bool = False) -> State | None:
 
 
 def _rule_name(finding: Finding) -> str:
+    """Return the name of a finding's rule for the page."""
     return RULE_WORDS[finding.rule].word
 
 
 def _closeness(finding: Finding) -> float:
+    """Return the margin of a finding as a multiple of the margin at which it is shown as close to its limit."""
     scale, margin = RULE_WORDS[finding.rule].scale, finding.margin or 0.0
     if scale is None:
         if finding.limit is None or not finding.limit:
@@ -119,5 +123,6 @@ def _closeness(finding: Finding) -> float:
 
 
 def _value_text(finding: Finding) -> str:
+    """Return the rule, the value and the limit of a finding, such as "slope 5.2° (6.0°)"."""
     value, limit = finding.compared_texts()
     return f"{_rule_name(finding)} {value}" + (f" ({limit})" if limit else "")

@@ -60,7 +60,7 @@ def round_to_json(values: Any, digits: int = 1) -> Any:
 
 
 def world_json(context: EditContext, setup: FlightSetup) -> Json:
-    """Return page data of the world of a mission, with its area, threats, zones, ends and limits."""
+    """Return page data of a mission's surroundings: area, threats, zones, ends and limits."""
     scenario, mission = context.scenario, setup.mission
     extent = scenario.bounds if scenario.external else map_extent(scenario, context.item_positions(mission), [])
     return {
@@ -80,7 +80,10 @@ def world_json(context: EditContext, setup: FlightSetup) -> Json:
 
 
 def _widen_extent(extent: Floats) -> Floats:
-    """Widen a map extent, so that the terrain fills a window of another shape.  extent: (2, 2), m."""
+    """Return a larger map extent, so that the terrain also fills windows of other shapes.
+
+    extent: minimum and maximum of east, then of north, (2, 2), m.
+    """
     center, size = extent.mean(axis=1), np.diff(extent, axis=1)[:, 0]
     longer_side = float(size.max())
     half_size = 0.5 * np.maximum(
@@ -90,6 +93,7 @@ def _widen_extent(extent: Floats) -> Floats:
 
 
 def _threats_json(threats: Threats) -> list[Json]:
+    """Return page data of threats: name, position and radii, m."""
     rows = zip(
         threats.names,
         threats.position.tolist(),
@@ -152,6 +156,7 @@ def window_json(mission: Mission, route: Route, windows: Sequence[Window]) -> Js
 
 
 def _window_json(mission: Mission, route: Route, window: Window) -> Json:
+    """Return page data of the waypoints, the path and the states in a judged part of the route."""
     first, last = window.first, window.last
     path = window.requirements.path
     states = place_states(window.requirements, window.findings, shift=window.start)
@@ -187,7 +192,7 @@ def items_json(context: EditContext, mission: Mission) -> list[Json]:
 
 
 def route_json(mission: Mission, route: Route, first: int, last: int) -> Json:
-    """Return page data of the waypoints from first to last, each with the index of its item, or -1 without an item."""
+    """Return page data of the waypoints `first` to `last`, each with the index of its item, or -1 without an item."""
     numbers = {item.seq: k for k, item in enumerate(mission.items)}
     items = [numbers.get(seq, -1) for seq in route.items[first : last + 1].tolist()]
     return {"route": round_to_json(route.waypoints[first : last + 1]), "of": items}
@@ -201,7 +206,7 @@ def _leg_paths(points: Floats, legs: NDArray[np.int64], first: int, last: int) -
 
 
 def states_json(states: PlaceStates, first: int, last: int) -> Json:
-    """Return the states of legs and corners in order, each as state and text."""
+    """Return page data of the legs and corners between two waypoints, each as a pair of state and text."""
     return {
         "legs": [_state_pair(states.legs.get(k, _OK_STATE)) for k in range(first, last)],
         "corners": [_state_pair(states.corners.get(k, _OK_STATE)) for k in range(first, last + 1)],
@@ -209,6 +214,7 @@ def states_json(states: PlaceStates, first: int, last: int) -> Json:
 
 
 def _state_pair(state: State) -> list[str]:
+    """Return a state as page data: its name and its text."""
     return [state.state, state.text]
 
 
@@ -235,6 +241,7 @@ def findings_json(verdict: Verdict) -> list[Json]:
 
 
 def _finding_json(number: int, finding: Finding) -> Json:
+    """Return page data of a finding, with its suggestions.  number: index of the finding in the verdict."""
     return {
         "number": number,
         "rule": RULE_WORDS[finding.rule].title,
@@ -254,7 +261,7 @@ def _finding_json(number: int, finding: Finding) -> Json:
 
 
 def profile_json(scenario: Scenario, setup: FlightSetup) -> Json:
-    """Return page data of the terrain along the route, the distances of waypoints, and the threats and zones."""
+    """Return page data of the profile along the route: terrain, waypoints, and sections of threats and zones."""
     route = setup.route.waypoints
     waypoint_distance = route_distance(route)
     distance, points = route_samples(route, max(float(waypoint_distance[-1]) / _PROFILE_SAMPLES, 1.0))

@@ -71,9 +71,11 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
 
 def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
-    """Return the findings of a flight as page data, with the suggestions that passed a trial, and their missions.
+    """Try the suggestions of a failed flight; return its findings with the suggestions that passed, and missions.
 
-    The missions are keyed by the numbers of finding and suggestion; a suggestion that changes no item has no mission.
+    payload: the editing context, and the pickled flight.
+    The findings are page data.  The missions have a suggestion applied, and are keyed by the numbers of finding and
+    suggestion; a suggestion that moves no item has no mission.
     """
     context, pickled = payload
     judged_mission: JudgedMission = pickle.loads(pickled)
@@ -153,12 +155,12 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
 
 
 def _stop_reason(deadline: float) -> str:
-    """Return the reason to end a search, or "" to go on."""
+    """Return the reason to end a search after the deadline, or "" before it.  deadline: monotonic time, s."""
     return "budget" if time.monotonic() > deadline else ""
 
 
 def with_ends(scenario: Scenario, start: tuple[float, ...], destination: tuple[float, ...]) -> Scenario:
-    """Return a scenario with other ends in the air, without courses.  start, destination: (3,), m."""
+    """Return a scenario with another start and destination, both in the air and without a course, (3,), m."""
     spec = scenario.to_json()
     for key, (east, north, altitude) in (("start", start), ("destination", destination)):
         spec[key] = {"east_m": east, "north_m": north, "amsl_m": altitude}

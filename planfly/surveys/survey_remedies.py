@@ -94,9 +94,9 @@ class TriedRemedies:
 def survey_remedies(
     setup: FlightSetup, airframe: Airframe, verdict: Verdict, on_trial: Callable[[str], None] = lambda _: None
 ) -> TriedRemedies:
-    """Find single changes with which all photo lines can be used, and return the smallest change of each kind.
+    """Find changes with which all photo lines of a survey can be used, the smallest of each kind, by trial flights.
 
-    If no single change is enough, try longer turn-arounds together with another parameter value or a lower airspeed: at
+    If no single change is enough, longer turn-arounds are combined with another parameter value or a lower airspeed: at
     most four flights for each of about five changes.
 
     verdict: verdict on the flight of the setup.  on_trial: called before each flight with a description of the change.
@@ -131,7 +131,7 @@ def _worst_margins(verdict: Verdict) -> dict[str, float]:
 
 
 def _count_usable(verdict: Verdict) -> tuple[int, int]:
-    """Return the number of photo lines that a verdict finds usable, and the number of all photo lines."""
+    """Return the number of usable photo lines according to a verdict, and the number of all photo lines."""
     lines = [finding.ok for finding in verdict.findings if finding.rule == "survey" and not finding.check]
     return sum(is_usable is True for is_usable in lines), len(lines)
 
@@ -184,7 +184,11 @@ class _Trials:
         return make_setup(scenario, airframe, mission, self._setup.seed, placed=placed)
 
     def _fly_trial(self, mission: Mission, airframe: Airframe, description: str) -> _TrialFlight | None:
-        """Fly a mission; return None if it has no valid route."""
+        """Fly a changed mission, and remember the flight if it came closest to passing.
+
+        description: description of the change.
+        Returns verdict, mission and path length (m), or None for a mission without a valid route.
+        """
         description = self._change_prefix + description
         self._on_trial(description)
         try:
@@ -201,7 +205,10 @@ class _Trials:
         return trial.flight_verdict, mission, trial.setup.path.length
 
     def _fly_layout(self, layout: SurveyLayout, description: str) -> _TrialFlight | None:
-        """Fly the surveys in another layout; return None if that layout cannot be made."""
+        """Fly the surveys with another layout; return None if the layout cannot be made.
+
+        description: description of the layout.
+        """
         mission, setup = self._setup.mission, self._setup
         # Start with the last survey, because a changed survey may be detected as two, which renumbers later surveys.
         for number in reversed(self._numbers):
@@ -217,7 +224,7 @@ class _Trials:
         return self._fly_trial(mission, self._airframe, description)
 
     def _is_remedy(self, flight: _TrialFlight | None) -> TypeGuard[_TrialFlight]:
-        """Return True if all lines are usable, no further rule fails, and no failure is noticeably worse."""
+        """Return True if all lines are usable, no further rule fails, and no rule fails noticeably more than before."""
         return (
             flight is not None
             and _all_lines_usable(flight[0])
@@ -238,11 +245,11 @@ class _Trials:
         )
 
     def try_other_side(self) -> SurveyRemedy | None:
-        """Try to fly the lines from the other side, so that turns are into the wind."""
+        """Try the lines in the opposite order, with turns into the wind; return None in calm air or on failure."""
         if self._setup.scenario.wind.speed <= 0.0:
             return None
         flight = self._fly_layout(
-            SurveyLayout(self._current_turn_around, backwards=True), "the lines from the other side"
+            SurveyLayout(self._current_turn_around, backwards=True), "the lines in the opposite order"
         )
         return (
             SurveyRemedy("side", "", 0.0, 1.0, "", *flight, self._current_turn_around)
@@ -299,7 +306,7 @@ class _Trials:
         return SurveyRemedy("every", "", 1.0, float(stride), "lines", *flight, shortest_length, lead_in)
 
     def find_course(self) -> SurveyRemedy | None:
-        """Try lines along and across the wind; return the shortest route that passes."""
+        """Try lines along and across the wind; return the shortest route that passes, or None."""
         wind = self._setup.scenario.wind
         if wind.speed <= 0.0:
             return None
@@ -316,7 +323,7 @@ class _Trials:
         return min(remedies, key=lambda remedy: remedy.length, default=None)
 
     def find_parameter(self) -> SurveyRemedy | None:
-        """Find an autopilot parameter with which another value passes."""
+        """Find an autopilot parameter that makes the flight pass with another value; return None if there is none."""
         passed_flights: list[_TrialFlight] = []
 
         def passes_with(autopilot: Autopilot) -> bool:
@@ -347,7 +354,11 @@ class _Trials:
     def _find_turn_around_with(
         self, change: str, airframe: Airframe, mission: Mission | None = None
     ) -> SurveyRemedy | None:
-        """Find the shortest turn-around that passes in combination with another change."""
+        """Find the shortest turn-around that passes in combination with another change.
+
+        change: description of the other change.
+        airframe, mission: changed airframe, and changed mission or None.
+        """
         trials = copy(self)
         trials._airframe, trials._change_prefix = airframe, f"{change}, "
         if mission is not None:
@@ -357,7 +368,7 @@ class _Trials:
         return remedy
 
     def find_parameter_and_turn_around(self) -> SurveyRemedy | None:
-        """Try each autopilot parameter half way to its farthest value, together with longer turn-arounds."""
+        """Try longer turn-arounds combined with one autopilot parameter, half way to the end of its tried range."""
         autopilot = self._airframe.autopilot
         values = (
             {}
@@ -378,7 +389,7 @@ class _Trials:
         return None
 
     def find_airspeed_and_turn_around(self) -> SurveyRemedy | None:
-        """Try the lowest of the slower airspeeds with longer turn-arounds."""
+        """Try longer turn-arounds combined with the lowest of the reduced airspeeds."""
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
             remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe)
             if remedy is not None:
@@ -386,7 +397,7 @@ class _Trials:
         return None
 
     def try_default_airspeed(self) -> SurveyRemedy | None:
-        """Try the default airspeed with longer turn-arounds, if the mission sets less than the minimum."""
+        """Try longer turn-arounds with the default airspeed, if the mission sets less than the minimum airspeed."""
         mission, default_airspeed = self._setup.mission, self._airframe.airspeed
         slow_items = [
             item for item in mission.items if 0.0 < _commanded_airspeed(item) < self._airframe.aircraft.airspeed_min
@@ -409,7 +420,10 @@ class _Trials:
         )
 
     def _slower_airspeeds(self) -> Iterator[tuple[float, Airframe]]:
-        """Yield reduced airspeeds, m/s, and airframes, the fastest first; nothing if the mission sets an airspeed."""
+        """Yield each reduced airspeed (m/s) with its airframe, the fastest first.
+
+        Yields nothing if the mission itself sets an airspeed.
+        """
         if any(item.command == Command.DO_CHANGE_SPEED for item in self._setup.mission.items):
             return
         min_speed = _MIN_AIRSPEED_RATIO * self._airframe.aircraft.airspeed_min

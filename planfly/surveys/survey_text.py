@@ -20,7 +20,7 @@ def is_line_usable(measure: LineMeasure | None) -> bool:
 
 
 def lines_headline(measures: list[LineMeasure | None]) -> str:
-    """Return a line with the number of usable photo lines and the worst line.
+    """Return one line with the number of usable photo lines, and the worst line if some are not usable.
 
     >>> lines_headline([None, None])
     '0 of 2 photo lines can be used; line 1 is the worst: not flown'
@@ -86,11 +86,11 @@ def has_required_overlap(measure: OverlapMeasure | None) -> bool:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe from where lines are usable, and thereby the turn-arounds that would be needed."""
+    """Describe how far after their start lines become usable, which shows the turn-arounds that would be needed."""
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (
-            f"no part of its {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, "
+            f"no part of the {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, "
             "because there is no room to turn"
         )
     latest_start, max_length = (
@@ -109,7 +109,7 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
 
 
 def near_miss_text(near_miss: NearMiss) -> str:
-    """Describe the best trial that did not pass, and the reason of its failure."""
+    """Describe the trial that came closest to passing, and the reason of its failure."""
     return (
         f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used;"
         f" {near_miss.verdict.headline}"
@@ -120,7 +120,7 @@ def remedy_text(remedy: SurveyRemedy, length: float) -> str:
     """Describe a remedy and the path length that it costs.  length: length of the current route, m."""
     match remedy.kind:
         case "side":
-            change = "the lines from the other side"
+            change = "the lines in the opposite order"
         case "turn-around":
             change = f"turn-arounds of {remedy.value:.0f} m instead of {remedy.current:.0f} m"
         case "every":

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from logs.importers.open_log import SUFFIXES
-from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_camera, is_place, is_wind
+from planfly.arguments import CAMERA_FORMAT, CHOICES, RANGES, is_camera, is_valid_position, is_wind
 
 # ----------------------------------------------------------------------
 # Convert command line texts to values within the ranges of the API's keywords.
 
 
 def number_parser(keyword: str) -> Callable[[str], Any]:
-    """Return a function that parses a number in the range of a keyword of the API.
+    """Return a function that parses a number and checks it against the range of an API keyword.
 
     >>> number_parser("seed")("3"), number_parser("max_hours")("1.5")
     (3, 1.5)
@@ -71,7 +71,7 @@ def parse_position(text: str) -> tuple[float, float]:
         lat, lon = (float(part) for part in text.split(","))
     except ValueError:
         lat, lon = math.nan, 0.0
-    if not is_place(lat, lon):
+    if not is_valid_position(lat, lon):
         raise argparse.ArgumentTypeError(
             f"{text!r}: expected LAT,LON: degrees north from -89 to 89, degrees east from -180 to 180"
         )
@@ -99,7 +99,7 @@ def parse_autopilots(text: str) -> list[str]:
 
 
 def parse_time_or_stations(text: str) -> float | str:
-    """Parse a time of the flight, s; return a text with a colon, the addresses of ground stations, unchanged."""
+    """Parse a time of the flight, s; a text with a colon is returned unchanged, as addresses of ground stations."""
     if ":" in text:
         return text
     return number_parser("end")(text)
@@ -131,7 +131,7 @@ def parse_threat(text: str) -> tuple[float, float, float, float]:
 
 
 def parse_problems(text: str) -> tuple[int, ...]:
-    """Parse numbers of threats separated by commas; only the four numbers of the paper are allowed."""
+    """Parse threat counts separated by commas, such as "7,15"; only the four counts of the paper are allowed."""
     parts = [part.strip() for part in text.split(",")]
     numbers = sorted({int(part) for part in parts if part.isdecimal()})
     if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(CHOICES["problems"]):

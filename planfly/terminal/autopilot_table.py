@@ -13,7 +13,7 @@ _GAP = "  "
 
 
 def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
-    """Return the table with a row for each rule, then the first lines of the verdict on each autopilot.
+    """Return a table with a row for each rule and a column for each autopilot, then the main lines of each verdict.
 
     verdicts: verdict for each autopilot, keyed by name, in the order of the columns.
 
@@ -49,6 +49,7 @@ def autopilot_lines(verdicts: Mapping[str, Verdict]) -> list[str]:
 
 
 def _answer_text(verdict: Verdict) -> str:
+    """Return a verdict in one or two words, for a cell of the table."""
     if verdict.undecided:
         return verdict.answer
     return "flyable" if verdict.flyable else "not flyable"

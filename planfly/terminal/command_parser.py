@@ -79,7 +79,7 @@ class OptionGroup(Protocol):
     """Parser, or group of a parser's options."""
 
     def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
-        """Add an option."""
+        """Add an option, as `argparse.ArgumentParser.add_argument` does."""
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -105,21 +105,21 @@ class CommandParser(argparse.ArgumentParser):
         self.epilog = epilog
         return colour_help(text) if wants_colour(sys.stdout) else text
 
-    def group(self, title: str, description: str | None = None) -> OptionGroup:
+    def add_group(self, title: str, description: str | None = None) -> OptionGroup:
         """Add a group of options, which the help shows under a title, and return it."""
         return self.add_argument_group(title, description)
 
     def alias_keyword(self, keyword: str, option: str) -> None:
-        """Let errors about the API keyword name the option, as errors about the option's dest do."""
+        """Register an option under whose name error messages mention an API keyword with another name."""
         self._aliases[keyword] = option
 
-    def keywords(self) -> dict[str, str]:
+    def options_by_keyword(self) -> dict[str, str]:
         """Return the option for each API keyword."""
         options_by_dest = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
         return options_by_dest | self._aliases
 
-    def options(self) -> list[str]:
-        """Return the long options of the parser."""
+    def long_options(self) -> list[str]:
+        """Return the parser's options that begin with two dashes."""
         return list(dict.fromkeys(_LONG_OPTION.findall(self.format_usage())))
 
 
@@ -147,11 +147,11 @@ class LineParser(CommandParser):
         # Remove argparse's list of commands, because the help shows them in sections.
         self._positionals._group_actions.clear()
 
-    def section(self, title: str) -> None:
+    def start_section(self, title: str) -> None:
         """Start a section of the help under a title, for the commands added next."""
         self._section = title
 
-    def command(self, name: str, summary: str, *examples: str, extra: str = "", details: str = "") -> CommandParser:
+    def add_command(self, name: str, summary: str, *examples: str, extra: str = "", details: str = "") -> CommandParser:
         """Add the parser for a command, and return it.
 
         summary: one sentence on the command.
@@ -196,7 +196,7 @@ class LineParser(CommandParser):
                 "",
             ).partition("=")[0]
             if option:
-                parser.error(f"{option}: no such option{did_you_mean(option, parser.options())}")
+                parser.error(f"{option}: no such option{did_you_mean(option, parser.long_options())}")
             parser.error(
                 f"{next((argument for argument in unknown_arguments if argument != '--'), unknown_arguments[0])}:"
                 " no such argument"
@@ -227,7 +227,7 @@ _KEYWORD = re.compile(r"`(\w+)`|\b(\w+)=True\b")
 
 
 def error_text(error: PlanflyError, parser: CommandParser) -> str:
-    """Return an error's text in which keywords of the API are replaced by the options of a command.
+    """Return the text of an error, with each API keyword replaced by the command-line option that sets it.
 
     >>> parser = CommandParser(prog="planfly replay")
     >>> _ = parser.add_argument("--from", dest="start")
@@ -237,7 +237,7 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     >>> error_text(PlanflyError("a.gif: exists; overwrite=True replaces it", file="a.gif"), parser)
     'a.gif: exists; --overwrite replaces it'
     """
-    options, text = parser.keywords(), str(error)
+    options, text = parser.options_by_keyword(), str(error)
     # An error in a scenario that a keyword changed names the keyword as its file; a real file may have the same name.
     is_keyword = error.file in options and bool(error.field)
     prefix = f"{error.file}: " if error.file and not is_keyword else ""

@@ -13,23 +13,24 @@ _COLOUR_OR_SPECIAL = re.compile(COLOUR_SEQUENCE + r"|[^\n\t\x20-\x7e]")
 _SPECIAL = re.compile(r"[^\n\t\x20-\x7e]")
 
 
-def without_controls(text: str, *, colours: bool = False) -> str:
+def escape_controls(text: str, *, colours: bool = False) -> str:
     r"""Return a text with escapes for all control characters except line feeds and tabs.
 
     colours: True to keep planfly's own colours.
 
-    >>> print(without_controls("a\x1b[2J \u202e\x9b \xb0"))
+    >>> print(escape_controls("a\x1b[2J \u202e\x9b \xb0"))
     a\x1b[2J \u202e\x9b °
     """
     return (_COLOUR_OR_SPECIAL if colours else _SPECIAL).sub(_escape, text)
 
 
 def _escape(match: re.Match[str]) -> str:
+    """Return the escape for a matched control character; longer matches and other characters are returned unchanged."""
     text = match[0]
     is_control = len(text) == 1 and unicodedata.category(text) in _CONTROLS
     return text.encode("unicode_escape").decode() if is_control else text
 
 
-def escaped_json(text: str) -> str:
-    """Return JSON text with JSON's escapes for control characters in its strings."""
+def escape_json_controls(text: str) -> str:
+    r"""Return JSON text in which control characters are replaced by JSON escapes such as \u009b."""
     return _SPECIAL.sub(lambda match: match[0] if _escape(match) == match[0] else json.dumps(match[0])[1:-1], text)

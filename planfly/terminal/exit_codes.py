@@ -17,7 +17,7 @@ exit codes: 0 flyable, or flown as planned
 FLYABLE = 0
 FAULT = 1
 BAD_INPUT = 2
-LOSS = 3
+INCOMPLETE = 3
 NOT_FLYABLE = 4
 # Interrupted by Ctrl-C.  By the convention of shells, this is 128 plus the number of the signal.
 INTERRUPTED = 130
@@ -26,5 +26,5 @@ INTERRUPTED = 130
 def verdict_code(verdict: "Verdict") -> int:
     """Return the exit code for a verdict that is flyable, not flyable, or not judged in full."""
     if verdict.undecided:
-        return LOSS
+        return INCOMPLETE
     return FLYABLE if verdict.flyable else NOT_FLYABLE

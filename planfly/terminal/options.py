@@ -46,7 +46,7 @@ def call_api(function: Callable[..., Result], args: argparse.Namespace, **overri
 # Options for output files, and for the amount of printed text.
 
 
-def result_options(
+def add_result_options(
     parser: CommandParser, out: str = "", placeholder: str = "DIR", *, json: bool = True, junit: bool = False
 ) -> None:
     """Add the options for output files and for the amount of printed text.
@@ -55,19 +55,19 @@ def result_options(
     placeholder: placeholder for the value of --out.
     junit: True if the answer of the command is a verdict.
     """
-    group = parser.group("results")
+    group = parser.add_group("results")
     if out:
         group.add_argument("--out", metavar=placeholder, help=out)
     group.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
     if json:
-        json_option(group, parser.prog.split()[-1])
+        add_json_option(group, parser.prog.split()[-1])
     if junit:
         group.add_argument(
             "--junit", metavar="FILE", help="also write the verdict as JUnit XML, for continuous integration"
         )
 
 
-def json_option(group: OptionGroup, command: str) -> None:
+def add_json_option(group: OptionGroup, command: str) -> None:
     """Add the options for an answer as JSON, and for no printed text."""
     group.add_argument(
         "--json",
@@ -84,28 +84,28 @@ def json_option(group: OptionGroup, command: str) -> None:
 # Options for the world of a flight, its aircraft and its autopilot.
 
 
-def world_options(parser: CommandParser) -> OptionGroup:
+def add_world_options(parser: CommandParser) -> OptionGroup:
     """Add the options for the world in which a mission is judged, and return their group."""
-    group = parser.group("where it flies")
+    group = parser.add_group("where it flies")
     with_completer(
         group.add_argument(
             "--scenario", metavar="SCENARIO", help="judge within this scenario: a TOML file or an embedded name"
         ),
         complete_scenario,
     )
-    terrain_option(group)
-    fence_option(group)
+    add_terrain_option(group)
+    add_fence_option(group)
     return group
 
 
-def terrain_option(group: OptionGroup) -> None:
+def add_terrain_option(group: OptionGroup) -> None:
     """Add the option for the terrain."""
     suffixes, names = ", ".join(SUFFIXES), ", ".join(EMBEDDED)
     help_text = f"elevation file ({suffixes}), a folder or .vrt of such tiles, or an embedded name: {names}"
     group.add_argument("--terrain", metavar="DEM", help=help_text)
 
 
-def fence_option(group: OptionGroup) -> None:
+def add_fence_option(group: OptionGroup) -> None:
     """Add the option for fences in addition to the fences of the mission."""
     option = group.add_argument(
         "--fence",
@@ -118,7 +118,7 @@ def fence_option(group: OptionGroup) -> None:
     with_completer(option, file_completer("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
 
 
-def time_option(group: OptionGroup) -> None:
+def add_time_option(group: OptionGroup) -> None:
     """Add the option for the time of the flight."""
     group.add_argument(
         "--at",
@@ -130,9 +130,9 @@ def time_option(group: OptionGroup) -> None:
     )
 
 
-def aircraft_and_wind_options(parser: CommandParser) -> None:
+def add_aircraft_and_wind_options(parser: CommandParser) -> None:
     """Add the options for the aircraft and the wind."""
-    group = parser.group("aircraft and weather")
+    group = parser.add_group("aircraft and weather")
     with_completer(
         group.add_argument(
             "--aircraft",
@@ -154,20 +154,20 @@ def aircraft_and_wind_options(parser: CommandParser) -> None:
         help="steady wind: m/s, and the direction it blows from in degrees: 8,270 is 8 m/s from the west "
         "(default: the scenario's, or none)",
     )
-    turbulence_option(group)
-    time_option(group)
+    add_turbulence_option(group)
+    add_time_option(group)
 
 
-def turbulence_option(group: OptionGroup) -> None:
+def add_turbulence_option(group: OptionGroup) -> None:
     """Add the option for the turbulence."""
     group.add_argument(
         "--turbulence", choices=CHOICES["turbulence"], help="turbulence (default: the scenario's, or none)"
     )
 
 
-def autopilot_options(parser: CommandParser) -> OptionGroup:
+def add_autopilot_options(parser: CommandParser) -> OptionGroup:
     """Add the options for the autopilot, and return their group."""
-    group = parser.group("autopilot")
+    group = parser.add_group("autopilot")
     option = group.add_argument(
         "--params",
         metavar="FILE",
@@ -195,9 +195,9 @@ def autopilot_options(parser: CommandParser) -> OptionGroup:
     return group
 
 
-def steering_options(parser: CommandParser) -> OptionGroup:
+def add_steering_options(parser: CommandParser) -> OptionGroup:
     """Add the options for the autopilot and its position errors, and return their group."""
-    group = autopilot_options(parser)
+    group = add_autopilot_options(parser)
     group.add_argument(
         "--nav",
         choices=CHOICES["nav"],
@@ -207,16 +207,16 @@ def steering_options(parser: CommandParser) -> OptionGroup:
     return group
 
 
-def program_option(group: OptionGroup, help_text: str) -> None:
-    """Add the option for the program of an autopilot.  help_text: help text."""
+def add_sitl_option(group: OptionGroup, help_text: str) -> None:
+    """Add the option --sitl for the path of an autopilot's program.  help_text: help of the option."""
     group.add_argument("--sitl", metavar="PATH", help=help_text)
 
 
-def flight_options(parser: CommandParser) -> None:
+def add_flight_options(parser: CommandParser) -> None:
     """Add the options for a flight's aircraft, weather, autopilot and limits."""
-    aircraft_and_wind_options(parser)
-    group = steering_options(parser)
-    program_option(
+    add_aircraft_and_wind_options(parser)
+    group = add_steering_options(parser)
+    add_sitl_option(
         group,
         "fly ArduPlane or PX4 itself in planfly's flight dynamics: the path of its program, built for software in the "
         "loop (extra planfly[live])",
@@ -236,7 +236,7 @@ def flight_options(parser: CommandParser) -> None:
         help="if the flight passes, also fly the mission by planfly's guidance, and say whether the two flights agree "
         "(default: only if the flight fails, to find out why)",
     )
-    limits = parser.group("limits of the flight")
+    limits = parser.add_group("limits of the flight")
     limits.add_argument(
         "--max-hours",
         metavar="H",
@@ -253,7 +253,7 @@ def flight_options(parser: CommandParser) -> None:
     )
 
 
-def log_rate_option(group: OptionGroup) -> None:
+def add_log_rate_option(group: OptionGroup) -> None:
     """Add the option for the rows per second in the log."""
     group.add_argument(
         "--log-hz",
@@ -265,9 +265,9 @@ def log_rate_option(group: OptionGroup) -> None:
     )
 
 
-def imported_log_options(parser: CommandParser) -> None:
+def add_imported_log_options(parser: CommandParser) -> None:
     """Add the options for information that may be missing in a log of another program."""
-    group = parser.group("an autopilot's log")
+    group = parser.add_group("an autopilot's log")
     option = group.add_argument("--plan", metavar="MISSION", help="planned mission (default: the mission in the log)")
     with_completer(option, file_completer(*MISSION_SUFFIXES))
     group.add_argument(
@@ -281,14 +281,14 @@ def imported_log_options(parser: CommandParser) -> None:
     )
 
 
-def log_argument(
+def add_log_argument(
     parser: CommandParser, name: str = "log", metavar: str = "LOG.mcap", help_text: str = "a flight log"
 ) -> None:
     """Add the argument for a flight log to read."""
     with_completer(parser.add_argument(name, metavar=metavar, help=help_text), file_completer("mcap"))
 
 
-def scenario_argument(parser: CommandParser, **settings: object) -> None:
+def add_scenario_argument(parser: CommandParser, **settings: object) -> None:
     """Add the argument for a scenario to plan in."""
     with_completer(
         parser.add_argument("scenario", metavar="SCENARIO", **settings),  # type: ignore[arg-type]
@@ -300,9 +300,9 @@ def scenario_argument(parser: CommandParser, **settings: object) -> None:
 # Options for the links of commands that talk to ground stations, and the end of these commands.
 
 
-def own_link_options(parser: CommandParser, *, bind: str) -> None:
-    """Add the options for a vehicle's MAVLink connection."""
-    group = parser.group("the link")
+def add_vehicle_link_options(parser: CommandParser, *, bind: str) -> None:
+    """Add the options for the MAVLink connection of a simulated vehicle.  bind: default of --bind."""
+    group = parser.add_group("the link")
     group.add_argument(
         "--bind", metavar="IP:PORT", default=bind, help=f"address at which the vehicle listens (default: {bind})"
     )
@@ -316,7 +316,7 @@ def own_link_options(parser: CommandParser, *, bind: str) -> None:
 
 @contextlib.contextmanager
 def watch_stop_signals() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns True after SIGINT or SIGTERM; the signals do not interrupt the closing of logs."""
+    """Yield a function that returns True after SIGINT or SIGTERM; neither signal interrupts the process itself."""
     should_stop = False
 
     def request_stop(_number: int, _frame: FrameType | None) -> None:

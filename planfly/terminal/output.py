@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple, TextIO
 
 from planfly.runtime.stages import Advance, Receiver, send_progress_to
 from planfly.terminal.command_parser import wants_colour
-from planfly.terminal.control_characters import escaped_json, without_controls
+from planfly.terminal.control_characters import escape_controls, escape_json_controls
 from planfly.workflow.output_paths import check_output_file
 from world.errors import PlanflyError
 from world.files import read_at_most, write_atomically
@@ -54,7 +54,7 @@ class _SafeStream(io.TextIOBase):
 
     def write(self, text: str, /) -> int:
         """Write the text without control characters."""
-        self.plain.write(without_controls(text, colours=wants_colour(self.plain)))
+        self.plain.write(escape_controls(text, colours=wants_colour(self.plain)))
         return len(text)
 
     def flush(self) -> None:
@@ -93,6 +93,7 @@ class _TolerantStream(_SafeStream):
                 raise _with_stream_name(error) from error
 
     def _drop_output(self) -> None:
+        """Ignore all further text, and let the interpreter write buffered text to the null device when it ends."""
         self._is_reader_gone = True
         # When the interpreter ends, it flushes the buffered text, which then goes to the null device.
         with contextlib.suppress(OSError, ValueError), Path(os.devnull).open("w") as null_file:
@@ -100,6 +101,7 @@ class _TolerantStream(_SafeStream):
 
 
 def _with_stream_name(error: OSError) -> OSError:
+    """Return a copy of an error that names standard output as its file."""
     return OSError(error.errno, error.strerror, "standard output")
 
 
@@ -130,11 +132,11 @@ def printable(text: str) -> str:
     >>> print(printable("a\nb \x1b[2J \u202e"))
     a b \x1b[2J \u202e
     """
-    return without_controls(" ".join(text.split()))
+    return escape_controls(" ".join(text.split()))
 
 
 def plain_stream(stream: TextIO) -> TextIO:
-    """Return the stream under a safe stream, for text that moves the cursor."""
+    """Return the stream that a safe stream wraps, for text that moves the cursor; other streams are returned as is."""
     plain: TextIO = getattr(stream, "plain", stream)
     return plain
 
@@ -169,6 +171,7 @@ class _LastDuration(NamedTuple):
 
 
 def _durations_file() -> Path:
+    """Return the path of the file with the durations of earlier stages, in the user's cache folder."""
     # Imported here: the help does not need it.
     from platformdirs import user_cache_dir
 
@@ -230,7 +233,10 @@ class _TimeLeft:
         self._done, self._next_report_time = 0.0, _FIRST_REPORT_DELAY_S
 
     def estimate(self, done: float, total: float) -> str:
-        """Return the time left as text; "" at the end, without a total, or without progress since the first report."""
+        """Record the work done, and return the time left as text.
+
+        The text is "" at the end, without a total, or without progress since the first report.
+        """
         if self._first_report is None:
             self._first_report = time.monotonic(), done
         self._done, units_done = done, done - self._first_report[1]
@@ -268,6 +274,7 @@ class _TimeLeft:
             )
 
     def _measured_time(self) -> float:
+        """Return the seconds since the first report, or 0 before it."""
         return 0.0 if self._first_report is None else time.monotonic() - self._first_report[0]
 
 
@@ -510,7 +517,7 @@ def write_json_if_requested(args: argparse.Namespace, make_answer: Callable[[], 
     content = make_answer()
     text = content if isinstance(content, str) else answer_text(content)
     if target == STANDARD_OUTPUT:
-        print(escaped_json(text), end="", file=_output.get() or sys.stdout)
+        print(escape_json_controls(text), end="", file=_output.get() or sys.stdout)
     else:
         write_atomically(Path(target), text)
 

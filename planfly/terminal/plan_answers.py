@@ -77,7 +77,7 @@ PlanDocument = PlanAnswer | FrontAnswer
 
 
 def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
-    """Return the answer for a front in a folder."""
+    """Return the JSON answer for a Pareto front whose files are in a folder.  code: exit code of the command."""
     from planfly.api.fronts import table_rows
     from planfly.api.planning import conditions_of_plan
 
@@ -100,7 +100,7 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
 
 
 def fewer_plans_line(front: "Front") -> str:
-    """Return a line with the reason why a front has fewer plans than requested."""
+    """Return a line that explains why a front has fewer plans than requested."""
     from planner.search.plan_front import NOTICEABLE_CLEARANCE_M, NOTICEABLE_EXPOSURE_FRACTION, NOTICEABLE_GAIN_FRACTION
 
     min_fraction, min_exposure = f"{NOTICEABLE_GAIN_FRACTION:.1%}", f"{NOTICEABLE_EXPOSURE_FRACTION:.0%}"
@@ -114,7 +114,7 @@ def fewer_plans_line(front: "Front") -> str:
 
 
 def front_lines(front: "Front", folder: Path) -> list[str]:
-    """Return the lines of a front for the terminal, one for each plan, and then the written files."""
+    """Return the lines that the terminal shows for a front: conditions, a table of the plans, and the written files."""
     from logs.verdict.conditions import autopilot_line, condition_lines
     from planfly.api.fronts import PICTURES
     from planfly.api.planning import conditions_of_plan

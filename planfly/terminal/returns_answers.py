@@ -110,7 +110,7 @@ class ByProgram:
     """The worst returns flown by the ArduPlane program, the worst first."""
 
     version: str
-    """Version of the program; empty if it flew no return."""
+    """Version of the program; empty if the program flew none of the returns."""
     returns: list[ProgramReturnEntry]
 
 
@@ -210,7 +210,7 @@ class ReturnsAnswer:
 
 
 def suggestion_entry(answer: ReturnsResult, trial: RemedyTrial) -> ReturnSuggestion:
-    """Return a suggested remedy, with the numbers of safe and unsafe returns under it, for the JSON answer."""
+    """Return the JSON entry of a suggested remedy, with the numbers of safe and unsafe returns that it gives."""
     rally = None
     if trial.remedy.rally is not None:
         rally = []
@@ -229,7 +229,7 @@ def suggestion_entry(answer: ReturnsResult, trial: RemedyTrial) -> ReturnSuggest
 
 
 def program_entry(answer: ReturnsResult) -> ByProgram | None:
-    """Return the entry of the returns that the ArduPlane program flew, or None if the program was not used."""
+    """Return the JSON entry of the returns that the ArduPlane program flew, or None if the program was not used."""
     if answer.by_program is None:
         return None
     log_path_by_name = {log.name: str(log) for log in answer.files}
@@ -251,6 +251,7 @@ def program_entry(answer: ReturnsResult) -> ByProgram | None:
 
 
 def _measured_return(simulated_return: SimulatedReturn) -> MeasuredReturn:
+    """Return the outcome of a return, its target, and its smallest distances from ground and missiles, m."""
     return MeasuredReturn(
         kind=simulated_return.kind,
         target=simulated_return.target.name,
@@ -265,7 +266,7 @@ def _round_to_tenths(value: float) -> float | None:
 
 
 def glides_entry(answer: ReturnsResult) -> GlidesEntry:
-    """Return the entry of the glides without the engine."""
+    """Return the JSON entry of the glides after an engine failure."""
     glides = answer.glides
     entries = []
     for glide_range in glides.ranges:
@@ -309,7 +310,7 @@ def glides_entry(answer: ReturnsResult) -> GlidesEntry:
 
 
 def return_entry(answer: ReturnsResult, return_range: ReturnRange) -> ReturnEntry:
-    """Return the entry of a range of returns."""
+    """Return the JSON entry of consecutive returns with the same outcome; the numbers are from the worst return."""
     worst_return, scenario, round_to_tenths = return_range.worst, answer.setup.scenario, _round_to_tenths
 
     return ReturnEntry(

@@ -96,7 +96,7 @@ def _called_by_compiled_code(frame: FrameType | None) -> bool:
 
 
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
-    """Return a function that reads signal numbers, and the non-blocking handle for Python to write the numbers to."""
+    """Return a function that reads signal numbers, and the non-blocking handle to which Python writes the numbers."""
     if hasattr(os, "set_blocking"):
         read, write = os.pipe()
         os.set_blocking(write, False)
@@ -142,6 +142,7 @@ def end_process(code: int) -> NoReturn:
 
 
 def _kill_children_and_exit(code: int) -> NoReturn:
+    """Kill the children of this process, remove unfinished files of all of them, and exit at once."""
     # Do not import multiprocessing: if it is not yet imported, there are no children, and an import could block.
     multiprocessing = sys.modules.get("multiprocessing")
     deadline = time.monotonic() + _REMOVAL_TIMEOUT_S

@@ -99,7 +99,7 @@ class SurveyAnswer:
 
 
 def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure | None) -> PhotoLineEntry:
-    """Return the entry of a photo line.  measure: measures of the flown line, or None if the line was not flown."""
+    """Return the JSON entry of a photo line.  measure: measures of the flown line, or None if it was not flown."""
     first, last = (int(setup.route.items[i]) for i in (line.first, line.last))
 
     def round_to_1e4(value: float | None) -> float | None:
@@ -121,7 +121,7 @@ def photo_line_entry(setup: FlightSetup, line: PhotoLine, measure: LineMeasure |
 
 
 def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
-    """Return the entry of the overlap of a survey."""
+    """Return the JSON entry of the photo overlap of a survey."""
     first_line, second_line = sorted(overlap.line_pair)
     return OverlapEntry(
         front=None if overlap.front is None else round(overlap.front, 4),
@@ -134,14 +134,14 @@ def overlap_entry(overlap: OverlapMeasure) -> OverlapEntry:
 
 
 def near_miss_entry(near_miss: NearMiss) -> NearMissEntry:
-    """Return the entry of the trial that came closest to passing."""
+    """Return the JSON entry of the trial that came closest to passing."""
     return NearMissEntry(
         what=near_miss.what, usable=near_miss.usable, lines=near_miss.lines, headline=near_miss.verdict.headline
     )
 
 
 def survey_remedy_entry(remedy: SurveyRemedy) -> SurveyRemedyEntry:
-    """Return the entry of a remedy."""
+    """Return the JSON entry of a remedy, a change that makes all lines of a survey usable."""
     return SurveyRemedyEntry(
         kind=remedy.kind,
         name=remedy.name,

@@ -28,7 +28,7 @@ def verdict_lines(verdict: Verdict, notes: Iterable[str]) -> list[str]:
     ]
     # One flight would decide all findings with the same suggestion.
     deciding_flights = dict.fromkeys(finding.suggestion for finding in presentation.undecided if finding.suggestions)
-    lines += [colour_text("          would tell: ", "hint") + text for text in deciding_flights]
+    lines += [colour_text("          would decide: ", "hint") + text for text in deciding_flights]
     for rule in presentation.rules:
         zone_count_text = (
             f"{presentation.zones:,} zones; " if rule.words.name == "fence" and presentation.zones > 1 else ""
@@ -55,6 +55,7 @@ def _failed_lines(rule: RuleFindings) -> list[str]:
 
 
 def _place_and_value(finding: Finding) -> str:
+    """Return the place of a finding, with its value if it has one, such as "leg 4 (12.3 m)"."""
     value, _ = finding.compared_texts()
     return finding.where + (f" ({value})" if value else "")
 

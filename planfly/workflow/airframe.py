@@ -46,7 +46,7 @@ class Airframe:
 
 
 def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan | None = None) -> Plan:
-    """Add the departure and approach that the scenario of a plan requires, if any.
+    """Return a plan with the departure and approach that its scenario requires; without either, the plan itself.
 
     flown_plan: the plan being flown, whose departure is reused; None for a new plan.
 
@@ -96,22 +96,22 @@ def load_airframe(scenario: Scenario, parameters: Mapping[str, float] | None = N
         autopilot = autopilot.restore(autopilot.with_parameters(**parameters).store())
     airspeed = cruise_airspeed(scenario, aircraft, autopilot)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
-    limits = make_limits(scenario, envelope, airspeed, bank_limit(scenario, autopilot))
+    limits = make_limits(scenario, envelope, airspeed, max_turn_bank(scenario, autopilot))
     return Airframe(aircraft, with_tracking(limits, autopilot, scenario), battery, autopilot)
 
 
-def airframe_of(setup: FlightSetup) -> Airframe:
+def airframe_for_setup(setup: FlightSetup) -> Airframe:
     """Return the airframe of a setup.  Raises FlightError if the catalog does not contain the aircraft.
 
     >>> from logs.recording.example_log import example_log
-    >>> airframe_of(example_log().setup).aircraft.name
+    >>> airframe_for_setup(example_log().setup).aircraft.name
     'aerosonde'
     """
     aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     return Airframe(aircraft, setup.limits, setup.battery, setup.autopilot)
 
 
-def bank_limit(scenario: Scenario, autopilot: Autopilot) -> float:
+def max_turn_bank(scenario: Scenario, autopilot: Autopilot) -> float:
     """Return the bank limit in turns, rad: the lower limit of scenario and autopilot."""
     return min(math.radians(scenario.flight.max_bank_deg), autopilot.turns.max_bank)
 
@@ -163,7 +163,9 @@ def cruise_airspeed(scenario: Scenario, aircraft: Aircraft, autopilot: Autopilot
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
     """Return the airframe with the limits and the maximum bank of a tightened scenario."""
     old_limits = airframe.limits
-    limits = make_limits(scenario, old_limits.envelope, old_limits.airspeed, bank_limit(scenario, airframe.autopilot))
+    limits = make_limits(
+        scenario, old_limits.envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot)
+    )
     return replace(airframe, limits=replace(limits, tracking=old_limits.tracking))
 
 

@@ -47,13 +47,13 @@ def can_apply(suggestion: Suggestion) -> bool:
 def apply_suggestion(
     context: MissionContext, judged_mission: JudgedMission, finding: Finding, suggestion: Suggestion
 ) -> Mission:
-    """Return the mission with all changes of a suggestion of a finding.
+    """Return a mission changed as one suggestion of a finding proposes.
 
     Raises MissionError if no item can be moved for the suggestion, or if it does not change the mission's items.
     """
     source = judged_mission.mission.source
     if not can_apply(suggestion):
-        raise MissionError(f"{source}: this suggestion does not change its items", field="suggestion")
+        raise MissionError(f"{source}: this suggestion cannot be made by moving items", field="suggestion")
     missions = []
     # Away from a missile, try a single waypoint and all waypoints, because each moved waypoint may fail elsewhere; both
     # in the direction of the nearest point, and each in its own direction, for a path that bends around the missile.
@@ -63,7 +63,10 @@ def apply_suggestion(
         for change in suggestion:
             _CHANGE_FUNCTIONS[change.what](edited_mission, change, finding)
         if not edited_mission.is_changed:
-            raise MissionError(f"{source}: no item of the mission lies there: move one by hand", field="suggestion")
+            raise MissionError(
+                f"{source}: the mission has no item at the place of this suggestion: change it by hand",
+                field="suggestion",
+            )
         missions.append(edited_mission.mission)
     return (
         min(missions, key=lambda mission: len(context.judge(mission).verdict.failed))
@@ -105,13 +108,17 @@ class _EditedMission:
             self.mission, self.is_changed = self.context.with_updated_radii(self.mission, index), True
 
     def end_waypoints(self, legs: Sequence[int]) -> list[int]:
-        """Return the waypoints at the ends of legs, without the ends of the route unless there are no others."""
+        """Return the indices of the waypoints at the ends of some legs.
+
+        The first and last waypoint of the route are left out unless there are no other waypoints.
+        """
         ends = sorted({end for leg in legs for end in (leg, leg + 1)})
         inner_ends = [end for end in ends if 0 < end < self.route.legs]
         return inner_ends or ends
 
 
 def _changed_leg(change: Change, route: Route) -> int:
+    """Return the index of the leg that a change refers to.  Raises MissionError for a change of another kind."""
     if change.place.kind != "leg" or change.place.index is None or change.place.index >= route.legs:
         raise MissionError("this suggestion names no leg of the route", field="suggestion")
     return change.place.index
@@ -127,7 +134,7 @@ def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> 
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg by moving both ends by half; an end of the route stays if possible."""
+    """Reduce the climb or descent of a leg by moving both ends by half, or one end if the other ends the route."""
     leg, points = _changed_leg(change, edited.route), edited.waypoint_positions()
     excess = float(points[leg + 1, 2] - points[leg, 2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
@@ -186,7 +193,7 @@ def _change_altitude(edited: _EditedMission, change: Change, finding: Finding) -
 
 
 def _move_inside_area(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Move waypoints inside that are too near to the edges, floor or ceiling of the area."""
+    """Move waypoints that lie outside the area, or too close to its edges, floor or ceiling, into the area."""
     scenario, points = edited.context.scenario, edited.waypoint_positions()
     (west, east), (south, north) = scenario.bounds.tolist()
     min_position = np.array([west, south, scenario.floor]) + change.wanted
@@ -218,26 +225,28 @@ def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Fin
     edited.move_items(waypoints, np.array([*offset, 0.0]))
 
 
-def _nearest_point(place: Floats, points: Floats, legs: Sequence[int]) -> tuple[Floats, int, float]:
-    """Return the direction (2,) from a place to the nearest point of legs, its leg, and the fraction of the leg there.
+def _nearest_point(position: Floats, points: Floats, legs: Sequence[int]) -> tuple[Floats, int, float]:
+    """Find the point of some legs that is nearest to a position (2,).
 
-    The direction is across the leg if the place is on it.
+    points: waypoints of the route, (w, 2) m.
+    Returns the direction from the position to this point (2,), a unit vector, the leg, and the fraction of the leg's
+    length before the point.  If the position is on the leg, the direction is perpendicular to the leg.
     """
     candidates = []
     for leg in legs:
         step = points[leg + 1] - points[leg]
-        fraction = float(np.clip((place - points[leg]) @ step / max(float(step @ step), 1.0), 0.0, 1.0))
-        away = points[leg] + fraction * step - place
-        candidates.append((math.hypot(*away), leg, fraction, away))
-    distance, leg, fraction, away = min(candidates, key=lambda candidate: candidate[0])
+        fraction = float(np.clip((position - points[leg]) @ step / max(float(step @ step), 1.0), 0.0, 1.0))
+        offset = points[leg] + fraction * step - position
+        candidates.append((math.hypot(*offset), leg, fraction, offset))
+    distance, leg, fraction, offset = min(candidates, key=lambda candidate: candidate[0])
     if distance < 1.0:
         step = points[leg + 1] - points[leg]
-        away, distance = np.array([-step[1], step[0]]), max(math.hypot(*step), 1.0)
-    return away / distance, leg, fraction
+        offset, distance = np.array([-step[1], step[0]]), max(math.hypot(*step), 1.0)
+    return offset / distance, leg, fraction
 
 
 def _move_sideways(edited: _EditedMission, change: Change, finding: Finding) -> None:
-    """Move the legs on which a zone is violated to one side."""
+    """Move the ends of the legs that violate a zone east, west, north or south."""
     east, north = _SIDE_DIRECTIONS[change.what]
     legs = violated_legs(edited.requirements, finding)
     edited.move_items(edited.end_waypoints(legs), change.wanted * np.array([east, north, 0.0]))

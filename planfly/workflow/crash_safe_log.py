@@ -48,7 +48,9 @@ class FlightLimits:
 
 
 def predicted_seconds(setup: FlightSetup) -> float:
-    """Predict the duration of a setup's flight in still air, at the airspeed of each leg, s.
+    """Return the predicted duration of a flight in still air, s.
+
+    The speed is the mean of the legs' airspeeds, weighted by time.
 
     >>> from logs.recording.example_log import example_log
     >>> flown = example_log()
@@ -70,7 +72,7 @@ def flight_text(setup: FlightSetup) -> str:
 
 
 def flight_kind(setup: FlightSetup) -> str:
-    """Return the kind of a flight: its autopilot.  Flights of one kind take a similar time per kilometre."""
+    """Return the key under which durations of flights are stored; flights of one key take similar times per km."""
     return f"flying by {setup.autopilot.name}"
 
 
@@ -137,6 +139,11 @@ class CrashSafeLog:
                 self._close_unfinished(error_type)
 
     def _close_unfinished(self, error_type: type[BaseException] | None) -> None:
+        """Close a log whose flight has not been judged.
+
+        After an interruption, a log with rows is finished and an empty log is deleted.  After any other error the log
+        is closed without its end, so that `planfly recover` can read the rows.
+        """
         with delay_signals():
             if error_type is None or not issubclass(error_type, KeyboardInterrupt):
                 self._recorder.abandon()

@@ -70,7 +70,9 @@ _MIN_AIRSPEED_STALL_RATIO = 1.2
 
 
 def stated_parameters(file: Path) -> dict[str, float]:
-    """Return the parameters of a file that describe the aircraft and differ from their defaults, by current name.
+    """Read a parameter file; return the parameters that describe the aircraft and differ from their defaults.
+
+    The keys are current names of ArduPlane's parameters.
 
     Raises ParameterError for a file that cannot be read.
     """
@@ -85,14 +87,21 @@ def stated_parameters(file: Path) -> dict[str, float]:
     return values
 
 
-def _stated_value(entries: Mapping[str, Entry], name: str, old: tuple[str, float] | None) -> float | None:
+def _stated_value(entries: Mapping[str, Entry], name: str, deprecated: tuple[str, float] | None) -> float | None:
+    """Return the value of a parameter in a parameter file, or None if the file does not state it.
+
+    deprecated: former name of the parameter, and the factor from its unit to the present unit; None without one.
+    """
     if name in entries:
         return entries[name].value
-    return entries[old[0]].value * old[1] if old is not None and old[0] in entries else None
+    if deprecated is None:
+        return None
+    deprecated_name, unit_factor = deprecated
+    return entries[deprecated_name].value * unit_factor if deprecated_name in entries else None
 
 
 def with_parameters(sheet: DataSheet, parameters: Mapping[str, float]) -> DataSheet:
-    """Fill the gaps of a sheet from parameters; values of the sheet itself stay.
+    """Return a data sheet whose missing values are taken from ArduPlane parameters.
 
     >>> sheet = DataSheet(2.1, 1.6, 0.0, 0.0)
     >>> filled = with_parameters(sheet, {"AIRSPEED_CRUISE": 15.0, "AIRSPEED_MIN": 12.0, "TECS_CLMB_MAX": 3.0})
@@ -160,6 +169,7 @@ def parse_sheet(
 
 
 def _parse_battery(text: str) -> tuple[float, float]:
+    """Return voltage (V) and energy (J) of a battery such as "14.8V,5Ah".  Raises FlightError for invalid text."""
     match = _BATTERY_PATTERN.fullmatch(text.strip())
     volts, capacity = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     unit = match[3].lower() if match else ""
@@ -176,18 +186,20 @@ def _parse_battery(text: str) -> tuple[float, float]:
 
 
 def _parse_propeller(text: str) -> tuple[float, float]:
+    """Return diameter and pitch (m) of a propeller such as "12x6", inches.  Raises FlightError for invalid text."""
     match = _PROPELLER_PATTERN.fullmatch(text.strip())
     diameter, pitch = (_parse_number(match[k]) for k in (1, 2)) if match else (math.nan, math.nan)
     if not (_DIAMETER_IN[0] <= diameter <= _DIAMETER_IN[1] and 0.25 * diameter <= pitch <= 1.5 * diameter):
         allowed = (
-            f"expected inches of diameter and pitch, such as 12x6: {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g},"
-            " and a quarter to one and a half of that"
+            "expected diameter and pitch in inches, such as 12x6: a diameter of"
+            f" {_DIAMETER_IN[0]:g}..{_DIAMETER_IN[1]:g}, and a pitch of 0.25 to 1.5 times the diameter"
         )
         raise FlightError.of_argument("prop", text, allowed)
     return diameter * _METERS_PER_INCH, pitch * _METERS_PER_INCH
 
 
 def _parse_number(text: str) -> float:
+    """Return a number, or NaN for text that is not a number."""
     try:
         return float(text)
     except ValueError:
@@ -201,7 +213,7 @@ def _parse_number(text: str) -> float:
 _SPREADS = {
     "zero-lift-drag": (MIN_DRAG_LOG_SD, "least drag by layout and aspect ratio, fitted to real aircraft"),
     "induced-drag": (INDUCED_DRAG_LOG_SD, "span efficiency from published aircraft of the class"),
-    "drive-power": (EFFICIENCY_LOG_SD, "efficiency of the drive by mass, fitted to real aircraft"),
+    "drive-power": (EFFICIENCY_LOG_SD, "propulsive efficiency by mass, fitted to real aircraft"),
     "avionics-power": (AVIONICS_LOG_SD, "autopilot, radios and servos, fitted to real aircraft"),
     "thrust": (0.20, "propeller scaled to the climb; balances the other factors"),
     "motor-speed": (0.07, "motor scaled to the climb and the top speed"),
@@ -225,10 +237,12 @@ STATED_DRAG = 0.15
 
 
 def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncertainty, Draws]:
-    """Return standard deviations of the factors, and of climb, descent, top speed and power at cruise, with draws.
+    """Return the uncertainty of a data sheet's model, and aircraft drawn from it.
 
-    The factors are independent but for the thrust, which a draw sets such that the climb has its own deviation: an
-    aircraft with more drag than expected has the motor for its climb.
+    The uncertainty has standard deviations of factors on model properties, and of the resulting climb, descent, top
+    speed and power at cruise.  All factors are independent except the factor on thrust: it compensates the effect of
+    the other factors on the climb, because an aircraft with more drag has a stronger motor, and then varies by the
+    uncertainty of the climb itself.
     """
     estimated = _performance_vector(aircraft)
     spreads = {name: sd for name, (sd, _) in _SPREADS.items() if name in sized.numbers.factors}
@@ -241,7 +255,7 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
     balance = {name: -slope[0] / thrust_slopes[0] for name, slope in slopes.items()}
     effects = {name: spreads[name] * (slope + balance[name] * thrust_slopes) for name, slope in slopes.items()}
     effects["climb"] = climb_sd / thrust_slopes[0] * thrust_slopes
-    # The drive's deviation is what all others leave of the calibrated deviation of the power.
+    # The deviation of the propulsive efficiency is the rest of the calibrated deviation of the power.
     other_power = math.hypot(*(effect[3] for name, effect in effects.items() if name != "drive-power"))
     calibrated_power = _calibrated_power_sd(sized, math.exp(estimated[3]), spreads["zero-lift-drag"])
     drive_power = math.sqrt(max((0.3 * calibrated_power) ** 2, calibrated_power**2 - other_power**2))
@@ -270,10 +284,10 @@ def _make_uncertainty(sized: SizedAircraft, aircraft: Aircraft) -> tuple[Uncerta
 
 
 def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thrust_sd: float) -> Draws:
-    """Draw all factors, and set the thrust such that it keeps the climb but for a deviation of its own.
+    """Draw all factors; the factor on thrust compensates the effect of the other factors on the climb.
 
     balance: change of the logarithm of the thrust per logarithm of each other factor.
-    thrust_sd: deviation of the logarithm of the thrust for the deviation of the climb.
+    thrust_sd: standard deviation of the logarithm of the thrust that varies the climb.
     """
     draws = draw_quantities(uncertainty.quantities)
     logarithms = np.log(draws.values)
@@ -288,7 +302,11 @@ def _draw_with_climb(uncertainty: Uncertainty, balance: Mapping[str, float], thr
 
 
 def _calibrated_power_sd(sized: SizedAircraft, power: float, min_drag_sd: float) -> float:
-    """Return the standard deviation of the logarithm of the power (W) at cruise, as calibrated on real aircraft."""
+    """Return the standard deviation of the logarithm of the power at cruise, as calibrated on real aircraft.
+
+    power: estimated power at cruise, W.
+    min_drag_sd: standard deviation of the logarithm of the minimum drag.
+    """
     aero, sheet, propulsion = sized.numbers.aero, sized.sheet, sized.numbers.propulsion
     lift = sheet.mass * GRAVITY / (0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area)
     min_drag_fraction = aero.drag_min / (aero.drag_min + aero.drag_lift * lift**2)
@@ -320,9 +338,10 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
 
 
 def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: float) -> Floats:
-    """Return the effect of a standard deviation of a factor's logarithm on the values of `_performance_vector`, (4,).
+    """Return the effect on `_performance_vector`, (4,), of a factor larger by one standard deviation.
 
-    estimated: values of the estimated aircraft, (4,).
+    estimated: values for the estimated aircraft, (4,).
+    sd: standard deviation of the factor's logarithm.
     """
     increased, decreased = (
         _performance_vector(aircraft, ((f"ident/{name}", math.exp(sign * sd)),)) for sign in (1.0, -1.0)
@@ -331,10 +350,10 @@ def _effect_of_factor(aircraft: Aircraft, estimated: Floats, name: str, sd: floa
 
 
 def factor_effect(increased: Floats, decreased: Floats, estimated: Floats) -> Floats:
-    """Return the signed effect of a factor on path angles and speeds, (n,).
+    """Return the signed effect of a factor on path angles and speeds, (n,): half the difference of two values.
 
-    A value is NaN if the aircraft cannot be trimmed.  Then the change to the other value applies; if both are NaN, the
-    magnitude of the estimated value applies.
+    A value is NaN if the aircraft cannot be trimmed.  If one of the two is NaN, the difference between the other and
+    the estimated value is returned; if both are NaN, the magnitude of the estimated value.
 
     increased, decreased: values with the factor increased and decreased, (n,).
     estimated: estimated values, (n,).
@@ -382,7 +401,7 @@ def make_data_sheet_folder(
     """Make the folder of an aircraft from its data sheet, completely or not at all.
 
     parameters: file of ArduPlane parameters, which fill the gaps of the sheet.
-    sized: sized aircraft, for a class other than the default class of the layout.
+    sized: aircraft sized from the sheet for another class of aircraft; None for the default class of the layout.
     overwrite: True replaces the folder of an aircraft.
     Raises FlightError, in one line with the allowed range, for a sheet outside the range of small aircraft, a folder
     that exists, and an aircraft that cannot be made to fly; ParameterError for a file that cannot be read; OSError.
@@ -400,6 +419,7 @@ def make_data_sheet_folder(
 
 
 def _check_required_numbers(sheet: DataSheet) -> None:
+    """Raise FlightError for a sheet without mass, span, cruise speed or stall speed."""
     for name in ("mass", "span", "cruise", "stall"):
         if not getattr(sheet, name):
             min_value, max_value, unit = RANGES[name][2], RANGES[name][3], RANGES[name][1]
@@ -447,7 +467,10 @@ def _make_files(
 
 
 def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
-    """Trim the aircraft in all flight conditions of `Performance`.  Raises FlightError if one has no trim point."""
+    """Trim an aircraft in all flight conditions of `Performance`.
+
+    Raises FlightError, with the value of the data sheet to change, if a condition has no trim point.
+    """
     cruise = aircraft.airspeed
     level = steady_flight(fdm, cruise, AMSL)
     if level is None:
@@ -462,12 +485,15 @@ def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:
         if trim is None:
             argument = {"climb": "climb", "idle": "cruise", "slowest": "stall", "fastest": "top"}[name]
             option, unit, low, high, _ = RANGES[argument]
-            allowed = f"no trim of the model for this sheet ({name}): state another value, {low:g}..{high:g} {unit}"
+            allowed = (
+                f"the model of this sheet has no trim point ({name}): state another value, {low:g}..{high:g} {unit}"
+            )
             raise FlightError.of_argument(option, None, allowed, shown="")
     return Performance(level, **{name: trim for name, trim in trims.items() if trim is not None})
 
 
 def _metadata_text(sized: SizedAircraft, stall: float, min_airspeed: float, max_airspeed: float) -> str:
+    """Return the text of ``name.toml``.  stall, min_airspeed, max_airspeed: m/s."""
     numbers, sheet = sized.numbers, sized.sheet
     elevator, aileron, rudder = (math.degrees(value) for value in numbers.throw)
     energy = (
@@ -555,7 +581,10 @@ def arduplane_parameters(
 
 
 def servo_text(aircraft: Aircraft, performance: Performance) -> str:
-    """Return the text of ``ardupilot.toml``, the servo outputs of unmixed controls; the model contains the mixer."""
+    """Return the text of ``ardupilot.toml``: output and pulses of elevator, ailerons, throttle and rudder.
+
+    Elevons and V-tails are mixed within the model.
+    """
     elevator, aileron, rudder = (
         math.degrees(value) for value in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
@@ -613,13 +642,14 @@ def _readme_text(
     uncertainty: Uncertainty,
     file_parameters: Mapping[str, float],
 ) -> str:
+    """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files."""
     sheet = sized.sheet
-    drive = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"
+    propulsion = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"
     climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
     lines = [
         f"# {name}",
         "",
-        f"{sized.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {drive}.",
+        f"{sized.numbers.title}, made by `planfly aircraft --new` from a data sheet. It {propulsion}.",
         "Values that the sheet does not state are scaled from aircraft of its class; see `aircraft/data_sheet.py` of",
         "planfly. A slope close to the model's limit is left undecided.",
         "",
@@ -630,10 +660,8 @@ def _readme_text(
         if value := factor * getattr(sheet, field):
             lines.append(f"| {title} | {value:.4g} {unit} | {'guessed' if field in sized.guessed else 'stated'} |")
     if file_parameters:
-        lines += [
-            "",
-            f"Of the parameter file: {', '.join(f'{key} {value:g}' for key, value in file_parameters.items())}.",
-        ]
+        values_text = ", ".join(f"{key} {value:g}" for key, value in file_parameters.items())
+        lines += ["", f"From the parameter file: {values_text}."]
     lines += [
         "",
         f"The model weighs {sheet.mass * GRAVITY:.1f} N, flies level at {sheet.cruise:g} m/s with"

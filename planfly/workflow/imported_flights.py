@@ -148,13 +148,13 @@ def _check_plan_autopilot(path: Path, mission: Mission, program: str) -> None:
         (name for name, title in TITLES.items() if program.lower().startswith(title[:5].lower())), ""
     )
     if mission.autopilot and flown_autopilot and mission.autopilot != flown_autopilot:
-        allowed = f"the flight of {path} is {program}'s; `plan` names the mission that was flown"
+        allowed = f"the log {path} is from {program}; `plan` must name the mission that was flown"
         message = f"{mission.source}: written for {TITLES[mission.autopilot]}; {allowed}"
         raise MissionError(message, file=mission.source, field="autopilot", value=mission.autopilot, allowed=allowed)
 
 
 def _planned_mission(path: Path, flight: LoggedFlight, options: LogOptions) -> tuple[Mission, str, Scenario | None]:
-    """Return the planned mission, a description of its source, and the scenario of its plan, or None without a plan.
+    """Return the planned mission, a text on its source, and the scenario of its plan (None for a mission file or log).
 
     Raises LogError if neither the options nor the log contain the mission.
     """
@@ -213,6 +213,7 @@ def _flight_setup(
     autopilot: Autopilot,
     flight: LoggedFlight,
 ) -> FlightSetup:
+    """Return the setup for judging an imported flight.  placed: the mission placed on the map of the scenario."""
     aircraft, battery = find_airframe(scenario)
     limits = _path_limits(scenario, autopilot, flight, aircraft.airspeed)
     return FlightSetup(
@@ -230,7 +231,9 @@ def _flight_setup(
 
 
 def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
-    """Return the limits at the airspeed stated by autopilot or scenario, or otherwise at the flown airspeed.
+    """Return the limits on path and speed at the cruise airspeed that the autopilot or else the scenario states.
+
+    If neither states an airspeed, the median airspeed of the log is used.
 
     default_airspeed: airspeed of the aircraft, m/s, used if the log has no airspeed.
     """
@@ -248,6 +251,7 @@ def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight,
 
 
 def _sha256(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal text."""
     digest = hashlib.sha256()
     with path.open("rb") as file:
         while block := file.read(_BLOCK_BYTES):
@@ -264,7 +268,7 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
         notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
     usual_step = float(np.median(np.diff(flight.time)))
     if usual_step > MAX_STEP_S:
-        notes.append(f"the log has a position every {usual_step:.1f} s: the flight between them is unknown")
+        notes.append(f"the log has a position only every {usual_step:.1f} s: the flight in between is unknown")
     return tuple(notes)
 
 
@@ -293,7 +297,10 @@ def _describe_mission_change(flight: LoggedFlight, mission: Mission, options: Lo
         return ()
     if len(logged_items) != len(mission.items):
         return (f"the mission of the log has {len(logged_items)} items, the plan {len(mission.items)}",)
-    return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
+    return (
+        f"{len(changed)} items of the mission in the log have other positions than in the plan; the first is item"
+        f" {changed[0]}",
+    )
 
 
 def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
@@ -317,6 +324,7 @@ def _vehicle_events(flight: LoggedFlight) -> tuple[LogEvent, ...]:
 
 
 def _completion_text(verdict: Verdict) -> str:
+    """Return the text of the finding on completion, or "not judged" without this finding."""
     finding = next((candidate for candidate in verdict.findings if candidate.rule == "completion"), None)
     return "not judged" if finding is None else finding.brief
 
@@ -371,7 +379,8 @@ def fly_draws(
 ) -> tuple[Reflight, ...]:
     """Fly the longest sequence of followed legs once for each draw, and return the comparisons.
 
-    A draw with which the aircraft cannot start, or flies none of the legs, is left out.
+    A draw with which the aircraft cannot start, or flies none of the legs, is left out.  A draw is a sampled variant of
+    the aircraft in a sampled wind.
 
     Raises LogError for a flight that followed no part of its mission, or if no draw flies.
     """
@@ -385,15 +394,16 @@ def fly_draws(
         advance(number, len(draws), f"flight {number} of {len(draws)}")
     if not flights:
         name = setup.scenario.name
-        raise LogError(f"{name}: {aircraft} flew the mission with none of {len(draws)} draws", file=name)
+        message = f"none of the {len(draws)} sampled variants of {aircraft} could fly the mission"
+        raise LogError(f"{name}: {message}", file=name)
     return tuple(flights)
 
 
 def start_after_takeoff(setup: FlightSetup, track: Track) -> FlightSetup:
-    """Return a setup whose mission begins where the first stretch reached the altitude of its take-off.
+    """Return a setup whose mission begins where the first segment of the flight reached the take-off's altitude.
 
     The autopilot chooses the course of a take-off itself, and the model's flight starts in the air.  A mission without
-    a take-off, and a stretch that never reached its altitude, are returned unchanged.
+    a take-off, and a segment that never reached this altitude, are returned unchanged.
     """
     source, route, mission, scenario = setup.source, setup.route, setup.mission, setup.scenario
     first = next((item for item in mission.items if item.seq == route.items[0]), None)
@@ -430,6 +440,12 @@ def _refly_followed_legs(
     advance: Advance | None,
     draw: DrawnFlight | None = None,
 ) -> Reflight:
+    """Simulate followed legs with the model of an aircraft, and compare the simulated with the logged flight.
+
+    aircraft, turbulence: replace the aircraft and the turbulence of the setup unless None.
+    draw: variations of aircraft, wind and start of one sampled flight, or None.
+    Raises LogError if the model flies none of the legs.
+    """
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
     if draw is not None:
         wind = scenario.wind
@@ -464,18 +480,23 @@ def _refly_followed_legs(
             advance(block.distance, length, f"{block.distance / 1000:.1f} of {length / 1000:.1f} km")
     track = builder.track()
     if len(track) < 2:
-        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {end_reason}", file=scenario.name)
+        message = f"the model of {model.name} flew no part of the mission: {end_reason}"
+        raise LogError(f"{scenario.name}: {message}", file=scenario.name)
     if draw is not None:
         track = replace(track, position=track.position + np.array(draw.offset))
-    stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
-    return compare_with_model(model_setup, legs, track, end_reason, stands_in=stands_in)
+    is_assumed_aircraft = setup.source is not None and not setup.source.aircraft_known and aircraft is None
+    return compare_with_model(model_setup, legs, track, end_reason, stands_in=is_assumed_aircraft)
 
 
 def _followed_legs(setup: FlightSetup, track: Track) -> list[FlownLegs]:
+    """Return the legs followed in each segment of a flight, the longest sequence first.
+
+    Raises LogError if the flight followed no leg of its mission.
+    """
     source = setup.source
     stretches = () if source is None else source.stretches
     stretch_legs = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not stretch_legs:
         name = "the log" if source is None else source.file
-        raise LogError(f"{name}: none of its mission's legs was flown, so there is nothing to fly again", file=name)
+        raise LogError(f"{name}: no leg of its mission was flown, so there is nothing to fly again", file=name)
     return sorted(stretch_legs, key=lambda legs: legs.first - legs.last)

@@ -17,7 +17,7 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.verdict import Verdict
-from planfly.workflow.airframe import Airframe, airframe_of
+from planfly.workflow.airframe import Airframe, airframe_for_setup
 from planfly.workflow.open_flight import make_setup
 from world.arrays import Floats
 from world.frames import to_geo, to_map
@@ -55,7 +55,7 @@ class MissionContext:
 
         Raises FlightError if the aircraft is missing.
         """
-        airframe = airframe_of(setup)
+        airframe = airframe_for_setup(setup)
         airframe = replace(airframe, autopilot=setup.autopilot.model)
         return cls(setup.scenario, airframe, setup.seed, setup, planned=setup.plan is not None)
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from flight.autopilots.catalog import program_autopilot
+from flight.autopilots.catalog import program_class_for
 from flight.autopilots.program import ProgramAutopilot
 from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
@@ -155,7 +155,7 @@ def fly_and_judge(
         return _judge_unflown(requirements, log, reason, reference)
     try:
         if autopilot is not None:
-            return _fly_with_program(task, setup, program_autopilot(autopilot).flying(setup.autopilot, autopilot))
+            return _fly_with_program(task, setup, program_class_for(autopilot).flying(setup.autopilot, autopilot))
         off_nominal_flight = off_nominal or OffNominal(Variation())
         flight = Flight(
             setup, airframe.aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset
@@ -198,7 +198,7 @@ def autopilot_log(log: Path, program: Path) -> Path:
     >>> autopilot_log(Path("runs/flight.mcap"), Path("arduplane")).name
     'flight.BIN'
     """
-    return log.with_suffix(program_autopilot(program).log_suffix)
+    return log.with_suffix(program_class_for(program).log_suffix)
 
 
 def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, flight: Airborne) -> JudgedFlight:

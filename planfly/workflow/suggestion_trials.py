@@ -76,8 +76,8 @@ def tried_suggestions(passed_trials: Sequence[PassedTrial]) -> tuple[TriedSugges
     )
 
 
-def judge_mission(setup: FlightSetup) -> Verdict:
-    """Judge the geometry of a mission without a flight, with suggestions that pass a trial by geometry."""
+def judge_mission_geometry(setup: FlightSetup) -> Verdict:
+    """Judge the geometry of a mission without flying it; keep only suggestions that pass the same geometric check."""
     requirements = route_requirements(setup)
     verdict = judge_geometry(setup, requirements)
     return with_tried_suggestions(JudgedMission(setup.mission, setup, requirements, verdict))

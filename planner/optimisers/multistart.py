@@ -215,9 +215,11 @@ class Multistart(BoxSearch):
         self.samples, self.scores = points, scores
 
     def _to_unit_box(self, points: Floats) -> Floats:
+        """Scale points (n, d) of the search box to the unit box."""
         return (points - self.lower) / (self.upper - self.lower)
 
     def _draw(self, search: Gaussian) -> None:
+        """Draw the next generation of a search, in the unit box and in the search box."""
         self._pending_unit_samples = search.draw(self._rng)
         self._pending_samples = np.clip(
             self.lower + self._pending_unit_samples * (self.upper - self.lower), self.lower, self.upper

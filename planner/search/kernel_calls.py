@@ -66,6 +66,7 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
 
 
 def _call_scores(task: _Task) -> None:
+    """Score two paths, rank them, and run a pattern search."""
     scores = score_table(*graded_scores(task.problem.search, np.stack([task.path, task.path])))
     best_first(scores)
     vector = rotated_vectors(task.problem.space, task.encoding, task.path[None])[0]
@@ -73,14 +74,17 @@ def _call_scores(task: _Task) -> None:
 
 
 def _call_certificates(task: _Task) -> None:
+    """Certify a path."""
     certify(task.problem, task.path)
 
 
 def _call_shortening(task: _Task) -> None:
+    """Shorten a path."""
     shorten_path(task.problem.search, task.path)
 
 
 def _call_routes(task: _Task) -> None:
+    """Find the best route over a grid, and fit waypoints to it."""
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     best_route = grid_route(data, frame, make_grid(data, frame, span, STAGES))
     for route in [best_route] if isinstance(best_route, GridRoute) else []:
@@ -88,6 +92,7 @@ def _call_routes(task: _Task) -> None:
 
 
 def _call_side_routes(task: _Task) -> None:
+    """Find routes on other sides of the obstacles."""
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
     side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
@@ -100,10 +105,12 @@ def _frame_and_span(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
 
 
 def _call_paper_scores(task: _Task) -> None:
+    """Score a path by the objectives of the paper."""
     paper_scores(task.problem.certified, task.path[None])
 
 
 def _call_front(task: _Task) -> None:
+    """Compute the values of a path for a front, and select rows that cover the hypervolume."""
     data = task.problem.search
     front_values(data, make_energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
     covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)

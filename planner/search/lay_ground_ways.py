@@ -186,7 +186,10 @@ class _Site:
         return slopes[0], slopes[1]
 
     def min_path_length(self, height_change: float, is_descent: bool) -> float:
-        """Return the length of the shortest path that gains a height, or with `is_descent` loses it, m."""
+        """Return the length (m) of the shortest path that climbs by a height (m), or descends if `is_descent`.
+
+        The length is inf if the aircraft can neither climb nor descend on any course.
+        """
         altitude = float(max(self.scenario.start[2], self.scenario.destination[2]))
         max_slope = max(self.slopes(course, altitude)[is_descent] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
@@ -229,6 +232,7 @@ class _Site:
 
 
 def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
+    """Make the data for departures and approaches: the problems of their certificates and the size of their turns."""
     scenario = plan.scenario
     algorithm_limits = limits_for(find_algorithm(plan.algorithm, scenario.name), limits)
     problem = make_problem(scenario, algorithm_limits)
@@ -269,6 +273,7 @@ def _read_only(position: Floats) -> Floats:
 
 
 def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
+    """Return the path (n, 3) over n points of the map at altitudes (n,)."""
     return np.column_stack([np.array(points), altitudes])
 
 
@@ -331,7 +336,7 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
         )
     return (
         None,
-        f"none of {best_rejected.count} paths launched {courses} is clear; the nearest: {best_rejected.problem}",
+        f"none of {best_rejected.count} paths launched {courses} is clear; the best one: {best_rejected.problem}",
     )
 
 
@@ -452,7 +457,7 @@ def _list_departures(
 
 
 def _list_lap_counts(site: _Site, height_change: float, is_descent: bool) -> list[int]:
-    """Return the lap counts to try for gaining a height, or with `is_descent` losing it, m, fewest first."""
+    """Return the lap counts to try, fewest first, for a climb (or a descent if `is_descent`) of `height_change` m."""
     max_laps = math.ceil(
         site.min_path_length(height_change, is_descent) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
     )
@@ -559,6 +564,10 @@ def _find_finals(
 
 
 def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
+    """Return the start of the line-up and the start of the glide (2, 3), both at `height` (m) above the landing point.
+
+    course, length: course (rad) and length (m) of the final.
+    """
     distances = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.turn_radius), length])
     east, north = point[0] - distances * math.sin(course), point[1] - distances * math.cos(course)
     return np.column_stack([east, north, np.full(2, point[2] + height)])
@@ -648,7 +657,7 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
     remedy = "a higher destination (height_m) or another strip may have one"
     return (
         None,
-        f"none of {best_rejected.count} paths {route_text} is clear: {remedy}; the nearest: {best_rejected.problem}",
+        f"none of {best_rejected.count} paths {route_text} is clear: {remedy}; the best one: {best_rejected.problem}",
     )
 
 
@@ -662,7 +671,7 @@ def _approach_altitudes(
 
 
 def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, course: float) -> float:
-    """Return a fraction of the climb slope, or with `is_descent` of the dive slope, on a course, m per m."""
+    """Return a fraction of the climb slope (or the dive slope if `is_descent`) on a course (rad), m per m."""
     return factor * site.slopes(course, altitude)[is_descent]
 
 

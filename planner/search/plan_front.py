@@ -127,6 +127,7 @@ class Front:
 
 
 def _objective_row(plan: FrontPlan, fourth: str) -> list[float]:
+    """Return the plan's length, exposure, negated clearance, and time or energy, as `fourth` says."""
     return [plan.length, plan.exposure, -plan.clearance, plan.time if fourth == "time" else plan.energy]
 
 
@@ -490,6 +491,7 @@ def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> lis
 
 
 def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
+    """Return a plan of a path (w, 3) with scores and certificate; its other fields are copied from a template."""
     counts, objectives = paper_scores(task.problem.certified, path[None])
     return replace(
         template,

@@ -167,6 +167,11 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
+    """Check that a path can be searched. Raises ScenarioError for the first obstacle.
+
+    Obstacles are: more wind than the airspeed (m/s) allows, too many values in a population, a budget below the
+    population, and a start or destination inside a missile's kill radius.
+    """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
         raise ScenarioError.at(
             scenario.name,
@@ -184,8 +189,8 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             field="planner.population",
         )
     if settings.budget is not None and settings.budget < settings.population:
-        allowed = f"at least the population, {settings.population}, is evaluated"
-        raise ScenarioError.at(scenario.name, "planner.budget", settings.budget, f"{allowed}")
+        allowed = f"allowed at least the population, {settings.population}"
+        raise ScenarioError.at(scenario.name, "planner.budget", settings.budget, allowed)
     threats = scenario.threats
     for field, end in (("start", scenario.start), ("destination", scenario.destination)):
         distances = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius

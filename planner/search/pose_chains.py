@@ -90,6 +90,7 @@ def _lap_corners(start: MapPoint, course: float, signed_side: float, laps: int) 
 
 
 def _offset_point(point: MapPoint, course: float, distance: float) -> MapPoint:
+    """Return the map point at a distance (m) from a point on a course (rad)."""
     return point[0] + distance * math.sin(course), point[1] + distance * math.cos(course)
 
 

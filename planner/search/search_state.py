@@ -238,7 +238,7 @@ class Search:
         return rotated_vectors(space, encoding, path[None])
 
     def should_stop(self) -> bool:
-        """Ask the stop condition, and record its reason if it says to stop."""
+        """Return True if the stop condition gives a reason to stop, and record the reason."""
         reason = self.stop_condition() if self.stop_condition is not None else ""
         self.end_reason = reason or self.end_reason
         return bool(reason)
@@ -343,6 +343,7 @@ class Search:
         return self.shortest is not None or (len(self.archive.scores) > 0 and self.best_is_safe())
 
     def _straight_length(self) -> float:
+        """Return the distance between start and destination, m."""
         return math.dist(self.problem.space.start, self.problem.space.destination)
 
     def length_ratio(self) -> float:
@@ -358,6 +359,7 @@ class Search:
         return certificate.ok and certificate.kill_distance >= self.required_distance
 
     def _evaluation_budget(self) -> float:
+        """Return the allowed number of evaluations; inf if the scenario sets none."""
         budget = self.problem.scenario.planner.budget
         return math.inf if budget is None else budget
 
@@ -425,7 +427,7 @@ class Search:
         return self.shortest
 
     def _certify_vector(self, vector: Floats, path: Floats) -> Certificate:
-        """Return the certificate of a vector's path, cached because it is the same in all attempts."""
+        """Return the certificate of a vector's path; it is cached, because all attempts have the same certificate."""
         key = vector.tobytes()
         certificate = self.certificates.get(key)
         if certificate is None:

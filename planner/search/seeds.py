@@ -279,7 +279,7 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Search for a path along a route that may turn back; return the better of it and `best`, with its certificate."""
+    """Search along a route that may turn back. Return the better of the path found and `best`, with its certificate."""
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices, remaining_states = (
@@ -328,7 +328,7 @@ def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple
 
 
 def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
-    """Return the best path in a frame along a route (k, 3), its certificate, and True if shortening has made it."""
+    """Search along a route (k, 3). Return the best path, its certificate, and True if it comes from shortening."""
     waypoints = search.encoding.waypoints
     piece_ends, _ = sample_route(route, waypoints - 1)
     encoding = route_encoding(search.problem.space, piece_ends[:, :2])

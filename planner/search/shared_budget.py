@@ -45,9 +45,11 @@ class SharedBudget:
         return replace(plan, evaluations=self._count_evaluations(), ended=end_reason)
 
     def _count_evaluations(self) -> int:
+        """Return the number of evaluations of all searches so far."""
         return sum(plan.evaluations for plan in self._plans)
 
     def _record_plan(self, plan: Plan) -> Plan:
+        """Store a plan, and why its search ended if all earlier searches completed. Return the plan."""
         self._plans.append(plan)
         if self._end_reason == "completed":
             self._end_reason = plan.ended

@@ -46,9 +46,9 @@ def test_the_shipped_prior_is_the_fit_to_the_table() -> None:
 
 
 def test_a_large_drive_is_efficient_and_a_slender_wing_has_less_drag() -> None:
-    assert POWER_PRIOR.drive_efficiency(POWER_PRIOR.loss_mass) == pytest.approx(0.5 * MAX_EFFICIENCY)
+    assert POWER_PRIOR.propulsive_efficiency(POWER_PRIOR.loss_mass) == pytest.approx(0.5 * MAX_EFFICIENCY)
     # 8 times the mass has a quarter of the losses per output.
-    assert POWER_PRIOR.drive_efficiency(8.0 * POWER_PRIOR.loss_mass) == pytest.approx(MAX_EFFICIENCY / 1.25)
+    assert POWER_PRIOR.propulsive_efficiency(8.0 * POWER_PRIOR.loss_mass) == pytest.approx(MAX_EFFICIENCY / 1.25)
     assert POWER_PRIOR.min_drag_coefficient("vtail", 8.0, 3.2e5) == POWER_PRIOR.tail_drag
     # Twice the aspect ratio: 2^-0.42 = 0.747; 32 times the Reynolds number: 32^-0.2 = 0.5.
     assert POWER_PRIOR.min_drag_coefficient("wing", 16.0, 3.2e5) == pytest.approx(

@@ -138,7 +138,7 @@ def test_every_command_stands_in_the_reference_with_its_options_and_what_they_do
         assert re.search(rf"^\| `planfly {name}\b", rows, re.MULTILINE), name
         part = section(page, name)
         defined = " ".join(re.findall(r"^`(.*)`$", part, re.MULTILINE))
-        assert [option for option in parser.options() if option not in defined] == [], name
+        assert [option for option in parser.long_options() if option not in defined] == [], name
         # Every word of the help but the usage, which breaks its lines elsewhere, and the exit codes.
         helped = parser.format_help().partition("\n\n")[2].replace(EXIT_CODES.strip(), "")
         # The help breaks its lines at hyphens, too.
@@ -166,7 +166,7 @@ def test_commands_in_the_text_have_options_that_there_are(page: Path) -> None:
         assert set(names) <= set(commands), code
         for name in names:
             options = {option for word in words[1:] if word.startswith("--") for option in word.split("|")}
-            known = {*commands[name].options(), "--help"}
+            known = {*commands[name].long_options(), "--help"}
             assert {option.partition("=")[0] for option in options} <= known, code
 
 

@@ -190,7 +190,7 @@ class ArduPlane(Autopilot):
         parameters = self.parameters
         values = {name: value for name, value, _ in parameters.values}
         texts = [
-            f"{name} {values[name]:g} changes the flight and is not flown"
+            f"{name} {values[name]:g} affects the flight, but is not simulated"
             for name, neutral in _NEUTRAL.items()
             if values[name] != neutral
         ]
@@ -199,7 +199,7 @@ class ArduPlane(Autopilot):
             texts.append(f"the circle and the altitudes of FENCE_TYPE {parameters.fence_type:g} are not judged")
         if mission.returns and parameters.rtl_follows_terrain:
             texts.append(
-                f"TERRAIN_FOLLOW {parameters.terrain_follow:g} has the return follow the terrain, which is not flown"
+                f"TERRAIN_FOLLOW {parameters.terrain_follow:g} makes returns follow the terrain, which is not simulated"
             )
         return texts + describe_open_settings(parameters, mission, by_program=by_program)
 
@@ -555,4 +555,6 @@ def _bank_limit_note(bank: float) -> str:
     """
     if bank <= 0.0:
         return ""
-    return f"NAVL1_LIM_BANK {bank:g} is not flown: circles are as wide as without it, but ArduPlane's may be narrower"
+    return (
+        f"NAVL1_LIM_BANK {bank:g} is not simulated: circles are as wide as without it, but ArduPlane's may be narrower"
+    )

@@ -153,21 +153,21 @@ _FREE_BANK_HEIGHT_RATIO = 3.0
 
 
 def describe_open_settings(parameters: ArduPilotParameters, mission: MissionParts, *, by_program: bool) -> list[str]:
-    r"""Describe the settings that change a mission's flight and are not simulated, without a full stop.
+    r"""Describe each parameter that affects a mission's flight but is not simulated, in a text without a full stop.
 
     by_program: True if ArduPlane's own program flies.
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.of_text("LAND_PF_ARSPD 11\nKFF_THR2PTCH 2\n", "mine.param")
     >>> describe_open_settings(made, MissionParts(), by_program=False)
-    ['KFF_THR2PTCH 2 changes the flight and is not flown']
+    ['KFF_THR2PTCH 2 affects the flight, but is not simulated']
     >>> describe_open_settings(made, MissionParts(lands=True), by_program=False)[1]
-    'LAND_PF_ARSPD 11 changes the landing and is not flown'
+    'LAND_PF_ARSPD 11 affects the landing, but is not simulated'
     """
     is_flown = {Phase.FLIGHT: True, Phase.TAKE_OFF: mission.takes_off, Phase.LANDING: mission.lands}
     values = _DEFAULTS | {name: value for name, value, _ in parameters.values}
     texts = [
-        f"{name} {values[name]:g} changes the {setting.phase} and is not flown"
+        f"{name} {values[name]:g} affects the {setting.phase}, but is not simulated"
         for name, setting in OPEN_SETTINGS.items()
         if is_flown[setting.phase]
         and not setting.lowest <= values[name] <= setting.highest
@@ -194,13 +194,13 @@ def _describe_others(
         if percent != 0.0 and flap_speed > 0.0 and min_airspeed <= flap_speed:
             yield (
                 f"FLAP_{number}_PERCNT {percent:g} below FLAP_{number}_SPEED {flap_speed:g}"
-                " changes the flight and is not flown"
+                " affects the flight, but is not simulated"
             )
     for name in ("ARSPD_WIND_MAX",) if by_program else ("AHRS_WIND_MAX", "ARSPD_WIND_MAX"):
         if 0.0 < values[name] < mission.wind:
-            yield f"{name} {values[name]:g} in {mission.wind:.3g} m/s of wind changes the airspeed and is not flown"
+            yield f"{name} {values[name]:g} in {mission.wind:.3g} m/s wind affects the airspeed, but is not simulated"
     if mission.lands and int(values["MIS_OPTIONS"]) & _CONTINUE_AFTER_LANDING:
-        yield f"MIS_OPTIONS {values['MIS_OPTIONS']:g} continues the mission after its landing, which is not flown"
+        yield f"MIS_OPTIONS {values['MIS_OPTIONS']:g} continues the mission after its landing, which is not simulated"
     if by_program:
         return
     yield from _describe_pitch_rates(parameters, values)
@@ -210,23 +210,23 @@ def _describe_others(
             range_text = f"AIRSPEED_MIN {values['AIRSPEED_MIN']:g} to AIRSPEED_MAX {values['AIRSPEED_MAX']:g}"
             yield (
                 f"DO_CHANGE_SPEED to {airspeed:g} m/s with a throttle sets TRIM_THROTTLE outside {range_text},"
-                " which is not flown"
+                " which is not simulated"
             )
     free_bank_height = _FREE_BANK_HEIGHT_RATIO * parameters.takeoff_level_height
     if mission.takes_off and values["TKOFF_ALT"] < free_bank_height:
         # `Plane::takeoff_calc_roll`.
         yield (
             f"TKOFF_ALT {values['TKOFF_ALT']:g} frees the bank of the take-off below {free_bank_height:g} m,"
-            " which is not flown"
+            " which is not simulated"
         )
     if parameters.throttle_cruise <= _MOTOR_OFF_THROTTLE:
-        yield f"TRIM_THROTTLE {values['TRIM_THROTTLE']:g} stops the motor, which is not flown"
+        yield f"TRIM_THROTTLE {values['TRIM_THROTTLE']:g} stops the motor, which is not simulated"
     reverse = _REVERSE_IN_FLIGHT | _REVERSE_IN_RETURN * mission.returns | _REVERSE_IN_LANDING * mission.lands
     if parameters.throttle_min < 0.0 and int(values["USE_REV_THRUST"]) & reverse:
         settings_text = f"THR_MIN {values['THR_MIN']:g} and USE_REV_THRUST {values['USE_REV_THRUST']:g}"
-        yield f"{settings_text} reverse the thrust, which is not flown"
+        yield f"{settings_text} reverse the thrust, which is not simulated"
     if mission.returns and mission.has_return_path and parameters.rtl_autoland == _BY_RETURN_PATH:
-        yield "RTL_AUTOLAND 4 returns along the mission's return path, which is not flown"
+        yield "RTL_AUTOLAND 4 returns along the mission's return path, which is not simulated"
 
 
 def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
@@ -236,11 +236,11 @@ def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
     present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
     if values["ARSPD_ENABLE"] == 0.0 or not present:
         name = "ARSPD_TYPE" if values["ARSPD_ENABLE"] else "ARSPD_ENABLE"
-        yield f"{name} 0 leaves no airspeed sensor, which is not flown"
+        yield f"{name} 0 leaves no airspeed sensor, which is not simulated"
         return
     use = f"{prefixes[primary if primary in present else present[0]]}_USE"
     if values[use] != 1.0:
-        yield f"{use} {values[use]:g} changes the flight and is not flown"
+        yield f"{use} {values[use]:g} affects the flight, but is not simulated"
 
 
 def _describe_estimate(values: Mapping[str, float]) -> Iterator[str]:
@@ -249,16 +249,16 @@ def _describe_estimate(values: Mapping[str, float]) -> Iterator[str]:
     if values["GPS_AUTO_SWITCH"] == 0.0:
         type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
     if not any(values[name] for name in type_names):
-        yield f"{' and '.join(type_names)} 0 leave no GPS, and so no position, which is not flown"
+        yield f"{' and '.join(type_names)} 0 leave no GPS, and so no position, which is not simulated"
     estimator, height_source = values["AHRS_EKF_TYPE"], values["EK3_SRC1_POSZ"]
     # `AP_AHRS::init` replaces EKF2 by EKF3.
     enabling = {_EKF2: "", _EKF3: "EK3_ENABLE", _EXTERNAL_AHRS: "EAHRS_TYPE"}
     if estimator not in enabling:
-        yield f"AHRS_EKF_TYPE {estimator:g} estimates the position without EKF3, which is not flown"
+        yield f"AHRS_EKF_TYPE {estimator:g} estimates the position without EKF3, which is not simulated"
     elif enabling[estimator] and values[enabling[estimator]] == 0.0:
-        yield f"{enabling[estimator]} 0 with AHRS_EKF_TYPE {estimator:g} leaves no position, which is not flown"
+        yield f"{enabling[estimator]} 0 with AHRS_EKF_TYPE {estimator:g} leaves no position, which is not simulated"
     if height_source not in _HEIGHT_SOURCES:
-        yield f"EK3_SRC1_POSZ {height_source:g} takes the altitude neither from barometer nor GPS, which is not flown"
+        yield f"EK3_SRC1_POSZ {height_source:g} uses neither barometer nor GPS for the altitude, which is not simulated"
 
 
 def _describe_arming(values: Mapping[str, float], mission: MissionParts) -> Iterator[str]:
@@ -278,7 +278,7 @@ def _describe_outputs(parameters: ArduPilotParameters, values: Mapping[str, floa
     functions = {values[f"SERVO{output}_FUNCTION"] for output in range(1, 33)}
     for part, moving in _FUNCTIONS_BY_PART.items():
         if functions.isdisjoint(moving):
-            yield f"SERVO1_FUNCTION to SERVO32_FUNCTION move no {part}, which is not flown"
+            yield f"SERVO1_FUNCTION to SERVO32_FUNCTION move no {part}, which is not simulated"
 
 
 def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
@@ -294,7 +294,7 @@ def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, 
     }
     for name, needed_rate in needed_rates.items():
         if 0.0 < values[name] < needed_rate:
-            yield f"{name} {values[name]:g} below {needed_rate:.3g} changes the flight and is not flown"
+            yield f"{name} {values[name]:g} below {needed_rate:.3g} affects the flight, but is not simulated"
 
 
 def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:
@@ -321,4 +321,4 @@ def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | N
         fault = rate_gains_fault(gains, (min(suitable, default), max(suitable, default)), values[time_constant])
         if fault:
             gains_text = ", ".join(f"{name} {values[name]:g}" for name in [*names[1:], names[0], time_constant])
-            yield f"{gains_text}: gains {fault} to hold the attitude, which is not flown"
+            yield f"{gains_text}: gains {fault} to hold the attitude, which is not simulated"

@@ -80,7 +80,7 @@ _NEUTRAL = {
     # Altitude from range finder or vision.
     "EKF2_HGT_REF": _NeutralRange(0.0, 1.0, by_program=False),
 }
-# Part of an RTL that is not flown, by RTL_TYPE.
+# Part of an RTL that is not simulated, by RTL_TYPE.
 _RTL_TYPES_NOT_FLOWN = {
     2: "RTL_TYPE 2, a return along the mission to its landing or back, is flown as 1, to the nearest rally "
     "point or home",
@@ -213,7 +213,7 @@ class Px4(Autopilot):
             if parameters[name] > 0.0
         ]
         changing_texts = [
-            f"{name} {parameters[name]:g} changes the flight and is not flown"
+            f"{name} {parameters[name]:g} affects the flight, but is not simulated"
             for name, neutral in _NEUTRAL.items()
             if not neutral.lowest <= parameters[name] <= neutral.highest and not (by_program and neutral.by_program)
         ]
@@ -225,38 +225,38 @@ class Px4(Autopilot):
         """Describe settings that change only some missions or releases."""
         parameters = self.parameters
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
-            yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not flown"
+            yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not simulated"
         if mission.moves_payload and parameters["MIS_COMMAND_TOUT"] > 0.0:
-            yield f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} waits for the payload, which is not flown"
+            yield f"MIS_COMMAND_TOUT {parameters['MIS_COMMAND_TOUT']:g} waits for the payload, which is not simulated"
         if parameters["FW_T_THR_LOW_HGT"] >= 0.0 and parameters["FW_LND_THRTC_SC"] != 1.0:
             scale_text = f"FW_LND_THRTC_SC {parameters['FW_LND_THRTC_SC']:g}"
-            yield f"{scale_text} below FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m is not flown"
+            yield f"{scale_text} below FW_T_THR_LOW_HGT {parameters['FW_T_THR_LOW_HGT']:g} m is not simulated"
         if mission.loiters_to_land and parameters["FW_LND_EARLYCFG"] != 0.0:
-            yield "FW_LND_EARLYCFG 1 changes the loiter before the landing and is not flown"
+            yield "FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated"
         if not mission.returns:
             return
         if parameters["RTL_TYPE"] in _ALONG_THE_MISSION:
-            yield f"RTL_TYPE {parameters['RTL_TYPE']:g} returns along the mission, which is not flown"
+            yield f"RTL_TYPE {parameters['RTL_TYPE']:g} returns along the mission, which is not simulated"
         if parameters["RTL_DESCEND_ALT"] != parameters["RTL_RETURN_ALT"]:
             end_text = f"RTL_DESCEND_ALT {parameters['RTL_DESCEND_ALT']:g}"
             yield f"{end_text} ends the return, which is flown to RTL_RETURN_ALT {parameters['RTL_RETURN_ALT']:g}"
         if parameters["RTL_LAND_DELAY"] >= 0.0:
-            yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not flown"
+            yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not simulated"
 
     def _describe_endings(self, mission: MissionParts) -> Iterator[str]:
         """Describe settings with which PX4 may leave a mission in flight."""
         parameters = self.parameters
         if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
-            yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not flown"
+            yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated"
         time_action = _RETURN_IN_TIME_DEFAULT[self.parameters.version]
         time_action = parameters.by_origin("file").get("COM_FLTT_LOW_ACT", time_action)
         if time_action == _RETURN_IN_TIME and parameters["BAT1_CAPACITY"] > 0.0:
-            yield "COM_FLTT_LOW_ACT 3 returns when the battery lasts only for the return, which is not flown"
+            yield "COM_FLTT_LOW_ACT 3 returns when the battery lasts only for the return, which is not simulated"
         if parameters["CBRK_FLIGHTTERM"] != _NO_TERMINATION:
             limits = {"FD_FAIL_R": "FW_R_LIM", "FD_FAIL_P": "FW_P_LIM_MAX"}
             for name, limit in limits.items():
                 if 0.0 < parameters[name] <= round(math.degrees(parameters[limit]), 6):
-                    yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not flown"
+                    yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not simulated"
 
     def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
         """Return the failsafe from COM_LOW_BAT_ACT and BAT_CRIT_THR, which PX4's own program does not get.

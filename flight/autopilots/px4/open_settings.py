@@ -57,12 +57,12 @@ def _describe_estimate(parameters: Px4Parameters) -> Iterator[str]:
     """Describe settings with which EKF2 has no position or no altitude."""
     gps_bits = int(parameters["EKF2_GPS_CTRL"])
     if not gps_bits & _GPS_POSITION_BIT:
-        yield f"EKF2_GPS_CTRL {gps_bits} takes no position from GPS, which is not flown"
+        yield f"EKF2_GPS_CTRL {gps_bits} takes no position from GPS, which is not simulated"
     has_barometer = parameters["EKF2_BARO_CTRL"] > 0.0 and parameters["SYS_HAS_BARO"] > 0.0
     if not has_barometer and not gps_bits & _GPS_ALTITUDE_BIT:
-        yield f"EKF2_GPS_CTRL {gps_bits} without a barometer leaves no altitude, which is not flown"
+        yield f"EKF2_GPS_CTRL {gps_bits} without a barometer leaves no altitude, which is not simulated"
     if not any(parameters[name] for name in _GPS_CONNECTIONS):
-        yield "GPS_1_CONFIG 0 connects no GPS, which is not flown"
+        yield "GPS_1_CONFIG 0 connects no GPS, which is not simulated"
 
 
 def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
@@ -71,12 +71,12 @@ def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
     if parameters["CA_AIRFRAME"] != _FIXED_WING:
         return
     if stated.get("CA_ROTOR_COUNT", 1.0) == 0.0:
-        yield "CA_ROTOR_COUNT 0 leaves no motor, which is not flown"
+        yield "CA_ROTOR_COUNT 0 leaves no motor, which is not simulated"
     names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(stated.get("CA_SV_CS_COUNT", 0.0)))]
     if "CA_SV_CS_COUNT" in stated and stated.keys() >= set(names):
         for part, types in _SURFACES_BY_PART.items():
             if {stated[name] for name in names}.isdisjoint(types):
-                yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not flown"
+                yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
 
 
 def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -> Iterator[str]:
@@ -99,7 +99,7 @@ def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -
         )
         if fault:
             gains_text = ", ".join(f"{name} {parameters[name]:g}" for name in [*names, time_constant])
-            yield f"{gains_text}: gains {fault} to hold the attitude, which is not flown"
+            yield f"{gains_text}: gains {fault} to hold the attitude, which is not simulated"
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:

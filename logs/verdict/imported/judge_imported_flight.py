@@ -22,7 +22,7 @@ from flight.simulation.setup import (
     VerticalDatum,
 )
 from flight.simulation.track import Track
-from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line, setup_conditions
+from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line, judging_conditions
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, gaps_between, stretch_end_text
 from logs.verdict.judge_geometry import track_findings
@@ -92,7 +92,7 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
         time_text = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
         legs = by_start.get(stretch.start)
         if legs is None:
-            lines.append(f"Judged: nothing of {time_text}: it passed no two waypoints in order")
+            lines.append(f"Judged: nothing of {time_text}: it did not pass two waypoints in order")
             continue
         first, last = leg_numbers[legs.first], leg_numbers[legs.last - 1]
         partial_text = f", leg {last} in part" if legs.partial else ""
@@ -264,7 +264,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
     own_answer = LevelAnswer(
         setup.autopilot.level, flyable, answer_text, undecided=bool(unjudged_text) and not has_failed
     )
-    conditions = setup_conditions(setup)
+    conditions = judging_conditions(setup)
     lines = imported_lines(findings, setup, own_answer, flown_stretches, conditions)
     return Verdict(
         findings,

@@ -88,7 +88,7 @@ def energy_findings(
             margin=math.nan if is_guessed else limit - energy,
             unit="Wh",
             check=NOT_FLOWN if undecided_faults else UNKNOWN_AIRCRAFT if is_uncertain else "",
-            method="power of steady flight on each leg over its time" if geometric else "power over time",
+            method="power of steady flight on each leg times its duration" if geometric else "power times duration",
         )
     ]
 

@@ -26,7 +26,7 @@ Columns = NDArray[Any]
 def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
     """Return columns (t,) by name: fields of `/state` messages, with latitude and longitude after time.
 
-    Each name ends with its unit; courses and the axes east and north belong to the map about the scenario's origin.
+    Each name ends with its unit.  East, north and courses refer to the map projection centred on the scenario's origin.
 
     >>> from logs.recording.example_log import example_log
     >>> columns = flight_columns(example_log())

@@ -191,7 +191,7 @@ def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) ->
     _add_element(document, "name", title)
     folders = _Folders(document)
     for line in lines:
-        folder = folders.shared_folder(line.folder) if line.folder else folders.new(line.name)
+        folder = folders.shared_folder(line.folder) if line.folder else folders.add_folder(line.name)
         mark = _add_element(folder, "Placemark")
         _add_element(mark, "name", line.name)
         _add_style(mark, line.role)
@@ -216,8 +216,8 @@ class _Folders:
         self._document = document
         self._folder_by_name: dict[str, ElementTree.Element] = {}
 
-    def new(self, name: str) -> ElementTree.Element:
-        """Add a folder to the document."""
+    def add_folder(self, name: str) -> ElementTree.Element:
+        """Add a folder with a name to the document, and return the folder."""
         folder = _add_element(self._document, "Folder")
         _add_element(folder, "name", name)
         return folder
@@ -225,7 +225,7 @@ class _Folders:
     def shared_folder(self, name: str) -> ElementTree.Element:
         """Return the folder that all lines and zones with this folder name share."""
         if name not in self._folder_by_name:
-            self._folder_by_name[name] = self.new(name)
+            self._folder_by_name[name] = self.add_folder(name)
         return self._folder_by_name[name]
 
 

@@ -88,7 +88,7 @@ class Instruments:
             f" {_metres_text(float(np.hypot(*step)))} to go"
         )
         if leg >= route.legs:
-            leg_text = "behind the last waypoint"
+            leg_text = "after the last waypoint"
         title_width = max(1, columns - len(clock))
         return [_without_control_characters(title)[: title_width - 1].ljust(title_width) + clock, bar, leg_text]
 

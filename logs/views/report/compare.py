@@ -237,7 +237,7 @@ def _wind_text(setup: FlightSetup) -> str:
 
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
-    """List quantity, unit, first value, second value, and second less first, as text."""
+    """Return rows of text: quantity, unit, first value, second value, and second minus first value."""
     first_answer, second_answer = (verdict.answer for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first_answer, second_answer, "")]
     for difference in comparison.differences:

@@ -371,15 +371,15 @@ def not_reflown_lines(reflights: Sequence[Reflight], stretches: Sequence[Mission
     stretches: stretches of the imported flight.  max_count: largest number of stretches to fly again.
 
     >>> not_reflown_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
-    ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']
+    ['Not flown again: AUTO from 50.0 s to 60.0 s: it did not pass two waypoints in order']
     """
     compared_starts = {reflight.stretch.start for reflight in reflights}
     lines = []
     for stretch in stretches:
         if stretch.start not in compared_starts:
-            reason = "it passed no two waypoints in order"
+            reason = "it did not pass two waypoints in order"
             if len(reflights) >= max_count:
-                reason += f", or {max_count} longer ones were"
+                reason += f", or {max_count} longer stretches were flown again"
             name = stretch.mode or "the flight"
             lines.append(f"Not flown again: {name} from {stretch.start:.1f} s to {stretch.end:.1f} s: {reason}")
     return lines

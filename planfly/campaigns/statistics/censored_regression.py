@@ -83,22 +83,27 @@ class BinaryLink(Protocol):
 
 class _Probit:
     def log_cdf(self, x: Floats) -> Floats:
+        """Return the logarithm of the normal probability of failure."""
         from scipy.special import log_ndtr
 
         return log_ndtr(x)
 
     def log_survival(self, x: Floats) -> Floats:
+        """Return the logarithm of the normal probability of success."""
         return self.log_cdf(-x)
 
     def survival(self, x: Floats) -> Floats:
+        """Return the normal probability of success."""
         from scipy.special import ndtr
 
         return ndtr(-x)
 
     def density(self, x: Floats) -> Floats:
+        """Return the standard normal density."""
         return np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
+        """Return the Fisher information about x of a flight that gives its margin if it passes within `width`."""
         from scipy.special import ndtr
 
         upper_predictor = x + width
@@ -113,6 +118,7 @@ class _Probit:
         return end_information + np.maximum(pass_information, 0.0)
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
+        """Return first and second derivative of the log-probability of each outcome."""
         from scipy.special import log_ndtr
 
         sign = np.where(has_failed, 1.0, -1.0)
@@ -122,29 +128,36 @@ class _Probit:
         return sign * ratio, -ratio * (z + ratio)
 
     def log_density(self, x: Floats) -> Floats:
+        """Return the logarithm of the standard normal density."""
         return -0.5 * x * x - 0.5 * np.log(2.0 * np.pi)
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return first and second derivative of `log_density`."""
         return -x, np.full_like(x, -1.0)
 
 
 class _ComplementaryLogLog:
     def log_cdf(self, x: Floats) -> Floats:
+        """Return the logarithm of the probability of failure, 1 - exp(-exp(x))."""
         with np.errstate(divide="ignore"):
             # For a tiny rate the probability equals the rate.
             logarithms: Floats = np.where(x < -30.0, x, np.log(-np.expm1(self.log_survival(x))))
         return logarithms
 
     def log_survival(self, x: Floats) -> Floats:
+        """Return the logarithm of the probability of success, exp(-exp(x))."""
         return -np.exp(np.minimum(x, _MAX_EXPONENT))
 
     def survival(self, x: Floats) -> Floats:
+        """Return the probability of success, exp(-exp(x))."""
         return np.exp(self.log_survival(x))
 
     def density(self, x: Floats) -> Floats:
+        """Return the derivative of the probability of failure."""
         return np.exp(x - np.exp(np.minimum(x, _MAX_EXPONENT)))
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
+        """Return the Fisher information about x of a flight that gives its margin if it passes within `width`."""
         rate, upper_rate = (
             np.exp(np.clip(predictor, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT)) for predictor in (x, x + width)
         )
@@ -154,15 +167,18 @@ class _ComplementaryLogLog:
         return failure_information + pass_information + upper_rate * upper_rate * np.exp(-upper_rate)
 
     def derivatives(self, x: Floats, has_failed: Bools) -> tuple[Floats, Floats]:
+        """Return first and second derivative of the log-probability of each outcome."""
         rate = np.exp(np.clip(x, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT))
         first = _rate_ratio(rate)
         second = first * (1.0 - rate - first)
         return np.where(has_failed, first, -rate), np.where(has_failed, np.minimum(second, 0.0), -rate)
 
     def log_density(self, x: Floats) -> Floats:
+        """Return the logarithm of `density`."""
         return x - np.exp(np.minimum(x, _MAX_EXPONENT))
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
+        """Return first and second derivative of `log_density`."""
         rate = np.exp(np.minimum(x, 0.5 * _MAX_EXPONENT))
         return 1.0 - rate, -rate
 
@@ -319,13 +335,14 @@ class RegressionFit:
     _mode: Floats
 
     def sample(self) -> Floats:
-        """Return (s, 2 + d) equally likely coefficients of the terms, with a positive coefficient of the wind."""
+        """Return equally likely coefficients of the terms from the posterior, (s, 2 + d); the wind's is positive."""
         return self._posterior.sample(self._mode)
 
 
 def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionFit | None = None) -> RegressionFit:
-    """Fit the regression with the prior of the draws' coefficients that has the most evidence.
+    """Fit the regression of flight outcomes with each prior of the draws' coefficients; return the most probable fit.
 
+    link: link function between the predictor and the probability of failure.
     nearby_fit: a fit of the same coefficients, whose mode is an additional start; the posterior of margins only may
     have two modes.
 
@@ -342,12 +359,8 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionF
     fits = []
     for deviation in priors:
         posterior = _Posterior(outcomes, link, deviation)
-        fits += [
-            _find_mode(posterior, start_point)
-            for start_point in (
-                [posterior.start_point()] if nearby_fit is None else [posterior.start_point(), nearby_fit._mode]
-            )
-        ]
+        start_points = [posterior.start_point()] if nearby_fit is None else [posterior.start_point(), nearby_fit._mode]
+        fits += [_find_mode(posterior, point) for point in start_points]
     return max(fits, key=lambda fit: fit.log_evidence)
 
 
@@ -380,13 +393,16 @@ class _Posterior:
         return point
 
     def coefficients(self, points: Floats) -> Floats:
-        """Return the coefficients of the terms at any number of points."""
+        """Return the coefficients of the terms at points (..., k).
+
+        A point has the logarithm of the wind's coefficient in place of the coefficient itself.
+        """
         beta = points.copy()
         beta[..., 1] = np.exp(np.minimum(points[..., 1], _MAX_LOGARITHM))
         return beta
 
     def log_density(self, points: Floats) -> Floats:
-        """Return the log-density (n,) at n points, up to a constant."""
+        """Return the logarithm of the posterior density at points (n, k), up to a constant, (n,)."""
         beta, deviations, has_failed = self.coefficients(points), points - self._prior_mean, self._outcomes.failed
         predictor = self._terms @ beta.T
         predictor_without_margin = (
@@ -410,7 +426,7 @@ class _Posterior:
         return np.where(is_possible, log_densities, -np.inf)
 
     def sample(self, mode: Floats) -> Floats:
-        """Return (s, size) equally likely coefficients of the terms.
+        """Return equally likely coefficients of the terms, (s, size), by importance sampling around the mode.
 
         With few failures the wind's coefficient is uncertain by factors, and the constant depends strongly on it.
         Therefore the constant is replaced by the predictor at the wind where the predictor is best known.
@@ -438,15 +454,15 @@ class _Posterior:
         return self.coefficients(constants(points))[:, : self.size]
 
     def slope_and_curvature(self, point: Floats) -> tuple[Floats, Floats]:
-        """Return the first and second derivatives of the negative log-density."""
+        """Return the gradient (k,) and the Hessian (k, k) of the negative log-density at a point (k,)."""
         beta, scale = self.coefficients(point), np.ones(point.size)
         predictor, terms = self._terms @ beta, self._terms
         first, second = self._link.derivatives(predictor, self._outcomes.failed)
         if self.margin_coefficient:
-            narrow_first, narrow_second = self._link.density_derivatives(predictor)
+            marginal_first, marginal_second = self._link.density_derivatives(predictor)
             first, second = (
-                np.where(self._marginal_passes, narrow_first, first),
-                np.where(self._marginal_passes, narrow_second, second),
+                np.where(self._marginal_passes, marginal_first, first),
+                np.where(self._marginal_passes, marginal_second, second),
             )
         slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
         if self._outcomes.given_passed:
@@ -465,11 +481,12 @@ class _Posterior:
         return slope + self._precision * (point - self._prior_mean), curvature + np.diag(self._precision)
 
     def _predictor_without_margin(self, beta: Floats) -> Floats:
+        """Return the predictor of each flight without the term of its margin, (n,)."""
         return self._outcomes.terms @ beta[: self.size]
 
 
-def _find_mode(posterior: _Posterior, start_point: Floats) -> RegressionFit:
-    """Find the posterior's mode from a start, and the inverse of its curvature there.
+def _find_mode(posterior: _Posterior, point: Floats) -> RegressionFit:
+    """Find the mode of a posterior from a start point, and return the fit: mode, covariance and evidence.
 
     The search is Newton's method with halved steps, and with the absolute eigenvalues of the curvature where the loss
     is not convex, which is possible with margins only (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006,
@@ -480,23 +497,23 @@ def _find_mode(posterior: _Posterior, start_point: Floats) -> RegressionFit:
     def loss(point: Floats) -> float:
         return -float(posterior.log_density(point[None])[0])
 
-    value = loss(start_point)
+    value = loss(point)
     for _ in range(_MAX_STEPS):
-        slope, curvature = posterior.slope_and_curvature(start_point)
+        slope, curvature = posterior.slope_and_curvature(point)
         eigenvalues, axes = np.linalg.eigh(curvature)
         step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE))
         # The margin's coefficient stays positive: limit the step towards 0, where halved steps would end otherwise.
         margin_step = step[-1] if posterior.margin_coefficient else 0.0
-        fraction = min(1.0, _MAX_MARGIN_STEP_FRACTION * start_point[-1] / margin_step) if margin_step > 0.0 else 1.0
-        while not (new_value := loss(start_point - fraction * step)) <= value and fraction > _MIN_STEP_FRACTION:
+        fraction = min(1.0, _MAX_MARGIN_STEP_FRACTION * point[-1] / margin_step) if margin_step > 0.0 else 1.0
+        while not (new_value := loss(point - fraction * step)) <= value and fraction > _MIN_STEP_FRACTION:
             fraction *= 0.5
-        start_point, value = start_point - fraction * step, new_value
+        point, value = point - fraction * step, new_value
         if float(np.abs(fraction * step).max()) < _STEP_TOLERANCE:
             break
-    curvature, beta = posterior.slope_and_curvature(start_point)[1], posterior.coefficients(start_point)
+    curvature, beta = posterior.slope_and_curvature(point)[1], posterior.coefficients(point)
     evidence = -value - np.log(posterior.deviations).sum() - 0.5 * float(np.linalg.slogdet(curvature)[1])
     covariance: Floats = np.linalg.inv(curvature)[:size, :size].astype(np.float64)
     covariance[1] *= beta[1]
     covariance[:, 1] *= beta[1]
     margin_coefficient = float(beta[-1]) if posterior.margin_coefficient else 0.0
-    return RegressionFit(beta[:size], covariance, float(evidence), margin_coefficient, posterior, start_point)
+    return RegressionFit(beta[:size], covariance, float(evidence), margin_coefficient, posterior, point)

@@ -85,6 +85,7 @@ def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
 
 
 def _binomial_interval(successes: int, trials: int, confidence: float, method: str) -> Interval:
+    """Return a two-sided interval of a success probability; 0 to 1 without trials.  method: as in scipy's binomtest."""
     from scipy.stats import binomtest
 
     if not trials:
@@ -135,6 +136,7 @@ class StoppingBound:
 
     @property
     def _required_evidence(self) -> float:
+        """Logarithm of E(p) from which p is excluded."""
         return -math.log1p(-self.confidence)
 
     @cached_property
@@ -154,15 +156,20 @@ class StoppingBound:
 
     @staticmethod
     def _mixture_parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
+        """Return weight, a and b of two beta distributions: one for a high success probability, and Jeffreys' prior."""
         return (1.0 - _JEFFREYS_WEIGHT, scale, max(failures, 1e-9)), (_JEFFREYS_WEIGHT, 0.5, 0.5)
 
     def evidence(self, successes: int, failures: int, p: float) -> float:
-        """Return the logarithm of E(p); p is excluded if this logarithm is at least ``-log(1 - confidence)``."""
+        """Return the logarithm of E(p), the evidence against the success probability p.
+
+        E(p) is the ratio of the mixture's likelihood to the likelihood of p.  p is excluded if the logarithm is at
+        least ``-log(1 - confidence)``.
+        """
         likelihood = _times_log(successes, p) + _times_log(failures, 1.0 - p)
         return _log_mixture(self.parts, successes, failures) - likelihood
 
     def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
-        """Return True if p is excluded and the fraction of successes is above p (below p if ``above`` is False)."""
+        """Return True if p is excluded, and the fraction of successes is above p, or below p if `above` is False."""
         fraction = successes / max(1, successes + failures)
         is_beyond = fraction > p if above else fraction < p
         return is_beyond and self.evidence(successes, failures, p) >= self._required_evidence
@@ -178,7 +185,10 @@ class StoppingBound:
         return Interval(lower, upper)
 
     def _find_edge(self, successes: int, failures: int, excluded: float, included: float) -> float:
-        """Find the edge between excluded and other values of p by bisection; return its excluded side."""
+        """Find by bisection the excluded value of p closest to the values that are not excluded.
+
+        excluded, included: an excluded value, and a value that is not excluded.
+        """
         for _ in range(_BISECTIONS):
             candidate = 0.5 * (excluded + included)
             if self.evidence(successes, failures, candidate) >= self._required_evidence:
@@ -188,19 +198,21 @@ class StoppingBound:
         return excluded
 
     def bounds(self, tally: Tally) -> Interval:
-        """Return the interval of a tally; lost flights are failures for the lower end, successes for the upper end."""
+        """Return the interval for a tally: from lost flights as failures up to lost flights as successes."""
         lower = self.interval(tally.flyable, tally.failed + tally.lost).low
         upper = self.interval(tally.flyable + tally.lost, tally.failed).high
         return Interval(lower, upper)
 
 
 def _times_log(count: int, p: float) -> float:
+    """Return count * log(p); 0 for a count of 0 even if p is 0."""
     if not count:
         return 0.0
     return count * math.log(p) if p > 0.0 else -math.inf
 
 
 def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, failures: int) -> float:
+    """Return the log-likelihood of outcomes under a mixture of beta distributions.  parts: weight, a and b of each."""
     from scipy.special import betaln
 
     terms = [math.log(w) + float(betaln(successes + a, failures + b) - betaln(a, b)) for w, a, b in parts]
@@ -236,10 +248,10 @@ class Goal:
             return "beta-binomial mixture, valid at every number of flights"
         if self.changed:
             return (
-                "Clopper-Pearson, one-sided, but the number of flights was changed after some had "
-                "been flown: the true confidence is lower"
+                "Clopper-Pearson, one-sided, but the number of flights was changed during the campaign: "
+                "the true confidence is lower"
             )
-        return "Clopper-Pearson, one-sided, for the number of flights fixed beforehand"
+        return "Clopper-Pearson, one-sided, for a number of flights fixed in advance"
 
 
 @dataclass(frozen=True)
@@ -271,7 +283,7 @@ class Estimator:
         return self._bound.min_flights if self._bound is not None else self._goal.flights
 
     def decides(self, tally: Tally) -> bool:
-        """Return True if a tally decides a goal that stops."""
+        """Return True if a tally proves or disproves the target; always False for a fixed number of flights."""
         target, bound = self._goal.target, self._bound
         if bound is None or target is None:
             return False
@@ -291,6 +303,7 @@ class Estimator:
         return Estimate(tally, lower, upper, interval, self._goal_status(lower, upper))
 
     def _goal_status(self, lower: float, upper: float) -> Answer:
+        """Compare the bounds of the probability with the target."""
         target = self._goal.target
         if target is None:
             return "no target"
@@ -314,9 +327,9 @@ _MAX_GROUPS = 64
 
 
 def first_order_index(x: Floats, y: Floats) -> float:
-    """Return the first-order index of y (n,) to x (n,), 0 to 1.
+    """Return the first-order sensitivity index: the fraction of the variance of y (n,) that x (n,) explains, 0 to 1.
 
-    0 below `MIN_FLIGHTS_FOR_INDEX`, or if y does not vary.
+    Returns 0 for fewer than `MIN_FLIGHTS_FOR_INDEX` values, or if x or y does not vary.
 
     >>> random = np.random.default_rng(1)
     >>> x = random.random((4000, 2))

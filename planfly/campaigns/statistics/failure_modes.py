@@ -54,7 +54,10 @@ class FailureLaws:
 
     @classmethod
     def for_winds_up_to(cls, max_speed: float) -> "FailureLaws":
-        """Make the grid for winds up to ``max_speed``, m/s."""
+        """Return normal and Gumbel distributions of the wind at which a flight fails, on a grid of parameters.
+
+        max_speed: strongest wind of the search, m/s.
+        """
         means = np.arange(-_GRID_BELOW_MPS, max_speed + _GRID_ABOVE_MPS, _MEAN_STEP_MPS)
         mean, deviation = (grid.ravel() for grid in np.meshgrid(means, _SIGMAS_MPS, indexing="ij"))
         # Gumbel's distribution for minima: mean = location - gamma * scale, variance = (pi * scale)^2 / 6.
@@ -63,7 +66,7 @@ class FailureLaws:
         return cls(np.concatenate((mean, location)), np.concatenate((deviation, scale)), mean.size)
 
     def log_probabilities(self, speed: float) -> tuple[Floats, Floats]:
-        """Return the logarithms (n,) of the failure probability and the success probability in a wind, m/s."""
+        """Return the logarithms of the probabilities of failure and success in a wind (m/s), two arrays (n,)."""
         from scipy.special import log_ndtr
         from scipy.stats import gumbel_l
 
@@ -73,7 +76,7 @@ class FailureLaws:
         return log_failure, np.concatenate((log_ndtr(-normal), gumbel_l.logsf(gumbel)))
 
     def quantile(self, fraction: float) -> Floats:
-        """Return the wind (n,) in which a fraction of flights fails, m/s."""
+        """Return the wind in which a fraction of flights fails, m/s, for each distribution, (n,)."""
         from scipy.special import ndtri
         from scipy.stats import gumbel_l
 
@@ -101,7 +104,7 @@ class FailureLaws:
 
 
 def _count_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tuple[int, int]]:
-    """Return the numbers of failed and flyable flights, keyed by wind."""
+    """Return the numbers of failed and of flyable flights at each wind speed, keyed by speed, m/s."""
     return {
         float(speed): (int((~flyable[speeds == speed]).sum()), int(flyable[speeds == speed].sum()))
         for speed in np.unique(speeds)
@@ -137,11 +140,13 @@ class FailureMode:
 
 
 def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink) -> FailureMode:
-    """Fit a failure mode of n flights, with or without their margins, whichever has more evidence.
+    """Fit the regression of one failure mode to n flights.
 
-    terms: (n, 2 + d) terms of each flight: one, the wind relative to some origin, and the draws.
-    has_failed: (n,).  margin: (n,) margin of each passed flight as a fraction of a scale: 1 for a scale or more, 0 for
-    unknown.
+    The margins of passed flights are used if the joint model of failures and margins has more evidence than separate
+    models.
+    terms: terms of each flight: one, the wind relative to some origin, and the draws, (n, 2 + d).
+    has_failed: True for each flight that failed in this mode, (n,).
+    margin: margin of each passed flight as a fraction of the rule's scale, (n,): 1 for a scale or more, 0 for unknown.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
@@ -166,6 +171,7 @@ def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink)
 
 
 def _make_mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
+    """Return a failure mode with the coefficients of a fit.  log_evidence: evidence of failures and margins."""
     return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.margin_coefficient)
 
 
@@ -191,12 +197,14 @@ def fit_modes(
     link: BinaryLink,
     margin: Sequence[Mapping[Hashable, float] | None] = (),
 ) -> tuple[FailureMode, ...]:
-    """Fit the failure modes of n flights: first the most frequent mode, then the most frequent of the other flights.
+    """Fit the failure modes of n flights one after another, the most frequent mode first.
 
-    terms: (n, 2 + d), of `make_terms`.
-    failed_modes: modes in which each flight failed; empty if it was flyable.
-    margin: modes that each flight passed marginally, with the margin as a fraction of a scale, 0 to 1, or 0 for a pass
-    of unknown margin; other modes were passed by a scale or more.  None for a flight without known margins.
+    A flight that failed in a fitted mode is left out when the other modes are fitted.
+    terms: terms of each flight, (n, 2 + d), as made by `make_terms`.
+    failed_modes: modes in which each flight failed; empty for a flyable flight.
+    margin: for each flight, the modes that it passed with a small margin, and the margin as a fraction of the rule's
+    scale, 0 to 1, or 0 for an unknown margin.  All other modes were passed with a scale or more.  None for a flight
+    without known margins.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> speeds = np.linspace(0.0, 20.0, 200)
@@ -229,7 +237,10 @@ def fit_modes(
 
 
 def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats:
-    """Return the probability (n,) that flights (n, 2 + d) fail in any mode, from the mean coefficients of the modes."""
+    """Return the probability that each flight fails in any mode, (n,), from the mean coefficients of the modes.
+
+    terms: terms of each flight, (n, 2 + d).
+    """
     success: Floats = np.ones(len(terms))
     for mode in modes:
         success *= mode.link.survival(terms @ mode.mean)
@@ -237,7 +248,10 @@ def failure_probabilities(modes: Sequence[FailureMode], terms: Floats) -> Floats
 
 
 def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> float:
-    """Find the wind, m/s, up to `max_speed`, in which a fraction of draws (m, d) is expected to fail, by bisection."""
+    """Find by bisection the wind, m/s, in which a fraction of the draws (m, d) is expected to fail.
+
+    Returns `max_speed` if a smaller fraction is expected to fail there.
+    """
     mode_predictors = [
         (mode.link, make_terms(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
     ]
@@ -271,24 +285,24 @@ class FailureFraction:
 
 
 def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) -> FailureFraction:
-    """Return the fraction of draws (m, d) that is expected to fail in a wind, m/s."""
+    """Return the fraction of draws (m, d) that is expected to fail in a wind (m/s), and its derivatives."""
     terms = make_terms(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]
     success = [mode.link.survival(predictor) for mode, predictor in zip(modes, predictors, strict=True)]
     slopes, wind_slope = [], 0.0
     for number, mode in enumerate(modes):
-        success_of_others = np.prod(success[:number] + success[number + 1 :], axis=0)
-        slopes.append(terms.T @ (mode.link.density(predictors[number]) * success_of_others) / len(draws))
+        success_in_other_modes = np.prod(success[:number] + success[number + 1 :], axis=0)
+        slopes.append(terms.T @ (mode.link.density(predictors[number]) * success_in_other_modes) / len(draws))
         wind_slope += float(slopes[-1][0] * mode.mean[1])
     return FailureFraction(1.0 - float(np.prod(success, axis=0).mean()), slopes, wind_slope)
 
 
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
-    """Return the derivatives (2 + d,) of the boundary with respect to each mode's coefficients, m/s.
+    """Return the derivatives of the boundary with respect to the coefficients of each mode, arrays (2 + d,), m/s.
 
-    They follow from the implicit function theorem.
+    The derivatives follow from the implicit function theorem.
 
-    draws: (m, d).  speed: the boundary, m/s.
+    draws: (m, d).  speed: wind speed at the boundary, m/s.
     """
     failing = failure_fraction(modes, draws, speed)
     # If more wind does not cause more failures, nothing is known about the boundary.

@@ -84,7 +84,10 @@ def boundary_quantiles(
 
 
 def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fraction: float, max_speed: float) -> Floats:
-    """Return the boundary (n,) of each sample, m/s."""
+    """Return the boundary for each posterior sample of the modes' coefficients, (n,), m/s.
+
+    draws: (m, d); only the first few are used to bracket the boundary.
+    """
     # The posteriors of the modes are independent: samples of different modes can be combined in any order.
     samples = [
         np.random.default_rng(number).permutation(mode.sample()) if number else mode.sample()
@@ -118,7 +121,7 @@ class _FailureFractions:
         self._at_origin = [make_terms(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
 
     def logarithms(self, speeds: Floats) -> Floats:
-        """Return the logarithms (n,) of the failing fractions, each at its own wind, m/s."""
+        """Return the logarithm of the failing fraction for each sample at its own wind (n,), m/s."""
         success = np.ones_like(self._at_origin[0])
         for mode, sample, predictor in zip(self._modes, self._samples, self._at_origin, strict=True):
             success *= mode.link.survival(predictor + sample[:, 1] * (speeds - WIND_ORIGIN_MPS))
@@ -138,7 +141,7 @@ class DrawnNumbers:
     _known: list[Floats] = field(default_factory=list)
 
     def first(self, count: int) -> Floats:
-        """Return the first `count` draws (count, d), which are computed once."""
+        """Return the first `count` draws, (count, d); draws are computed once and kept."""
         known_count = sum(len(block) for block in self._known)
         if known_count < count:
             self._known.append(self.draw(known_count, max(count, known_count + 500)))
@@ -197,9 +200,12 @@ class Direction:
     def add(
         self, speed: float, draw: int, failed_modes: frozenset[Hashable], margin: Mapping[Hashable, float] | None = None
     ) -> None:
-        """Add a flight in a wind from 0 to `max_speed`, m/s; failed_modes: empty if it was flyable.
+        """Add the result of a flight.
 
-        margin: None if its margins are unknown.  Raises ValueError for a wind out of range.
+        speed: wind speed, m/s, from 0 to `max_speed`; otherwise ValueError is raised.
+        draw: index of the flight's draw.
+        failed_modes: modes in which the flight failed; empty for a flyable flight.
+        margin: margins of modes that the flight passed, see `fit_modes`; None if the margins are unknown.
         """
         if not 0.0 <= speed <= self.max_speed:
             raise ValueError(f"speed: {speed}: expected 0 to {self.max_speed:g} m/s")
@@ -219,7 +225,10 @@ class Direction:
         return all(self.failed_modes)
 
     def fits(self) -> tuple[FailureFit, ...]:
-        """Return the failure modes for each link, for a direction with both failed and flyable flights."""
+        """Return the failure modes fitted with each link function, cached until a flight is added.
+
+        The direction must have both failed and flyable flights.
+        """
         if self._fits is None or self._fits[0] != len(self.speeds):
             terms = make_terms(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
             modes_by_link = [fit_modes(terms, self.failed_modes, link, self.margin) for link in LINKS]
@@ -235,12 +244,13 @@ class Direction:
         return self._fits[1]
 
     def _make_fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
+        """Return a fit with its boundary and the boundary's derivatives.  weight: probability of the link function."""
         draws = self.numbers.population
         speed = boundary_speed(modes, draws, 1.0 - self.target, self.max_speed)
         return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
 
     def boundary(self) -> WindBoundary:
-        """Return the estimate and interval of the boundary.
+        """Return the wind at which the target is just met: estimate and interval, m/s.
 
         >>> numbers = DrawnNumbers(np.zeros((8, 0)), lambda start, stop: np.zeros((stop - start, 0)))
         >>> direction = Direction(20.0, 0.99, numbers)
@@ -266,6 +276,7 @@ class Direction:
 
     @cached_property
     def _failure_laws(self) -> FailureLaws:
+        """Distributions that replace the regression while all flights have the same outcome."""
         return FailureLaws.for_winds_up_to(self.max_speed)
 
 
@@ -308,7 +319,11 @@ _LARGEST_WIND_TOLERANCE_MPS = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return wind, m/s, and draw of the `count` most informative flights."""
+    """Return wind (m/s) and draw of the next `count` flights of a direction.
+
+    As long as all flights have the same outcome, the wind is found by bisection; after that, the flights are chosen
+    that are expected to reduce the variance of the boundary most.
+    """
     if direction.all_flew or direction.all_failed:
         speed = _bisect_speed(direction)
         draws = _extreme_draws(direction) if speed == direction.max_speed else []
@@ -317,6 +332,7 @@ def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
 
 
 def _bisect_speed(direction: Direction) -> float:
+    """Return the next wind, m/s, between flown winds of one outcome and the end of the range."""
     max_speed = direction.max_speed
     if not direction.speeds:
         return _round_to_grid(0.5 * max_speed, max_speed)
@@ -350,6 +366,7 @@ def _extreme_draws(direction: Direction) -> list[int]:
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
+    """Return wind (m/s) and draw of `count` flights, each chosen as if the flights before it had been flown."""
     fits, max_speed, flown_count = direction.fits(), direction.max_speed, len(direction.draws)
     min_speeds, max_speeds = (
         [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
@@ -377,10 +394,11 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
 
 
 def _gains_between(fits: tuple[FailureFit, ...], terms: Floats) -> Floats:
-    """Return the expected reduction (n,) of the boundary's variance between the fits after each flight, m2/s2.
+    """Return the expected reduction of the boundary's variance between fits by each flight, (n,), (m/s)^2.
 
-    The outcome of a flight discriminates between the fits; the reduction is the variance of the boundary's mean given
-    the outcome.
+    The outcome of a flight makes one of the fits more likely.  The reduction is the variance of the mean boundary
+    given the outcome.
+    terms: terms of each flight, (n, 2 + d).
     """
     weights, speeds = (np.array(column) for column in zip(*((fit.weight, fit.speed) for fit in fits), strict=True))
     deviations = speeds - weights @ speeds
@@ -399,7 +417,10 @@ class _ExpectedPosterior:
         self._covariances = [mode.covariance for mode in fit.modes]
 
     def expected_gains(self, terms: Floats) -> Floats:
-        """Return the expected reduction (n,) of the boundary's variance by each flight (n, 2 + d), m2/s2."""
+        """Return the expected reduction of the boundary's variance within the fit by each flight, (n,), (m/s)^2.
+
+        terms: terms of each flight, (n, 2 + d).
+        """
         expected_gains: Floats = np.zeros(len(terms))
         for k, information in enumerate(self._mode_information(terms)):
             projected, slope = terms @ self._covariances[k], self._fit.slopes[k]
@@ -409,7 +430,10 @@ class _ExpectedPosterior:
         return self._fit.weight * expected_gains
 
     def include_flight(self, row: Floats) -> None:
-        """Include a flight (2 + d,) as flown, with unknown outcome."""
+        """Update the covariances by the information of a flight whose outcome is not known yet.
+
+        row: terms of the flight, (2 + d,).
+        """
         for k, information in enumerate(self._mode_information(row[None])):
             projected = self._covariances[k] @ row
             self._covariances[k] = self._covariances[k] - information * np.outer(projected, projected) / (
@@ -417,7 +441,7 @@ class _ExpectedPosterior:
             )
 
     def _mode_information(self, terms: Floats) -> Iterator[Floats]:
-        """Yield the information (n,) on each mode: a flight is informative unless it fails in an earlier mode."""
+        """Yield for each mode the Fisher information of flights, (n,); a failure in an earlier mode leaves none."""
         reach_probability: Floats = np.ones(len(terms))
         for mode in self._fit.modes:
             predictor = terms @ mode.mean
@@ -426,4 +450,5 @@ class _ExpectedPosterior:
 
 
 def _round_to_grid(speed: float, max_speed: float) -> float:
+    """Return a wind speed rounded to the grid of winds, from 0 to `max_speed`, m/s."""
     return min(max_speed, max(0.0, round(speed / WIND_GRID_MPS) * WIND_GRID_MPS))

@@ -21,7 +21,7 @@ from flight.autopilots.catalog import (
     autopilot_names,
     autopilot_of_log,
     load_autopilot,
-    program_autopilot,
+    program_class_for,
     restore_autopilot,
     stored_name,
 )
@@ -152,7 +152,7 @@ def test_a_name_of_another_version_is_not_restored() -> None:
 
 
 def test_a_program_is_flown_in_the_place_of_its_law() -> None:
-    kind = program_autopilot(Path("arduplane"))
+    kind = program_class_for(Path("arduplane"))
     flown = kind.flying(ArduPlane(MINE), Path("arduplane"))
     assert flown == ArduPlaneSitl(MINE)
     assert flown.model == ArduPlane(MINE)

@@ -202,7 +202,7 @@ def test_elevons_are_half_their_sum_and_difference(tmp_path: Path) -> None:
     aileron = (short_motion().outputs.values[:, 0] - 1500.0) / 400.0
     assert read.controls.values[:, 1] == pytest.approx(aileron)
     assert read.controls.values[:, 0] == pytest.approx(np.zeros(len(aileron)), abs=1e-9)
-    with pytest.raises(LogError, match="flown with elevons, and the base aerosonde has a tail"):
+    with pytest.raises(LogError, match="flown with elevons, but the base aerosonde has a tail"):
         flight_records(read, PRIOR)
 
 
@@ -273,7 +273,7 @@ def test_mixes_that_are_not_modelled_are_named(tmp_path: Path, parameters: dict[
         (("vehicle_attitude",), "no vehicle_attitude, the attitude"),
         (("vehicle_local_position",), "no vehicle_local_position, the velocity"),
         (("vehicle_global_position",), "no vehicle_global_position, the height"),
-        (("airspeed_validated", "wind"), "no airspeed_validated of a sensor in use, the airspeed; no wind, the wind"),
+        (("airspeed_validated", "wind"), "no airspeed_validated from a sensor in use, the airspeed; no wind, the wind"),
     ],
 )
 def test_what_a_log_lacks_is_named(tmp_path: Path, without: tuple[str, ...], said: str) -> None:

@@ -11,7 +11,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup, ImportedLog
-from logs.verdict.conditions import condition_lines, corridor_line, min_leg_spacing, setup_conditions
+from logs.verdict.conditions import condition_lines, corridor_line, judging_conditions, min_leg_spacing
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.verdict import verdict_json
 from tests.logs.made_flight import make_setup, make_track
@@ -23,7 +23,7 @@ from world.scenario_tables import FlightTable
 
 
 def lines_of(setup: FlightSetup) -> list[str]:
-    return condition_lines(setup_conditions(setup))
+    return condition_lines(judging_conditions(setup))
 
 
 def test_an_aircraft_that_nobody_named_is_said_to_be_the_default() -> None:
@@ -68,7 +68,7 @@ def test_the_zones_are_counted_the_missions_own_among_them() -> None:
         judged = replace(setup, mission=replace(setup.mission, fences=fences)).in_scenario(world)
         line = lines_of(judged)[1]
         assert "zone" not in line if not said else line.endswith(said)
-        assert setup_conditions(judged).zones == of_scenario + len(fences)
+        assert judging_conditions(judged).zones == of_scenario + len(fences)
 
 
 def test_a_logs_aircraft_need_not_be_on_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,16 +94,16 @@ def test_the_kind_of_an_airspeed_and_who_states_it() -> None:
         "25.2 m/s equivalent airspeed (its cruise speed)",
         "25.2 m/s equivalent airspeed (by the autopilot's parameters)",
     ]
-    assert setup_conditions(replace(unstated, autopilot=ArduPlane(mine))).autopilot_version == "4.7"
+    assert judging_conditions(replace(unstated, autopilot=ArduPlane(mine))).autopilot_version == "4.7"
     px4 = Px4.load(FlightTable(autopilot="px4", px4_version="1.16"), load_aircraft("aerosonde"), "a")
-    found = setup_conditions(replace(unstated, autopilot=px4))
+    found = judging_conditions(replace(unstated, autopilot=px4))
     assert (found.autopilot_version, found.airspeed_kind) == ("1.16", "equivalent")
 
 
 def test_every_verdict_is_told_what_it_is_for_and_holds_it_as_data() -> None:
     """Of a route, of a plan that is not feasible, and of a flight: in its first lines and in its JSON."""
     setup = make_setup()
-    conditions = setup_conditions(setup)
+    conditions = judging_conditions(setup)
     said = [*condition_lines(conditions), "Autopilot: planfly's guidance on the fly-by path"]
     geometric, planned = judge_geometry(setup), judge_plan_only(bad_plan(setup), conditions)
     assert list(geometric.lines[2:5]) == said  # after the answer, and how it starts

@@ -9,7 +9,7 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
-from logs.verdict.conditions import setup_conditions
+from logs.verdict.conditions import judging_conditions
 from logs.verdict.findings import Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
 from logs.verdict.rules.registry import RULES
@@ -84,7 +84,7 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
 
     def lines_by(parameters: ArduPilotParameters) -> tuple[str, ...]:
         by = replace(setup, autopilot=ArduPlane(parameters))
-        return summary_lines([], by, "flown", levels, setup_conditions(by))
+        return summary_lines([], by, "flown", levels, judging_conditions(by))
 
     lines = lines_by(ArduPilotParameters.defaults())
     assert (
@@ -112,7 +112,7 @@ def test_what_px4_has_no_parameter_for_is_not_used() -> None:
     not_used = []
     for autopilot in (ArduPlane(ArduPilotParameters.defaults()), Px4(Px4Parameters.defaults())):
         by = replace(setup, scenario=asked, autopilot=autopilot)
-        lines = summary_lines([], by, "flown", levels, setup_conditions(by))
+        lines = summary_lines([], by, "flown", levels, judging_conditions(by))
         not_used += [line for line in lines if line.startswith("Not used")]
     assert not_used == ["Not used: rtl_autoland of [returns], for which PX4 has no parameter"]
 

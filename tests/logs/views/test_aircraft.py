@@ -9,7 +9,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.dynamics.characteristics import Mode, StepResponse, TrimRow
 from flight.dynamics.trim import Trim
-from logs.views.aircraft import draw_envelope, draw_steps, draw_trims
+from logs.views.aircraft import draw_envelope, draw_step_responses, draw_trims
 from tests.synthetic import envelope
 
 AIRCRAFT = load_aircraft("aerosonde")
@@ -88,7 +88,7 @@ def test_an_answer_is_in_degrees_with_the_time_of_the_step_shaded(
 ) -> None:
     time = np.linspace(0.0, 10.0, 11)
     change = np.column_stack([0.01 * time, time])
-    figure = draw_steps(AIRCRAFT, [StepResponse(control, size, held, time, ("pitch", "airspeed"), change)])
+    figure = draw_step_responses(AIRCRAFT, [StepResponse(control, size, held, time, ("pitch", "airspeed"), change)])
     pitch, airspeed = figure.axes
     assert (pitch.get_title(loc="left"), airspeed.get_title(loc="left")) == (
         "change of pitch (°)",

@@ -77,7 +77,7 @@ def test_without_terrain_the_height_above_it_is_left_out() -> None:
     flight = replace(FIRST, setup=bare)
     panels = draw_chart(both_along((flight, replace(flight, name="second.mcap")))).axes
     titles = [axes.get_ylabel().split("\n")[0] for axes in panels]
-    assert titles == ["height", "airspeed", "bank, right +", "cross-track,", "throttle"]
+    assert titles == ["altitude", "airspeed", "bank, right +", "cross-track,", "throttle"]
 
 
 def test_a_small_cross_track_fills_its_panel() -> None:

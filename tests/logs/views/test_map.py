@@ -60,7 +60,7 @@ def test_contours_stand_at_round_heights_within_the_hill() -> None:
     radius = 400.0 * np.sqrt(2.0 * np.log(250.0 / level))
     points = contours.get_paths()[len(contours.levels) // 2].vertices
     np.testing.assert_allclose(np.hypot(*points.T), radius, rtol=0.03)
-    assert any("ground height" in other.get_ylabel() for other in figure.axes)
+    assert any("ground elevation" in other.get_ylabel() for other in figure.axes)
 
 
 # ----------------------------------------------------------------------

@@ -72,7 +72,7 @@ def test_the_greatest_height_follows_the_ground_and_a_zone_takes_its_band() -> N
     scenario = make_scenario(zones=[zone], limits=limits)
     figure = drawn_profile(scenario, **ALL, track=None, verdict=None)
     axes = figure.axes[0]
-    most = next(line for line in axes.lines if line.get_label() == "greatest height, 350 m above ground")
+    most = next(line for line in axes.lines if line.get_label() == "maximum height, 350 m above ground")
     (terrain,) = [
         layer
         for layer in profile_chart(scenario, **ALL, track=None, verdict=None).panels[0].layers

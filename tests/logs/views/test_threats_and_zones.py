@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from logs.views.charts import Label, Layer
 from logs.views.threats_and_zones import (
     PathPlane,
-    outline_anchor,
+    outline_label_position,
     sphere_cuts,
     zone_bands,
     zone_label,
@@ -42,7 +42,7 @@ def test_a_name_touches_the_top_the_foot_or_the_left_edge_that_is_in_the_picture
     cut = kilometres, *sphere_cuts(np.array([1300.0, 0.0, 500.0]), 300.0, points)
 
     def anchor(low: float, high: float) -> tuple[float, float, tuple[int, int]] | None:
-        return outline_anchor(*cut, np.full(3001, low), high)
+        return outline_label_position(*cut, np.full(3001, low), high)
 
     assert anchor(0.0, 1000.0) == (pytest.approx(1.3), pytest.approx(800.0), (0, 1))
     assert anchor(0.0, 700.0) == (pytest.approx(1.3), pytest.approx(200.0), (0, -1))
@@ -62,9 +62,9 @@ def test_no_name_stands_under_the_ground() -> None:
     points = np.column_stack([1000.0 * kilometres, np.zeros(3001), np.zeros(3001)])
     cut = kilometres, *sphere_cuts(np.array([1300.0, 0.0, 500.0]), 300.0, points)
     ground = np.where(np.abs(kilometres - 1.3) < 0.2, 250.0, 0.0)
-    (_, amsl, side) = outline_anchor(*cut, ground, 700.0) or (0.0, 0.0, (0, 0))
+    (_, amsl, side) = outline_label_position(*cut, ground, 700.0) or (0.0, 0.0, (0, 0))
     assert (amsl, side) == (pytest.approx(672.0, abs=6.0), (1, 0))
-    assert outline_anchor(*cut, 0.0 * ground, 700.0) == (pytest.approx(1.3), pytest.approx(200.0), (0, -1))
+    assert outline_label_position(*cut, 0.0 * ground, 700.0) == (pytest.approx(1.3), pytest.approx(200.0), (0, -1))
 
 
 # ----------------------------------------------------------------------

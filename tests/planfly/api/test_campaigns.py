@@ -66,7 +66,7 @@ def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoa
     planfly.winds("paper-07", prove=0.9, directions=4, most=15.0, seed=2, out=out, resume=True)
     assert (out / "plan.json").read_bytes() == plan
     assert len(table(out / "winds.sqlite")) == 1
-    with pytest.raises(planfly.PlanflyError, match="directions 8: the flights there were requested with 4"):
+    with pytest.raises(planfly.PlanflyError, match="directions 8: the stored flights were requested with 4"):
         planfly.winds("paper-07", prove=0.9, directions=8, most=15.0, seed=2, out=out, resume=True)
 
 
@@ -102,7 +102,7 @@ def test_numbers_that_are_none_are_refused(bad: dict[str, Any], asked: list[obje
 
 
 def test_a_goal_is_one_of_two(tmp_path: Path) -> None:
-    with pytest.raises(planfly.ArgumentError, match="give one of them"):
+    with pytest.raises(planfly.ArgumentError, match="give only one of them"):
         planfly.campaign("paper-07", prove=0.9, at_least=0.9)
 
 
@@ -138,7 +138,7 @@ def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:
     )
     assert [item.command for item in with_both.mission.fences] == [5004]
     assert len(with_both.scenario.spec.zones) == 1
-    assert with_both.world_hash() != without.world_hash()
+    assert with_both.inputs_hash() != without.inputs_hash()
     assert "fence" not in {rule for rule, _ in fly_one(without, 0).failed}
     assert "fence" in {rule for rule, _ in fly_one(with_both, 0).failed}
 
@@ -167,7 +167,7 @@ def test_a_plan_at_hand_is_flown_as_its_file_is(tmp_path: Path, monkeypatch: pyt
         )
         for name, target in (("a", plan), ("b", tmp_path / "plan.json"))
     ]
-    assert bases[0].world_hash() == bases[1].world_hash()
+    assert bases[0].inputs_hash() == bases[1].inputs_hash()
     assert (tmp_path / "a" / "plan.json").read_bytes() == (tmp_path / "b" / "plan.json").read_bytes()
     assert bases[0].scenario.wind.speed == 4.0
     if not SOAK:

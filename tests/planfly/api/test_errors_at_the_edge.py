@@ -102,7 +102,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "a spread's distribution": (
         lambda: _spread('[mass]\ndistribution = "gauss"\nsource = "a guess"'),
-        _Known("a.toml", "mass.distribution", "gauss", "no distribution of scipy.stats"),
+        _Known("a.toml", "mass.distribution", "gauss", "expected a continuous distribution of scipy.stats"),
     ),
     "an export's suffix": (
         lambda: planfly.export(_file("a.waypoints", _MISSION), "b.doc"),

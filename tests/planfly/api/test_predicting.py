@@ -72,7 +72,7 @@ def test_the_part_that_identified_the_aircraft_is_not_judged(tmp_path: Path) -> 
     with pytest.raises(PlanflyError, match=r"399.*at least 400"):
         predicting._judged_start(motion, used, [], 399.0)
     whole = _with_posterior(aircraft, tmp_path, entry)
-    with pytest.raises(LogError, match=r"identified from all of it.*--until"):
+    with pytest.raises(LogError, match=r"identified from the whole log.*--until"):
         predicting._judged_start(motion, whole, [], 450.0)
     other = _with_posterior(aircraft, tmp_path, '[[log]]\nfile = "y"\nsha256 = "0"\n')
     assert predicting._judged_start(motion, other, [], 300.0) == 300.0
@@ -84,7 +84,7 @@ def test_the_part_that_identified_the_aircraft_is_not_judged(tmp_path: Path) -> 
         ({}, "aircraft: name the aircraft"),
         ({"aircraft": "ultrastick25e", "start": 230.0}, "start = 230|before 230"),
         ({"aircraft": "ultrastick25e", "start": 1e6}, "from 1000000"),
-        ({"aircraft": "ultrastick25e", "by": "mission", "start": 300.0}, "only for a prediction by the controls"),
+        ({"aircraft": "ultrastick25e", "by": "mission", "start": 300.0}, "only for a prediction by controls"),
     ],
 )
 def test_refusals(tmp_path: Path, options: dict[str, object], message: str) -> None:

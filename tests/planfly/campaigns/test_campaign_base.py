@@ -46,10 +46,10 @@ def test_it_has_the_mission_as_fly_opens_it(base: CampaignBase, tmp_path: Path) 
 
 def test_the_hash_is_of_all_that_decides_a_flight(base: CampaignBase) -> None:
     other = parse_dispersions('[mass]\ndistribution = "norm"\nloc = 1.0\nscale = 0.02\nsource = "x"', "x")
-    assert base.world_hash() == replace(base, name="another").world_hash()
+    assert base.inputs_hash() == replace(base, name="another").inputs_hash()
     fenced = replace(base.mission, fences=base.mission.items[:1])
     for changed in (replace(base, seed=2), replace(base, dispersions=other), replace(base, mission=fenced)):
-        assert changed.world_hash() != base.world_hash()
+        assert changed.inputs_hash() != base.inputs_hash()
 
 
 @pytest.mark.parametrize(("mass", "good"), [(1.0, True), (1.9, False)])
@@ -60,7 +60,9 @@ def test_an_aircraft_that_cannot_fly_is_refused(base: CampaignBase, mass: float,
     if good:
         check_level_flight_at_medians(made)
         return
-    with pytest.raises(SpreadError, match=r"mine.toml: mass 1.9, drag 2.85: .* cannot hold level flight at 25 m/s"):
+    with pytest.raises(
+        SpreadError, match=r"mine.toml: with the medians mass 1.9, drag 2.85, .* cannot fly level at 25 m/s"
+    ):
         check_level_flight_at_medians(made)
 
 
@@ -182,7 +184,7 @@ def test_a_file_of_dispersions_names_draws(sheet: Path) -> None:
     assert made.dispersions.draws is not None
     assert made.dispersions.varying == ()
     other = replace(made.dispersions.draws, values=made.dispersions.draws.values + 0.01)
-    assert replace(made, dispersions=replace(made.dispersions, draws=other)).world_hash() != made.world_hash()
+    assert replace(made, dispersions=replace(made.dispersions, draws=other)).inputs_hash() != made.inputs_hash()
 
 
 @pytest.mark.parametrize(("quantity", "drawn"), [("wind_speed", True), ("drag", False)])
@@ -210,7 +212,7 @@ def test_a_file_without_draws_flies_the_folders_or_leaves_slopes_open(sheet: Pat
             '[aircraft]\ndraws = "foam/draws.csv"\n[drag]\ndistribution = "norm"\nloc = 1\nscale = 0.1\nsource = "x"',
             "drag: cannot be combined with [aircraft] draws",
         ),
-        ('[aircraft]\ndraws = "other.csv"', "other.csv: draws of another aircraft: "),
+        ('[aircraft]\ndraws = "other.csv"', "other.csv: these draws belong to another aircraft: "),
     ],
 )
 def test_bad_draws_are_refused(sheet: Path, text: str, told: str) -> None:

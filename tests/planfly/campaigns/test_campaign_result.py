@@ -108,7 +108,7 @@ def test_what_it_tells(base: CampaignBase, tmp_path: Path) -> None:
     assert list(flights["outcome"]).count("lost") == 1
     assert "clearance" not in flights
     assert result.shapes()["clearance"].shape == (60, STATION_COUNT)
-    with pytest.raises(ValueError, match="kept no folder; give it one by out"):
+    with pytest.raises(ValueError, match="has no folder; name one with `out`"):
         CampaignResult(summary, result.columns).shapes()
 
 

@@ -31,7 +31,7 @@ def test_aircraft_differ_and_a_missing_one_is_no_error_here() -> None:
 def test_it_is_unpacked_once_with_the_model_of_this_machine(base: CampaignBase) -> None:
     copy = CampaignCopy(base, fingerprint("aerosonde"), made_flight)
     ready, fly = copy.unpack("w")
-    assert ready.world_hash() == base.world_hash()
+    assert ready.inputs_hash() == base.inputs_hash()
     assert fly(ready, 3, None) == made_flight(base, 3)
     assert copy.unpack("w")[0] is ready
     assert copy.fly(FlightRequest(3), "w").worker == "w"

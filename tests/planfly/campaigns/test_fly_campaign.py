@@ -123,7 +123,7 @@ def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBa
 
 
 def test_a_campaign_that_is_gone_on_with_keeps_its_goal(base: CampaignBase, tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="no campaign there to continue"):
+    with pytest.raises(StoreError, match="there is no campaign to continue"):
         resumed_goal(None, tmp_path)
     asked = Goal(0.9, False, 40, 0.8)
     with open_store(base, asked, tmp_path, resume=False):
@@ -154,7 +154,7 @@ def test_fewer_flights_than_were_flown_are_refused_and_none_is_lost(base: Campai
         for k in range(5):
             store.add(made_flight(base, k, None))
     before = table(tmp_path / CAMPAIGN_DATABASE)
-    with pytest.raises(StoreError, match="flights 4: 5 have been flown there"):
+    with pytest.raises(StoreError, match="flights 4: the table already contains 5 flights"):
         open_store(base, Goal(None, False, 4), tmp_path, resume=True)
     assert table(tmp_path / CAMPAIGN_DATABASE) == before
     # Nor are the refused question's settings kept.

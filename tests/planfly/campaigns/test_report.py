@@ -95,7 +95,7 @@ def test_a_mission_that_cannot_be_opened_leaves_what_lies_there(tmp_path: Path) 
 
 
 def test_only_a_campaign_is_gone_on_with_and_by_its_own_plan(base: CampaignBase, tmp_path: Path) -> None:
-    with pytest.raises(PlanflyError, match=r"campaign.sqlite: no campaign there to continue"):
+    with pytest.raises(PlanflyError, match=r"campaign.sqlite: there is no campaign to continue"):
         asked(tmp_path, resume=True).open_base_and_clear(lambda _: base)
     (tmp_path / CAMPAIGN_DATABASE).write_bytes(b"")
     planned: list[Path | None] = []
@@ -126,7 +126,7 @@ def test_flights_are_counted_by_wind() -> None:
     first = chart_directions(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
     assert wind_lines(FOUND)[0] == (
-        "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
+        "flies with P >= 0.9, by the best estimate, in wind up to 7.0 m/s from 0° (the lowest; 6.5 to 7.5 m/s at 95 %),"
         " over 20 m/s from 270°"
     )
 
@@ -140,7 +140,7 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     boundaries = (*(WindBoundary(0.0, 0.0, 0.3, False) for _ in range(3)), WindBoundary(2.0, 1.8, 2.2, False))
     found = replace(FOUND, boundaries=boundaries, calm=CalmFailures(0.0, 4, 3, by_rule))
     assert wind_lines(found)[:4] == [
-        "does not fly with P >= 0.9, by best estimate, in wind from 0° even in calm air;"
+        "does not fly with P >= 0.9, by the best estimate, in any wind from 0°, even a light one;"
         " it flies in wind up to 2.0 m/s from 270°",
         "in calm air, 3 of 4 flights fail",
         "  failed  slopes in 1: leg 2 in 1",
@@ -148,7 +148,7 @@ def test_rules_that_fail_in_calm_air_are_named_with_their_places() -> None:
     ]
     nowhere = replace(found, boundaries=boundaries[:1] * 4, calm=CalmFailures(0.3, 4, 3, by_rule[1:]))
     assert wind_lines(nowhere)[:2] == [
-        "does not fly with P >= 0.9, by best estimate, even in calm air",
+        "does not fly with P >= 0.9, by the best estimate, even in calm air",
         "in 0.3 m/s, the weakest wind flown, 3 of 4 flights fail",
     ]
 
@@ -171,14 +171,16 @@ def test_the_page_is_red_only_where_flights_show_that_calm_air_is_missed() -> No
 def test_what_flights_show_by_themselves_where_none_failed() -> None:
     """Of 132 in the largest wind 0.05 ** (1 / 132) at 95 %; fewer of one direction show less."""
     flights = (*((3, 20.0, True) for _ in range(132)), (3, 10.0, True), (0, 20.0, False))
-    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("none failed"))
-    assert line == "none failed from 1 of 4 directions: 132 flights in 20 m/s from each show P >= 0.978 by themselves"
+    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("no flight failed"))
+    assert line == (
+        "no flight failed in 1 of 4 directions: 132 flights in 20 m/s from each of them show P >= 0.978 by themselves"
+    )
     flights += tuple((2, 20.0, True) for _ in range(58))
-    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("none failed"))
-    assert "from 2 of 4 directions: 58 flights" in line
+    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("no flight failed"))
+    assert "in 2 of 4 directions: 58 flights" in line
     assert "P >= 0.95 by" in line
     failed = replace(FOUND, flights=((3, 20.0, False), (0, 10.0, True)))
-    assert not any(one.startswith("none failed") for one in wind_lines(failed))
+    assert not any(one.startswith("no flight failed") for one in wind_lines(failed))
 
 
 def test_directions_for_which_flights_did_not_last_are_said() -> None:

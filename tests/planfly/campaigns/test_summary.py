@@ -65,5 +65,5 @@ def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Pat
     with made_report(base, tmp_path, flights=8) as (store, summary):
         assert summary.deciding == "clearance"
         assert summary.sensitivities == ()
-        assert "do not show what it depends on" in campaign_lines(summary)[-1]
+        assert "would show what the margin depends on" in campaign_lines(summary)[-1]
         assert "What the deciding margin depends on" not in campaign_page(base, summary, store, "").decode()

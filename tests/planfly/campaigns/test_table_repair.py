@@ -214,8 +214,7 @@ def test_what_is_damaged_is_named_and_flown_again(base: CampaignBase, tmp_path: 
     with send_progress_to(Receiver(lambda *_: pytest.fail("no stage"), told.append)):
         store = open_store(base, goal, tmp_path / "one", resume=True)
     assert told == [
-        f"{path}: flights 3, 7, 8 are damaged and were taken out: 9 flights are intact and stay;"
-        " --resume flies the missing ones"
+        f"{path}: flights 3, 7, 8 are damaged and were removed; intact flights: 9; --resume flies the missing ones"
     ]
     with store:
         assert store.tally().flown == 9
@@ -237,14 +236,12 @@ def test_a_checksum_is_of_values_as_sqlite_gives_them_back() -> None:
 
 
 def test_many_damaged_flights_are_counted() -> None:
-    assert Examination([3], [], is_sound=False).text().startswith("is damaged: 1 flights are intact")
+    assert Examination([3], [], is_sound=False).text().startswith("is damaged; intact flights: 1;")
     assert (
         Examination([0, 2], [1], is_sound=False, last_known=2)
         .text()
-        .startswith(
-            "flight 1 is damaged and was taken out, and any after flight 2 were lost: 2 flights are intact and stay;"
-        )
+        .startswith("flight 1 is damaged and was removed, and any flights after flight 2 are lost; intact flights: 2;")
     )
     found = Examination([], [], is_sound=False, last_known=-1).text()
-    assert found.startswith("is damaged, and no flight is found: 0 flights are intact and stay;")
+    assert found.startswith("is damaged, and no flight was found; intact flights: 0;")
     assert Examination([], list(range(20))).text().startswith("flights 0, 1, 2, 3, 4, 5, 6, 7 and 12 more are damaged")

@@ -114,7 +114,7 @@ def test_nothing_is_written_into_a_table_that_was_removed(
         yield all_fly(base, 1)
         raise AssertionError("a second flight was taken")
 
-    with pytest.raises(OSError, match=r"was removed, or another file took its place.*c\.sqlite"):
+    with pytest.raises(OSError, match=r"was removed or replaced by another file.*c\.sqlite"):
         adding(path, rows(), resume=False)
 
 

@@ -34,7 +34,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch, unrendered: None) -> None:
     """Pictures with nothing in them: drawing is most of what a description takes."""
-    for name in ("draw_envelope", "draw_trims", "draw_steps"):
+    for name in ("draw_envelope", "draw_trims", "draw_step_responses"):
         monkeypatch.setattr(drawn, name, lambda *_: None)
 
 
@@ -291,7 +291,7 @@ def test_a_data_sheet_makes_a_folder_that_is_described(
         ((*SIX, "--battery", "12"), "--battery 12: expected volts and capacity, such as 14.8V,5Ah"),
         # 300 Wh a kilogram of 2.1 kg.
         ((*SIX, "--battery", "14.8V,631Wh"), "--battery 631 Wh: allowed up to 630 Wh with a mass of 2.1 kg, 300 Wh/kg"),
-        ((*SIX, "--prop", "12"), "--prop 12: expected inches of diameter and pitch, such as 12x6"),
+        ((*SIX, "--prop", "12"), "--prop 12: expected diameter and pitch in inches, such as 12x6"),
         ((*SIX, "--from", "c172x"), "--from c172x: cannot be combined with mass"),
         # Given as nothing is given all the same.
         (("--from", "c172x", "--mass", "0"), "--from c172x: cannot be combined with mass"),

@@ -56,9 +56,15 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
         ([], "--resume continues it"),
         (["--resume", "--seed", "2"], "another campaign"),
         (["--resume", "--spread", "none.toml"], "cannot be read"),
-        (["--overwrite", "--spread", "heavy.toml"], "at the middle of these aerosonde cannot hold level flight"),
-        (["--overwrite", "--spread", "unknown.toml"], "mass.distribution: 'bell': no distribution of scipy.stats"),
-        (["--resume", "--scheduler", "tcp://10.0.0.1:8786", "--flights", "5"], "plain TCP beyond loopback"),
+        (["--overwrite", "--spread", "heavy.toml"], "aerosonde cannot fly level at 25 m/s"),
+        (
+            ["--overwrite", "--spread", "unknown.toml"],
+            "mass.distribution: 'bell': expected a continuous distribution of scipy.stats",
+        ),
+        (
+            ["--resume", "--scheduler", "tcp://10.0.0.1:8786", "--flights", "5"],
+            "tcp:// is allowed only on this machine",
+        ),
     ],
 )
 def test_one_line_and_nothing_lost(
@@ -83,7 +89,7 @@ def test_one_line_and_nothing_lost(
 def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     line, _ = flown
     assert main([*line[:-1], str(tmp_path / "none"), "--resume"]) == 2
-    assert "no campaign there" in capsys.readouterr().err
+    assert "there is no campaign" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
 
 
@@ -110,7 +116,7 @@ def test_a_folder_that_is_removed_ends_it_at_the_next_flight(
     remover.join()
     told = capsys.readouterr().err
     last = told.splitlines()[-1]
-    assert last.startswith(f"planfly: {table}: was removed, or another file took its place")
+    assert last.startswith(f"planfly: {table}: was removed or replaced by another file")
     assert "Traceback" not in told
     assert not out.exists()
 

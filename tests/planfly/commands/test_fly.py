@@ -79,11 +79,11 @@ def test_a_log_that_is_replaced_and_a_verdict_for_continuous_integration(
     monkeypatch.chdir(tmp_path)
     argv = ["fly", str(flight / "plan.json"), "--junit", "r.xml"]
     code = main(argv)
-    assert "is there: replaced" not in capsys.readouterr().err
+    assert "exists and is replaced" not in capsys.readouterr().err
     suite = ElementTree.parse("r.xml").getroot()[0]
     assert (int(suite.get("failures", "-1")) > 0) == (code == 4)
     # A file that was named is not replaced, a log that nobody named is, and is said to be.
     assert main(argv) == 2
     assert capsys.readouterr().err == "planfly: r.xml: exists; --overwrite replaces it\n"
     assert main([*argv, "--overwrite"]) == code
-    assert "flight.mcap is there: replaced\n" in capsys.readouterr().err
+    assert "flight.mcap exists and is replaced\n" in capsys.readouterr().err

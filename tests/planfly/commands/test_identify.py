@@ -113,13 +113,16 @@ def test_a_log_becomes_a_folder_that_flies(
             ["--identify", "a.BIN", *ARGUMENTS, "--motor-braking", "--out", "./mine"],
             "cannot be combined with --motor-braking",
         ),
-        (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "near enough to aerosonde"),
+        (["--identify", "a.BIN", "--mass", "2", "--span", "2.9", "--out", "./mine"], "for the base aerosonde"),
         (["--identify", "a.BIN", "--mass", "99", "--span", "2.9", "--out", "./mine"], "allowed 0.3..50 kg"),
         (["--identify", "a.BIN", *ARGUMENTS, "--battery", "12", "--out", "./mine"], "volts and capacity"),
-        (["--identify", "a.BIN", *ARGUMENTS, "--base", "c172x", "--out", "./mine"], "--base c172x: burns fuel"),
+        (
+            ["--identify", "a.BIN", *ARGUMENTS, "--base", "c172x", "--out", "./mine"],
+            "--base c172x: expected an electric aircraft",
+        ),
         (
             ["--identify", "a.BIN", *ARGUMENTS, "--out", "./mine"],
-            "0 s of it are flight on the wing that can be used: at least 180 s are needed to identify an aircraft, and"
+            "0 s are usable flight on the wing: at least 180 s are needed to identify an aircraft, and"
             " 30 s to check one",
         ),
         (["aerosonde", "--check", "a.BIN"], "only with --identify"),
@@ -152,7 +155,7 @@ def test_an_identified_aircraft_is_no_base(capsys: pytest.CaptureFixture[str]) -
     Path("known/posterior.toml").write_text('base = "aerosonde"\n', encoding="utf-8")
     write_motion(Path("a.BIN"), short_motion())
     said = refused(["--identify", "a.BIN", *ARGUMENTS, "--base", "./known", "--out", "./mine"], capsys)
-    assert "--base ./known: identified from flight logs itself: name its base" in said
+    assert "--base ./known: this aircraft was itself identified from flight logs: name its base" in said
 
 
 def test_only_the_rows_before_until_are_used(
@@ -174,7 +177,7 @@ def test_only_the_rows_before_until_are_used(
     # Rows are 0.02 s apart.
     assert end - 0.05 < last < end
     message = refused(["--identify", "a.BIN", *ARGUMENTS, "--until", "100", "--out", "./mine"], capsys)
-    assert "s of it before 100 s are flight on the wing that can be used: at least 180 s" in message
+    assert "s before 100 s are usable flight on the wing: at least 180 s" in message
 
 
 @pytest.mark.parametrize("again", [["--identify", "a.BIN", "b.BIN"], ["--identify", "a.BIN", "--check", "b.BIN"]])
@@ -182,7 +185,7 @@ def test_the_same_log_twice_is_refused(again: list[str], capsys: pytest.CaptureF
     write_motion(Path("a.BIN"), short_motion())
     shutil.copy("a.BIN", "b.BIN")
     said = refused([*again, *ARGUMENTS, "--out", "./mine"], capsys)
-    assert "b.BIN: the same bytes as a.BIN: name each log once" in said
+    assert "b.BIN: the same bytes as a.BIN: name each log only once" in said
 
 
 def test_logs_without_current_among_others_are_named() -> None:

@@ -130,7 +130,10 @@ def test_a_plan_other_than_the_logs_own_mission_is_told(tmp_path: Path, capsys: 
     log, plan = dataflash(tmp_path / "a.BIN"), example_plan(tmp_path)
     plan.write_text(plan.read_text().replace("\t500.000\t", "\t510.000\t", 1))
     assert main(["check", str(log), "--plan", str(plan)]) == 0
-    assert "1 items of the log's own mission lie elsewhere than the plan's, item 1 first" in capsys.readouterr().out
+    assert (
+        "1 items of the mission in the log have other positions than in the plan; the first is item 1"
+        in capsys.readouterr().out
+    )
 
 
 def test_a_log_with_a_loss_is_read_and_ends_with_3(tmp_path: Path, capsys: Output) -> None:
@@ -250,7 +253,7 @@ def test_what_fails_on_the_items_that_the_log_holds_is_not_flown_as_planned(tmp_
 def test_options_that_do_not_go_together_are_refused(tmp_path: Path, capsys: Output) -> None:
     log = dataflash(tmp_path / "a.BIN")
     assert main(["check", str(log), "--guidance", "l1"]) == 2
-    assert "--guidance: an imported flight is judged by the autopilot" in capsys.readouterr().err
+    assert "--guidance: an imported flight is judged with the autopilot" in capsys.readouterr().err
     assert main(["check", str(example_plan(tmp_path)), "--flight", "1"]) == 2
     assert "--flight: only with an imported log" in capsys.readouterr().err
     assert main(["import", str(log), str(log)]) == 2
@@ -309,7 +312,7 @@ def test_each_stretch_has_its_tables_and_files_and_what_is_left_is_named(tmp_pat
     out = capsys.readouterr().out
     assert "AUTO from 20.0 s to 40.0 s, legs 0 to 0: flown / simulated" in out
     assert "AUTO from 68.0 s to 111.8 s, legs 1 to 1: flown / simulated" in out
-    assert "Not flown again: AUTO from 60.0 s to 60.5 s: it passed no two waypoints in order" in out
+    assert "Not flown again: AUTO from 60.0 s to 60.5 s: it did not pass two waypoints in order" in out
     files = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"simulated.mcap", "simulated-2.mcap", "refly-height.png", "refly-height-2.png"} <= files
     assert main(["refly", str(flight), "--out", str(tmp_path / "out"), "--overwrite"]) == 0

@@ -54,7 +54,7 @@ def test_a_weaker_receiver_keeps_less_margin() -> None:
     ("options", "message"),
     [
         ({"frequency": 900.0, "power": 20.0}, r"sensitivity missing: expected a number, or a scenario with \[link\]"),
-        ({**RADIO, "frequency": 5.0}, "frequency 5.0: expected MHz from 30 to 100,000"),
+        ({**RADIO, "frequency": 5.0}, "frequency 5.0: expected a frequency from 30 to 100,000 MHz"),
         ({**RADIO, "station": (99.0, 0.0)}, "link"),
     ],
 )

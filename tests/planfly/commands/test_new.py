@@ -121,7 +121,10 @@ def test_where_there_is_no_way_it_says_why_and_leaves_the_file(here: Path, capsy
         (["--from", "46", "--to", "46,8"], "argument --from: '46': expected LAT,LON"),
         (["--from", "46,8", "--to", "46,8"], "--to 46,8, 0 km away: expected 100 m to 300 km from --from"),
         (["--from", "46,8"], "the following arguments are required: --to"),
-        (["--from", "46,8", "--to", "46,8.1", "--height", "0"], "argument --height: '0': expected m above ground"),
+        (
+            ["--from", "46,8", "--to", "46,8.1", "--height", "0"],
+            "argument --height: '0': expected a height above ground",
+        ),
         (["--from", "46,8", "--to", "46,8.1", "--aircraft", "x9"], "x9"),
         (
             ["--from", "36.3,-84.2", "--to", "36.9,-84.2", "--terrain", "jacksboro"],

@@ -14,7 +14,7 @@ def test_each_command_is_a_parser_and_a_function_of_one_module() -> None:
     modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - {"__init__", "registry"}
     assert modules == {command.module or command.name for command in COMMANDS}
     for command in COMMANDS:
-        function, options = find_command(command.name), command.load("_options")
+        function, options = find_command(command.name), command.load_parser_function()
         assert function.__module__ == options.__module__
         assert (function.__doc__ or "").strip()
 
@@ -31,7 +31,7 @@ def test_what_is_no_command_is_none() -> None:
 def test_a_command_answers_in_json_where_the_list_names_its_answer() -> None:
     line = build_parser()
     for command in COMMANDS:
-        assert ("--json" in line.commands[command.name].options()) == bool(command.answer)
+        assert ("--json" in line.commands[command.name].long_options()) == bool(command.answer)
 
 
 def test_help_lists_each_command_below_its_section() -> None:

@@ -138,7 +138,7 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
     assert main([*asked, "px4", "--json", "px4.json"]) == 3
     out = capsys.readouterr().out
     assert "not judged in full (the autopilot's own return is not simulated; ArduPlane's return stands in): all " in out
-    assert "PX4's own return is not simulated: ArduPlane's return stands in" in out
+    assert "the return of PX4 is not simulated; ArduPlane's return is used instead" in out
     for words in ("FS_", "RTL_AUTOLAND", "it returns:", "it does not:"):
         assert words not in out
     answer = json.loads((hill / "px4.json").read_text(encoding="utf-8"))
@@ -179,6 +179,6 @@ def test_seconds_out_of_range_are_refused(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit) as ended:
         main(["returns", "hill.waypoints", "--every", "0"])
     assert ended.value.code == 2
-    assert "expected seconds from 0.1 to 3,600" in capsys.readouterr().err
+    assert "expected a time from 0.1 to 3,600 s" in capsys.readouterr().err
     with pytest.raises(planfly.ArgumentError, match="every 4000"):
         planfly.returns("hill.waypoints", every=4000)

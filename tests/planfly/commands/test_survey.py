@@ -120,6 +120,6 @@ def test_what_is_no_survey_is_one_line(tmp_path: Path, capsys: pytest.CaptureFix
     short.write_text("\n".join(rows[:7]) + "\n", encoding="ascii")
     assert main(["survey", str(short), "--out", str(tmp_path / "out")]) == 2
     said = capsys.readouterr().err
-    assert "no survey; expected at least three lines side by side, or two with photos along them" in said
+    assert "no survey found; expected at least three parallel lines, or two with photos along them" in said
     assert said.count("\n") == 1
     assert not (tmp_path / "out").exists()

@@ -382,7 +382,7 @@ def test_around_a_mission_is_home_and_all_its_places(here: Path) -> None:
         (["--box", "46,8,47"], "argument --box: '46,8,47': expected S,W,N,E"),
         (["--box", "47,8,46,9"], "--box (47.0, 8.0, 46.0, 9.0): expected south, west, north, east"),
         (["--box", "46,8,nan,9"], "expected south, west, north, east"),
-        (["--box", "46,8,47,9", "--margin", "-1"], "argument --margin: '-1': expected km from 0 to 100"),
+        (["--box", "46,8,47,9", "--margin", "-1"], "argument --margin: '-1': expected a distance from 0 to 100 km"),
         (["--box", "46,8,47,9", "--out", "dem.png"], "dem.png: expected a name that ends with .tif"),
         (
             ["--box", "46,8,47,9", "--source", "ftp://x/y"],

@@ -93,9 +93,9 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
     ("more", "words"),
     [
         (["--resume", "--seed", "2"], "another campaign"),
-        (["--resume", "--prove", "0.9"], "target 0.9: the flights there were requested with 0.99"),
-        (["--resume", "--most", "30"], "most 30.0: the flights there"),
-        (["--resume", "--out", "campaign"], "no campaign there to continue"),
+        (["--resume", "--prove", "0.9"], "target 0.9: the stored flights were requested with 0.99"),
+        (["--resume", "--most", "30"], "most 30.0: the stored flights"),
+        (["--resume", "--out", "campaign"], "there is no campaign to continue"),
         (["--out", "campaign"], "contains another campaign; --overwrite replaces it"),
         ([], "--resume continues it"),
         (["--resume"], "held by another process"),

@@ -25,7 +25,7 @@ def _identified(cruise: float) -> Any:
 @pytest.mark.parametrize("cruise", [5.0, 60.0])
 def test_an_aircraft_without_level_flight_is_refused(cruise: float) -> None:
     """At 5 m/s the wing carries no 1.96 kg (a lift coefficient of 4.2), and at 60 m/s no motor holds its drag."""
-    with pytest.raises(LogError, match=rf"a\.BIN: .*holds no level flight at {cruise}") as refused:
+    with pytest.raises(LogError, match=rf"a\.BIN: .*cannot fly level at {cruise}") as refused:
         _check_level_flight(_identified(cruise), load_aircraft("ultrastick25e"))
     assert "\n" not in str(refused.value)
 

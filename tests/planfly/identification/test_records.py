@@ -36,15 +36,15 @@ def changed(parameters: Mapping[str, float] = {}, **fields: Any) -> MotionLog:
         (lambda: changed(airspeed=NONE, wind=NONE), "U = 1), the airspeed; no XKF2, the wind"),
         (
             lambda: changed(airspeed=Samples(flown_truth().log.airspeed.time, 0.0 * flown_truth().log.airspeed.values)),
-            "the airspeed stays at 0 m/s: expected that of a sensor",
+            "the airspeed stays at 0 m/s: expected a sensor's airspeed",
         ),
         (lambda: changed(vehicle="copter", program="ArduCopter V4.5.7"), "flown by a copter (ArduCopter V4.5.7)"),
         (lambda: changed(vehicle="rover", program="ArduRover V4.5.7"), "flown by a rover"),
         (lambda: changed({"SERVO1_FUNCTION": 24.0}), "output 1 (SERVO1_FUNCTION 24, flaperon) moves"),
         (lambda: changed({"SERVO2_FUNCTION": 79.0}), "V-tail"),
-        (lambda: changed({"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0}), "and the base aerosonde has a tail"),
-        (lambda: changed({"SERVO2_FUNCTION": 0.0}), "no SERVOn_FUNCTION is the elevator's"),
-        (lambda: changed(modes=((0.0, 10), (120.0, 19))), "flight on its lifting motors is cut"),
+        (lambda: changed({"SERVO1_FUNCTION": 77.0, "SERVO2_FUNCTION": 78.0}), "but the base aerosonde has a tail"),
+        (lambda: changed({"SERVO2_FUNCTION": 0.0}), "no output has the SERVOn_FUNCTION of the elevator"),
+        (lambda: changed(modes=((0.0, 10), (120.0, 19))), "flight on lifting motors is not used"),
     ],
 )
 def test_refusals_are_one_line_each(log: Any, said: str) -> None:

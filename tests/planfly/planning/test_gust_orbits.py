@@ -108,7 +108,7 @@ def test_a_plan_that_is_made_anew_for_updrafts_has_few_waypoints_too() -> None:
     assert find_shortfalls(first, airframe)
     plan = make_plan(scenario, airframe, SEED)
     assert expected_orbits(plan, airframe.autopilot, limits) <= MAX_EXPECTED_ORBITS
-    assert plan.safe or "updrafts may take it" in plan.certificate.problems[0]
+    assert plan.safe or "updrafts may take the aircraft" in plan.certificate.problems[0]
 
 
 def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -> None:
@@ -120,7 +120,7 @@ def test_a_plan_that_needs_more_says_what_would_help(airframe_of_x8: Airframe) -
     plan = limit_waypoint_orbits(found, airframe)
     assert not plan.feasible
     (problem,) = plan.certificate.problems
-    assert "in moderate turbulence PX4 circles where gusts push it off a waypoint's height" in problem
+    assert "in moderate turbulence PX4 circles at a waypoint if gusts push it off the waypoint's altitude" in problem
     value = float(problem.split("NAV_FW_ALT_RAD of ")[1].split(" m ")[0])
     enough, less = (tight.with_parameters(NAV_FW_ALT_RAD=asked) for asked in (value, value - 5.0))
     assert expected_orbits(plan, enough, airframe.limits) <= MAX_EXPECTED_ORBITS

@@ -240,7 +240,7 @@ def test_only_this_machine_is_served_and_a_port_in_use_is_said(
     assert f"127.0.0.1:{port}" in printed
     assert len(printed.splitlines()) == 1
     assert main(["replay", str(log_path), "--foxglove", "--port", "0", "--wait", "0.1"]) == 2
-    assert "nobody has subscribed within 0.1 s" in capsys.readouterr().err
+    assert "no viewer has subscribed within 0.1 s" in capsys.readouterr().err
 
 
 def test_without_the_package_it_is_one_line(

@@ -11,4 +11,4 @@ def test_what_is_replaced_is_said(tmp_path: Path, caplog: pytest.LogCaptureFixtu
     there = tmp_path / "flight.mcap"
     there.write_text("a law's", encoding="utf-8")
     report_replaced(there, tmp_path / "flight.BIN")
-    assert [one.getMessage() for one in caplog.records] == [f"{there} is there: replaced"]
+    assert [one.getMessage() for one in caplog.records] == [f"{there} exists and is replaced"]

@@ -62,7 +62,7 @@ def test_a_file_of_each_suffix_is_opened(suffix: str, tmp_path: Path) -> None:
     assert find_file_in_folder(tmp_path, f"a{suffix}") == tmp_path.resolve() / f"a{suffix}"
     assert f"a{suffix}" in folder_message(tmp_path)["files"]
     if not items:
-        with pytest.raises(PlanflyError, match=f"^A{suffix.upper()}: a flight's track without a mission"):
+        with pytest.raises(PlanflyError, match=f"^A{suffix.upper()}: contains a track but no mission"):
             open_dropped(f"A{suffix.upper()}", data, MissionOptions())
         return
     world = MissionOptions(scenario="jacksboro") if write is written_mission else MissionOptions()

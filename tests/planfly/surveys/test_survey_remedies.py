@@ -19,7 +19,7 @@ from logs.verdict.verdict import Verdict
 from planfly.surveys import survey_remedies as remedies
 from planfly.surveys.survey_remedies import TriedRemedies
 from planfly.surveys.survey_text import remedy_text
-from planfly.workflow.airframe import airframe_of
+from planfly.workflow.airframe import airframe_for_setup
 from planfly.workflow.open_flight import open_flight
 
 FIELD = Path(__file__).parents[1] / "commands" / "field.waypoints"
@@ -60,7 +60,7 @@ def opened(path: Path) -> FlightSetup:
 def tried(monkeypatch: pytest.MonkeyPatch, answer: Answer, path: Path = FIELD) -> tuple[TriedRemedies, list[float]]:
     flights, mission = Flights(answer), opened(path)
     monkeypatch.setattr(remedies, "Trial", flights)
-    found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
+    found = remedies.survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
     return found, flights.flown
 
 
@@ -92,7 +92,7 @@ def test_every_second_line_is_come_to_as_all_are(monkeypatch: pytest.MonkeyPatch
         return found
 
     monkeypatch.setattr(remedies, "Trial", fly)
-    found = remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, answer))
+    found = remedies.survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, answer))
     longer, second = found.remedies
     assert (longer.kind, longer.value, longer.lead_in) == ("turn-around", 150.0, 0.0)
     assert (second.kind, second.value, second.turn_around, second.lead_in) == ("every", 2.0, 50.0, 150.0)
@@ -135,7 +135,7 @@ def judged_by(
 
     mission = opened(path)
     monkeypatch.setattr(remedies, "Trial", fly)
-    return remedies.survey_remedies(mission, airframe_of(mission), verdict_of(mission, lambda _: (False, {})))
+    return remedies.survey_remedies(mission, airframe_for_setup(mission), verdict_of(mission, lambda _: (False, {})))
 
 
 def test_where_nothing_alone_helps_two_changes_are_made(monkeypatch: pytest.MonkeyPatch) -> None:

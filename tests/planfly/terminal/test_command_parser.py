@@ -110,17 +110,17 @@ def test_what_was_meant_is_named(line: str, said: str, capsys: Output) -> None:
 
 def test_a_parser_knows_its_long_options() -> None:
     parser = CommandParser(prog="x")
-    parser.group("a").add_argument("--one-two", metavar="N")
+    parser.add_group("a").add_argument("--one-two", metavar="N")
     parser.add_argument("-q", "--quiet", action="store_true")
-    assert set(parser.options()) <= {"--one-two", "--quiet"}
-    assert "--one-two" in parser.options()
+    assert set(parser.long_options()) <= {"--one-two", "--quiet"}
+    assert "--one-two" in parser.long_options()
 
 
 def test_commands_are_found_by_name_and_help_shows_groups() -> None:
     line = LineParser("1.0", "What it is.", "first steps: planfly go")
-    go = line.command("go", "go there", "planfly go now", "planfly go later")
+    go = line.add_command("go", "go there", "planfly go now", "planfly go later")
     go.extra_help = lambda: "ways:\n  on foot"
-    go.group("how fast").add_argument("--speed", help="in m/s")
+    go.add_group("how fast").add_argument("--speed", help="in m/s")
     assert line.commands == {"go": go}
     text = go.format_help()
     assert "how fast:\n  --speed" in text

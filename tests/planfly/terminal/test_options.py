@@ -11,11 +11,11 @@ import pytest
 from planfly.commands.registry import build_parser
 from planfly.terminal.command_parser import CommandParser
 from planfly.terminal.options import (
-    aircraft_and_wind_options,
+    add_aircraft_and_wind_options,
+    add_flight_options,
+    add_result_options,
+    add_steering_options,
     call_api,
-    flight_options,
-    result_options,
-    steering_options,
     watch_stop_signals,
 )
 
@@ -42,16 +42,16 @@ def parser_with(*groups: Callable[[CommandParser], Any]) -> CommandParser:
 
 
 def test_options_that_are_not_given_leave_the_scenario_as_it_is() -> None:
-    args = parser_with(result_options, aircraft_and_wind_options, steering_options).parse_args([])
+    args = parser_with(add_result_options, add_aircraft_and_wind_options, add_steering_options).parse_args([])
     assert not args.overwrite
     given = (args.aircraft, args.airspeed, args.wind, args.turbulence, args.params, args.guidance, args.nav)
     assert given == (None,) * len(given)
 
 
 def test_a_wind_is_a_speed_and_where_it_blows_from() -> None:
-    assert parser_with(aircraft_and_wind_options).parse_args(["--wind", "7.5,250"]).wind == (7.5, 250.0)
+    assert parser_with(add_aircraft_and_wind_options).parse_args(["--wind", "7.5,250"]).wind == (7.5, 250.0)
     with pytest.raises(SystemExit):
-        parser_with(aircraft_and_wind_options).parse_args(["--turbulence", "severe"])
+        parser_with(add_aircraft_and_wind_options).parse_args(["--turbulence", "severe"])
 
 
 @pytest.mark.parametrize("line", ["fly m.waypoints --sitl bin/arduplane", "run tight --sitl bin/arduplane"])
@@ -69,19 +69,23 @@ def test_and_for_no_other(line: str, capsys: pytest.CaptureFixture[str]) -> None
 
 def test_run_takes_what_fly_takes_of_a_flight() -> None:
     commands = build_parser().commands
-    shared = set(parser_with(flight_options).options())
+    shared = set(parser_with(add_flight_options).long_options())
     assert {"--wind", "--turbulence", "--aircraft", "--airspeed", "--params", "--nav", "--sitl"} < shared
     for name in ("run", "fly"):
-        assert shared <= set(commands[name].options())
+        assert shared <= set(commands[name].long_options())
     # What is left is a mission's: whose scenario it is judged in, and where its log goes.
-    assert set(commands["fly"].options()) - set(commands["run"].options()) == {"--scenario", "--fence", "--log"}
+    assert set(commands["fly"].long_options()) - set(commands["run"].long_options()) == {
+        "--scenario",
+        "--fence",
+        "--log",
+    }
 
 
 @pytest.mark.parametrize(
     "name", [name for name in build_parser().commands if name not in ("studio", "serve", "help", "completion")]
 )
 def test_every_command_with_a_result_answers_in_json_or_in_silence(name: str) -> None:
-    assert {"--json", "--quiet"} <= set(build_parser().commands[name].options())
+    assert {"--json", "--quiet"} <= set(build_parser().commands[name].long_options())
 
 
 # ----------------------------------------------------------------------

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from logs.recording.reader import read_log
-from logs.verdict.conditions import setup_conditions
+from logs.verdict.conditions import judging_conditions
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.places import FLIGHT, Change, Place
 from logs.verdict.verdict import Verdict
@@ -66,7 +66,7 @@ def test_the_table_counts_the_zones(capsys: pytest.CaptureFixture[str]) -> None:
     """One finding stands for all zones that are kept to."""
     kept = make_finding("fence", FLIGHT, ok=True, reason="none of 14 zones is violated")
     made = Verdict(
-        (kept,), True, True, ("flyable",), "flown", conditions=replace(setup_conditions(make_setup()), zones=14)
+        (kept,), True, True, ("flyable",), "flown", conditions=replace(judging_conditions(make_setup()), zones=14)
     )
     assert [line.split() for line in printed(capsys, made) if line.startswith("  zones")] == [
         ["zones", "14", "zones;", "1", "of", "1", "ok"]

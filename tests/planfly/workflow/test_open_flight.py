@@ -19,7 +19,7 @@ from planfly.flight_options import MissionOptions
 from planfly.live.served_flights import ServeOptions, load_served_scenario
 from planfly.named_fences import read_named_fences
 from planfly.plan_fence import add_plan_fence
-from planfly.workflow.airframe import airframe_of, load_airframe
+from planfly.workflow.airframe import airframe_for_setup, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planfly.workflow.open_flight import mission_of_plan, open_flight
 from planner.plan import plan_json
@@ -92,7 +92,7 @@ def test_fences_join_the_missions_own_and_each_other(mission: Path, capsys: pyte
     Path("b.geojson").write_text(feature(705.0), encoding="ascii")
     command = ["check", str(mission), "--fence", "a.fence", "--fence", "b.geojson", "--json", "v.json"]
     assert main(command) == 4
-    assert "its own fence of 1 items applies in addition to the one named" in capsys.readouterr().err
+    assert "the mission's own fence of 1 items applies in addition to the named fence" in capsys.readouterr().err
     found = json.loads(Path("v.json").read_text(encoding="utf-8"))["findings"]
     failed = [item["where"] for item in found if item["rule"] == "fence" and item["ok"] is False]
     assert failed == ["mill (exclusion)", "fence item 1 (exclusion)"]
@@ -281,7 +281,7 @@ def test_a_mission_is_judged_in_the_scenario_that_is_named(short_mission: Path) 
     slower = open_flight(short_mission, {"scenario": short_mission.parent / "field.toml", "seed": 9, "airspeed": 21.0})
     assert (slower.scenario.name, slower.seed) == ("field", 9)
     assert slower.scenario.wind.speed == 3.0
-    assert slower.airspeed == airframe_of(slower).airspeed == 21.0
+    assert slower.airspeed == airframe_for_setup(slower).airspeed == 21.0
     assert (slower.route.airspeed == 21.0).all()
 
 
@@ -298,7 +298,7 @@ def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_miss
     other = open_flight(file, {"scenario": short_mission.parent / "field.toml", "seed": 4})
     assert (other.scenario.name, other.seed, other.name) == ("field", 4, "plan")
     assert other.plan is None
-    assert other.mission == own.mission == mission_of_plan(plan, airframe_of(own))
+    assert other.mission == own.mission == mission_of_plan(plan, airframe_for_setup(own))
 
 
 def test_what_is_not_there_names_what_is_expected(tmp_path: Path) -> None:

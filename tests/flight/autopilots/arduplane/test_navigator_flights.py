@@ -189,10 +189,10 @@ def test_a_bank_limit_of_circles_is_said_not_to_be_flown() -> None:
         )
         airframe = replace(load_airframe(setup.scenario), autopilot=law)
         made = make_setup(setup.scenario, airframe, read, 1)
-        assert any(note.startswith("NAVL1_LIM_BANK 30 is not flown") for note in made.route.notes) == said
+        assert any(note.startswith("NAVL1_LIM_BANK 30 is not simulated") for note in made.route.notes) == said
         # The circle may be narrower than the one that is judged: the verdict stays open.
         open_texts = [finding.reason for finding in mission_findings(made) if finding.ok is None]
-        assert any(text.startswith("NAVL1_LIM_BANK 30 is not flown") for text in open_texts) == said
+        assert any(text.startswith("NAVL1_LIM_BANK 30 is not simulated") for text in open_texts) == said
 
 
 @pytest.mark.parametrize(("climb", "ended"), [(0.1, "missed"), (5.0, "completed")])

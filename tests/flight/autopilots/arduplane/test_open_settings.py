@@ -142,7 +142,7 @@ def test_arduplanes_defaults_leave_nothing_open_stated_or_not() -> None:
 def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mission: MissionParts) -> None:
     (text,) = said(line, mission)
     assert text.startswith(line)
-    assert text.endswith("and is not flown")
+    assert text.endswith("but is not simulated")
     # A take-off's or a landing's setting changes no flight that begins and ends in the air.
     assert (said(line, IN_THE_AIR) == []) == (mission is not IN_THE_AIR)
     assert line.split()[0] in OPEN_SETTINGS
@@ -159,9 +159,9 @@ def test_a_setting_leaves_the_verdict_open_where_its_part_is_flown(line: str, mi
         ("FLAP_1_PERCNT 30", IN_THE_AIR, ""),
         ("FLAP_2_SPEED 15", IN_THE_AIR, ""),
         # 12 m/s of wind: that much can lie between the airspeed and the ground speed.
-        ("AHRS_WIND_MAX 11.9", IN_THE_AIR, "AHRS_WIND_MAX 11.9 in 12 m/s of wind"),
+        ("AHRS_WIND_MAX 11.9", IN_THE_AIR, "AHRS_WIND_MAX 11.9 in 12 m/s wind"),
         ("AHRS_WIND_MAX 12", IN_THE_AIR, ""),
-        ("ARSPD_WIND_MAX 11.9", IN_THE_AIR, "ARSPD_WIND_MAX 11.9 in 12 m/s of wind"),
+        ("ARSPD_WIND_MAX 11.9", IN_THE_AIR, "ARSPD_WIND_MAX 11.9 in 12 m/s wind"),
         ("MIS_OPTIONS 4", TO_GROUND, "MIS_OPTIONS 4 continues"),
         ("MIS_OPTIONS 4", IN_THE_AIR, ""),
         ("MIS_OPTIONS 3", TO_GROUND, ""),
@@ -217,7 +217,7 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("AHRS_EKF_TYPE 11", "EAHRS_TYPE 0 with AHRS_EKF_TYPE 11 leaves no position"),
         ("AHRS_EKF_TYPE 11\nEAHRS_TYPE 1\nEK3_ENABLE 0", ""),
         ("EK3_SRC1_POSXY 0", "EK3_SRC1_POSXY 0"),
-        ("EK3_SRC1_POSZ 0", "EK3_SRC1_POSZ 0 takes the altitude neither"),
+        ("EK3_SRC1_POSZ 0", "EK3_SRC1_POSZ 0 uses neither"),
         ("EK3_SRC1_POSZ 3", ""),
         ("EK3_IMU_MASK 0", "EK3_IMU_MASK 0"),
         ("INS_ENABLE_MASK 0", "INS_ENABLE_MASK 0"),

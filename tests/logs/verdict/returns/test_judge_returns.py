@@ -301,7 +301,7 @@ def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> N
     found = ReturnsResult(guess, judge_returns(world, starts, 20.0))
     assert all(math.isnan(one.energy_left) for one in found.returns.each)
     assert not found.returns.count("energy")
-    assert any("the battery is guessed, so energy is not judged" in note for note in found.notes)
+    assert any("the battery capacity is guessed, so energy is not judged" in note for note in found.notes)
     stated = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
     known = guessed(stated)
     found = ReturnsResult(known, judge_returns(return_world(known), starts, 20.0))

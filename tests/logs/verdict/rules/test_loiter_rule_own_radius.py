@@ -17,7 +17,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.verdict import Verdict
-from planfly.workflow.airframe import bank_limit, load_airframe
+from planfly.workflow.airframe import load_airframe, max_turn_bank
 from planfly.workflow.open_flight import make_setup
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
@@ -50,7 +50,7 @@ def loiter(item: str, parameters: dict[str, float], **tables: Any) -> FlightSetu
     scenario = from_spec(spec | tables, "own")
     airframe = load_airframe(scenario)
     law = ArduPlane(ArduPilotParameters.load(airframe.aircraft)).with_parameters(**parameters)
-    limits = replace(airframe.limits, max_bank=min(airframe.limits.max_bank, bank_limit(scenario, law)))
+    limits = replace(airframe.limits, max_bank=min(airframe.limits.max_bank, max_turn_bank(scenario, law)))
     flown_by = replace(airframe, autopilot=law, limits=limits)
     return replace(make_setup(scenario, flown_by, parse_mission(text, "own.waypoints"), 1), nav="perfect")
 
@@ -196,5 +196,5 @@ def test_an_own_circle_of_a_low_roll_limit_keeps_its_corridor() -> None:
 def test_the_bank_limit_is_the_lesser_of_scenario_and_autopilot() -> None:
     setup = loiter(TURNS, {})
     law = setup.autopilot
-    assert bank_limit(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=20.0)) == math.radians(20.0)
-    assert bank_limit(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=50.0)) == math.radians(30.0)
+    assert max_turn_bank(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=20.0)) == math.radians(20.0)
+    assert max_turn_bank(setup.scenario, law.with_parameters(ROLL_LIMIT_DEG=50.0)) == math.radians(30.0)

@@ -174,9 +174,9 @@ def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
     other = MissionStretch(50.0, 60.0, "AUTO", "log")
     assert not_reflown_lines((AGAIN,), (AGAIN.stretch,), 9) == []
     (line,) = not_reflown_lines((AGAIN,), (AGAIN.stretch, other), 9)
-    assert line == "Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order"
+    assert line == "Not flown again: AUTO from 50.0 s to 60.0 s: it did not pass two waypoints in order"
     (line,) = not_reflown_lines((AGAIN,), (AGAIN.stretch, other), 1)
-    assert line.endswith("in order, or 1 longer ones were")
+    assert line.endswith("in order, or 1 longer stretches were flown again")
 
 
 def test_a_verdict_that_leaves_something_open_neither_passes_nor_fails() -> None:

@@ -9,7 +9,7 @@ from planfly.commands.registry import answer_objects, answer_schema, build_parse
 
 
 def test_every_command_with_json_has_a_schema_and_no_other() -> None:
-    asked = {name for name, parser in build_parser().commands.items() if "--json" in parser.options()}
+    asked = {name for name, parser in build_parser().commands.items() if "--json" in parser.long_options()}
     assert asked == set(commands_with_json())
 
 

@@ -36,7 +36,7 @@ function momentWords(moment, legs) {
   return [
     ["time", numberText(moment.time, 1) + " s"],
     ["leg", legs[moment.leg] || String(moment.leg)],
-    ["height", numberText(moment.up, 0) + " m AMSL"],
+    ["altitude", numberText(moment.up, 0) + " m AMSL"],
     ["above ground", moment.above === null ? "–" : numberText(moment.above, 0) + " m"],
     ["airspeed", numberText(moment.airspeed, 1) + " m/s"],
     ["climb", numberText(moment.climb, 1) + " m/s"],
