@@ -47,7 +47,7 @@ _MAX_FLIGHTS_EACH = 6
 # Growth of the number of flights between two checks of an open direction, because the posterior is slow to compute.
 _CHECK_GROWTH_RATIO = 1.04
 # Minimum number of flights in calm air that must all fail for a search to end without a flight in wind.
-_MIN_CALM_FLIGHTS = 6
+_MIN_CALM_FLIGHTS = 3
 # Dispersed quantities that the wind of the search replaces.
 SEARCHED_QUANTITIES = ("wind_speed", "wind_from")
 

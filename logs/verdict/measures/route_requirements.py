@@ -454,12 +454,27 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     )
 
 
+# The setups whose surveys were searched last, with these surveys: several parts of one verdict need them.
+_last_surveys: list[tuple[FlightSetup, tuple[Survey, ...]]] = []
+# Number of setups whose surveys are kept.
+_MAX_KEPT_SURVEYS = 4
+
+
 def judged_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
-    """Return the surveys of a setup's mission that are judged by their lines.
+    """Return the surveys of a setup's mission that are judged by their lines, cached for the last setups.
 
     A plan made by planfly has none.  Other missions have the surveys whose camera is switched, or, if the scenario
     states "lines", all legs with the form of a survey.
     """
+    for cached_setup, surveys in tuple(_last_surveys):
+        if cached_setup is setup:
+            return surveys
+    surveys = _search_surveys(setup)
+    _last_surveys[:] = [(setup, surveys), *_last_surveys[: _MAX_KEPT_SURVEYS - 1]]
+    return surveys
+
+
+def _search_surveys(setup: FlightSetup) -> tuple[Survey, ...]:
     mode = setup.scenario.limits.surveys
     if setup.plan is not None or mode == "path":
         return ()

@@ -12,7 +12,9 @@ import pytest
 from flight.mission.items import Command, Mission
 from flight.mission.survey_layout import min_turn_around
 from flight.simulation.setup import FlightSetup
+from logs.verdict.conditions import corridor_line
 from logs.verdict.findings import Finding, make_finding
+from logs.verdict.measures import route_requirements
 from logs.verdict.measures.route_requirements import judged_surveys
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.verdict import Verdict
@@ -215,3 +217,17 @@ def test_why_no_other_layout_was_tried(monkeypatch: pytest.MonkeyPatch, tmp_path
     found, flown = tried(monkeypatch, lambda metres: (False, {}), path)
     assert found.kept == "item 7, DO_CHANGE_SPEED, lies between two lines"
     assert set(flown) <= {0.0}
+
+
+def test_the_surveys_of_a_setup_are_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Requirements, summary and remedies ask for them; another setup has its own."""
+    searches = []
+    search = route_requirements.find_surveys
+    monkeypatch.setattr(route_requirements, "find_surveys", lambda *args: searches.append(args) or search(*args))
+    setup = opened(FIELD)
+    found = route_requirements.route_requirements(setup).surveys
+    assert corridor_line(setup) == ""
+    assert judged_surveys(setup) is found
+    assert len(searches) == 1
+    assert judged_surveys(opened(FIELD)) == found
+    assert len(searches) == 2
