@@ -3,10 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, partial, wraps
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from world.airspace.zones import Zone
 from world.airspace.zones_on_map import MAX_ZONE_DISTANCE, check_ends, make_zones, select_near_zones
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
-from world.errors import ScenarioError, TerrainError
+from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean
 from world.frames import GeoOrigin, to_geo
 from world.map_positions import check_inside, make_threats, map_position
@@ -64,6 +64,29 @@ DETECTION_SCALE_RATIO = 1.0 / 3.0
 GROUND_BUFFER = 1000.0
 
 
+_Class = TypeVar("_Class")
+
+
+def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
+    """Let a call with wrong arguments raise an ArgumentError that names the functions that make a scenario."""
+    initialise = scenario_class.__init__
+
+    @wraps(initialise)
+    def initialise_or_refuse(self: _Class, *args: object, **values: object) -> None:
+        try:
+            initialise(self, *args, **values)
+        except (TypeError, ValueError) as error:
+            reason = str(error).removeprefix("Scenario.__init__() ")
+            raise ArgumentError(
+                f"Scenario: {reason}: planfly.make_scenario makes a scenario from another one, with other threats and"
+                " tables"
+            ) from error
+
+    scenario_class.__init__ = initialise_or_refuse  # type: ignore[assignment]
+    return scenario_class
+
+
+@_with_clear_errors
 @dataclass(frozen=True, slots=True)
 class Scenario:
     """Environment of one mission, in map axes (m) and radians.

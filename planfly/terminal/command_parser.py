@@ -113,6 +113,23 @@ class CommandParser(argparse.ArgumentParser):
         """Register an option under whose name error messages mention an API keyword with another name."""
         self._aliases[keyword] = option
 
+    def take_late_arguments(self, parsed: argparse.Namespace, unknown_arguments: list[str]) -> bool:
+        """Store unknown arguments as the optional or last positional arguments, and return True if they fit there.
+
+        argparse itself takes these only directly behind the other positional arguments, not behind an option.
+        """
+        for action in self._actions:
+            if action.option_strings or any(argument.startswith("-") for argument in unknown_arguments):
+                continue
+            value = getattr(parsed, action.dest)
+            if action.nargs == "+":
+                setattr(parsed, action.dest, [*value, *unknown_arguments])
+                return True
+            if action.nargs == "?" and value == action.default and len(unknown_arguments) == 1:
+                setattr(parsed, action.dest, unknown_arguments[0])
+                return True
+        return False
+
     def options_by_keyword(self) -> dict[str, str]:
         """Return the option for each API keyword."""
         options_by_dest = {action.dest: action.option_strings[-1] for action in self._actions if action.option_strings}
@@ -183,8 +200,8 @@ class LineParser(CommandParser):
             hint = did_you_mean(arguments[0], self.commands) or f"; there are {', '.join(self.commands)}"
             self.error(f"{arguments[0]!r}: no such command{hint}")
         parsed, unknown_arguments = self.parse_known_args(arguments, namespace)
-        if unknown_arguments:
-            parser = self.commands[parsed.command]
+        parser = self.commands[parsed.command]
+        if unknown_arguments and not parser.take_late_arguments(parsed, unknown_arguments):
             # Words after a -- are not options, even if they begin with a dash.
             arguments_after_dashes = arguments[arguments.index("--") :] if "--" in arguments else []
             option = next(

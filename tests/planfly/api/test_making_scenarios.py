@@ -1,5 +1,6 @@
 """A scenario made in Python: its threats from arrays and data frames, other values, and what is refused."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -87,3 +88,15 @@ def test_a_plan_keeps_clear_of_threats_that_were_given() -> None:
     assert path.objectives.kill_exposure == 0.0
     assert path.safe
     assert path.certificate.kill_distance > 0.0
+
+
+@pytest.mark.parametrize("values", [{"foo": 1}, {"name": "mine"}, {}])
+def test_a_scenario_from_nothing_is_refused_with_the_function_that_makes_one(values: dict[str, Any]) -> None:
+    with pytest.raises(planfly.PlanflyError, match=r"^Scenario: .*planfly\.make_scenario makes") as error:
+        planfly.Scenario(**values)
+    assert "\n" not in str(error.value)
+
+
+def test_a_field_of_a_wrong_type_is_refused() -> None:
+    with pytest.raises(planfly.PlanflyError, match="could not convert string to float: 'west'"):
+        replace(planfly.make_scenario("tight"), start="west")

@@ -126,3 +126,23 @@ def test_commands_are_found_by_name_and_help_shows_groups() -> None:
     assert "how fast:\n  --speed" in text
     assert "example: planfly go now\n         planfly go later\n\nways:\n  on foot\n\nexit codes" in text
     assert line.parse_args(["go", "--speed", "3"]).speed == "3"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import log.BIN flight.mcap --plan a.plan",
+        "import log.BIN --plan a.plan flight.mcap",
+        "import --plan a.plan log.BIN flight.mcap",
+        "import log.BIN --overwrite flight.mcap --plan a.plan",
+        "import --overwrite log.BIN --plan a.plan --quiet flight.mcap",
+    ],
+)
+def test_options_may_stand_between_the_arguments(line: str) -> None:
+    parsed = build_parser().parse_args(line.split())
+    assert (parsed.log, parsed.target, parsed.plan) == ("log.BIN", "flight.mcap", "a.plan")
+
+
+def test_files_may_stand_on_both_sides_of_an_option() -> None:
+    parsed = build_parser().parse_args(["export", "a.mcap", "b.kml", "--overwrite", "c.csv"])
+    assert (parsed.source, parsed.files) == ("a.mcap", ["b.kml", "c.csv"])
