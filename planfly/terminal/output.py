@@ -536,8 +536,10 @@ def write_junit_error_if_requested(args: argparse.Namespace, message: str) -> No
     if target is not None:
         from logs.verdict.junit import junit_error_text
 
-        source = next(getattr(args, name) for name in ("what", "mission", "scenario", "log") if hasattr(args, name))
-        write_atomically(Path(target), junit_error_text(str(source), message))
+        # An option of another command may have the name of an argument, such as --scenario.
+        names = ("what", "mission", "log", "scenario")
+        source = next(value for name in names if (value := getattr(args, name, None)) is not None)
+        write_atomically(Path(target), junit_error_text(source, message))
 
 
 def _check_not_input(target: Path, args: argparse.Namespace) -> None:

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 CASES_FILE = Path(__file__).with_name("cases.txt")
-# A case that takes longer, of processor time or by the clock, is slow: 9 % of the cases take three quarters of the time.
+# A longer case, of processor time or by the clock, is slow: 9 % of the cases take three quarters of the time.
 SLOW_CPU_S = 0.3
 SLOW_CLOCK_S = 2.0
 # Slow cases that `make test` runs all the same: of each command, file format and page one that does the whole job.

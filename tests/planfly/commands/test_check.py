@@ -259,3 +259,23 @@ def test_an_autopilot_that_is_none_is_refused(capsys: pytest.CaptureFixture[str]
         "argument --for: 'px5': expected ardupilot, ardupilot-4.6, ardupilot-4.7, px4, px4-1.16, px4-1.17, planfly"
         in capsys.readouterr().err
     )
+
+
+@pytest.mark.parametrize(
+    ("argv", "name"),
+    [
+        (["check", "broken.waypoints", "--scenario", "tight"], "broken.waypoints"),
+        (["fly", "broken.waypoints", "--log", "f.mcap"], "broken.waypoints"),
+        (["import", "broken.BIN", "f.mcap"], "broken.BIN"),
+        (["import", "broken.BIN", "f.mcap", "--scenario", "tight"], "broken.BIN"),
+        (["run", "broken.toml"], "broken.toml"),
+    ],
+)
+def test_an_error_is_a_case_with_the_name_of_the_file_in_junit(
+    argv: list[str], name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "broken.waypoints").write_text("QGC WPL 110\nbroken\n")
+    assert main([*argv, "--junit", "r.xml"]) == 2
+    [suite] = ElementTree.parse("r.xml").getroot()
+    assert (suite.get("name"), suite.get("errors")) == (name, "1")
