@@ -51,7 +51,7 @@ class Contact:
 
     name: name in the model.
     forward, right, down: position relative to the centre of gravity, m.
-    stands: True if the aircraft stands and slides on the point; other points must not touch the ground at speed.
+    is_support: True if the aircraft stands and slides on the point; other points must not touch the ground at speed.
     wheel: True for a wheel.
     """
 
@@ -59,7 +59,7 @@ class Contact:
     forward: float
     right: float
     down: float
-    stands: bool
+    is_support: bool
     wheel: bool = False
 
 
@@ -68,7 +68,7 @@ def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
     >>> from aircraft.catalog import load_aircraft
     >>> made = default_contacts(load_aircraft("aerosonde"), "belly")
-    >>> len(made), made[0].name, round(made[0].down, 2), made[-1].stands
+    >>> len(made), made[0].name, round(made[0].down, 2), made[-1].is_support
     (7, 'belly front left', 0.2, False)
     """
     span, standing_points = aircraft.wing_span, _WHEEL_POINTS if gear == "wheels" else _BELLY_POINTS
@@ -112,7 +112,7 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
 
 def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
     """Return the XML of one contact, in metres aft, right and up from the model's reference point."""
-    standing_count = sum(other.stands for other in contacts)
+    standing_count = sum(other.is_support for other in contacts)
     stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / standing_count)
     aft, right, up = centre + np.array([-contact.forward, contact.right, -contact.down])
@@ -140,13 +140,13 @@ def _model_contacts(model: bytes) -> tuple[Contact, ...]:
     if not any(contact.wheel for contact in contacts):
         max_depth = max((contact.down for contact in contacts), default=0.0)
         contacts = [
-            replace(contact, stands=contact.down >= _MIN_SKID_DEPTH_RATIO * max_depth > 0.0) for contact in contacts
+            replace(contact, is_support=contact.down >= _MIN_SKID_DEPTH_RATIO * max_depth > 0.0) for contact in contacts
         ]
-    return tuple(sorted(contacts, key=lambda contact: not contact.stands))
+    return tuple(sorted(contacts, key=lambda contact: not contact.is_support))
 
 
 def _read_contacts(model: bytes) -> list[Contact]:
-    """Return the contacts of a model, with `stands` set for wheels only."""
+    """Return the contacts of a model, with `is_support` set for wheels only."""
     section = ElementTree.fromstring(model).find("ground_reactions")
     contacts, centre = [], _center_of_gravity(model)
     for element in [] if section is None else section.findall("contact"):

@@ -201,6 +201,7 @@ class _PlanFile(_Model):
 
 
 def _finite_or_none(value: float) -> float | None:
+    """Return a number, or None (null in JSON) if it is inf or NaN."""
     return float(value) if np.isfinite(value) else None
 
 
@@ -333,14 +334,17 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
 
 
 def _none_to_inf(value: float | None) -> float:
+    """Return a number, or inf for None; the inverse of `_finite_or_none`."""
     return np.inf if value is None else value
 
 
 def _reject_constant(name: str) -> float:
+    """Raise ValueError for NaN or Infinity, which Python's JSON reader accepts."""
     raise ValueError(f"{name} is not a number")
 
 
 def _check_names(source: str, field: str, found_names: dict[str, Any], expected_names: Sequence[str]) -> None:
+    """Raise MissionError if the keys of a JSON object are not exactly the expected ones."""
     if sorted(found_names) != sorted(expected_names):
         raise MissionError.at(source, field, sorted(found_names), f"expected keys {sorted(expected_names)}")
 

@@ -5,7 +5,7 @@
     ├── TerrainError    an elevation file
     ├── MissionError    a plan or mission file
     ├── FlightError     an aircraft model or a start condition
-    │   ├── StartError  a flight that cannot begin as its mission states: `fly` reports a verdict
+    │   ├── StartError  a flight that cannot start as its mission states: `fly` reports a verdict
     │   └── CrashError  a failure of the controlling program in flight: the command line ends with 1
     ├── ParameterError  a file of an autopilot's parameters
     ├── LogError        a flight log
@@ -122,10 +122,10 @@ class ParameterError(PlanflyError):
 
 
 class StartError(FlightError):
-    """Error for a flight that cannot begin as its mission states.
+    """Error for a flight that cannot start as its mission states.
 
     The aircraft and the place are known, but no flight is possible there.
-    source: mission or command that requires it.  reason: why it cannot begin.  field, value, allowed: as in
+    source: mission or command that requires it.  reason: why it cannot start.  field, value, allowed: as in
     `PlanflyError`.
 
     >>> str(StartError("a.plan", "no progress"))

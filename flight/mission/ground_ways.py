@@ -240,9 +240,10 @@ def airborne_route(route: Route, ground_phases: GroundPhases, first_leg_start: F
     )
 
 
-def shown_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
-    """Return a route's waypoints for pictures and tables, (w, 3) m, with flown ends on the ground.
+def display_waypoints(route: Route, ground_phases: GroundPhases) -> Floats:
+    """Return a route's waypoints (w, 3) for pictures and tables, m.
 
+    The first and last waypoints are on the ground where the take-off or landing is simulated.
     The route itself starts at the altitude at which a take-off ends, and its leg to a landing point is level.
     """
     points = np.array(route.waypoints)

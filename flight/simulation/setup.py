@@ -14,7 +14,7 @@ from aircraft.tracking import corridor_half_width
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.guidance.path import FlyByPath, fly_by_path
-from flight.mission.ground_ways import GroundPhases, find_ground_phases, flown_notes, shown_waypoints
+from flight.mission.ground_ways import GroundPhases, display_waypoints, find_ground_phases, flown_notes
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -310,9 +310,9 @@ class FlightSetup:
         return self.envelope.level_speeds(float(self.route.waypoints[0, 2]))[0]
 
     @property
-    def shown_waypoints(self) -> Floats:
+    def display_waypoints(self) -> Floats:
         """Waypoints of the route for pictures and tables, (w, 3) m, with the ends on the ground that are flown."""
-        return shown_waypoints(self.route, self.ground_phases)
+        return display_waypoints(self.route, self.ground_phases)
 
     @property
     def started(self) -> str:

@@ -385,7 +385,7 @@ class Flight(Airborne):
         except UnsupportedModel as unsupported:
             return None, f"JSBSim, since the compiled model does not cover {unsupported}"
         except (FlightError, ArithmeticError) as error:
-            return None, f"JSBSim, since the compiled model cannot begin: {error}"
+            return None, f"JSBSim, since the compiled model cannot start: {error}"
         if differences := model.find_differences():
             # Start again, since the comparison has moved the aircraft.
             self.fdm = self._new_fdm()
@@ -397,7 +397,7 @@ class Flight(Airborne):
         """Return a function that flies a number of ticks, fills the workspace's rows, and returns the last status."""
         record, workspace, access = self._work, self._workspace, self.fdm.loop_access()
         record.state_factors = access.factors[0]
-        record.scale_above, record.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
+        record.scale_positive, record.scale_negative = (tuple(scales) for scales in zip(*access.scales, strict=True))
         if self._compiled is not None and self._law.loop is not None:
             model = self._compiled
             return partial(self._law.loop, workspace.block, self._ground.heights, *model.arrays)

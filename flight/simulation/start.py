@@ -134,7 +134,7 @@ def find_release(
     launch = take_off.launch
     position, velocity = take_off.release()
     if launch.method == "runway":
-        stand_heights = [contact.down for contact in find_contacts(aircraft, "wheels") if contact.stands]
+        stand_heights = [contact.down for contact in find_contacts(aircraft, "wheels") if contact.is_support]
         position[2] += max(stand_heights, default=0.0)
     lat, lon = (float(value) for value in to_geo(setup.scenario.origin, position[0], position[1]))
     convergence = local_map.convergence(lat, lon)

@@ -110,8 +110,8 @@ WORKSPACE = record_dtype(
     ("north_map", POLYMAP),  # from latitude and longitude to the map course of true north
     ("pixel_map", POLYMAP),  # from east and north to column and row of the terrain
     ("output", OUTPUT),  # in JSBSim's units
-    ("scale_above", OUTPUT),  # factors from SI to JSBSim's units for values above zero
-    ("scale_below", OUTPUT),  # factors from SI to JSBSim's units for other values
+    ("scale_positive", OUTPUT),  # factors from SI to JSBSim's units for values above zero
+    ("scale_negative", OUTPUT),  # factors from SI to JSBSim's units for other values
     ("noise", NOISE, (BLOCK_TICKS,)),
     ("rows", TRACK_ROW, (BLOCK_TICKS,)),
 )
@@ -328,7 +328,7 @@ def fill_tick(workspace: Record) -> None:
     _fill_wind(row, state, cos, sin)
     timing.tick += 1
     timing.row += 1
-    _set_output(workspace.output, workspace.commands, air, workspace.scale_above, workspace.scale_below)
+    _set_output(workspace.output, workspace.commands, air, workspace.scale_positive, workspace.scale_negative)
 
 
 @inner
@@ -420,7 +420,7 @@ def _air_status(
 
 
 @inner
-def _set_output(output: Record, commands: Record, air: Record, scale_above: Record, scale_below: Record) -> None:
+def _set_output(output: Record, commands: Record, air: Record, scale_positive: Record, scale_negative: Record) -> None:
     """Set the outputs from commands, wind and ground altitude, in JSBSim's units."""
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
@@ -428,7 +428,7 @@ def _set_output(output: Record, commands: Record, air: Record, scale_above: Reco
     output.gust_north, output.gust_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
     output.gust_down, output.ground = air.gust_down, air.ground
     for name in literal_unroll(_OUTPUT_FIELDS):
-        output[name] *= scale_above[name] if output[name] > 0.0 else scale_below[name]
+        output[name] *= scale_positive[name] if output[name] > 0.0 else scale_negative[name]
 
 
 @inner

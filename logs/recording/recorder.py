@@ -249,11 +249,11 @@ class Recorder:
         scenes = {
             "/scene/terrain": scene.terrain_scene(EPOCH_NS, setup.scenario),
             "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats, setup.scenario.terrain),
-            "/scene/plan": scene.plan_scene(EPOCH_NS, setup.shown_waypoints, setup.route.items.tolist()),
+            "/scene/plan": scene.plan_scene(EPOCH_NS, setup.display_waypoints, setup.route.items.tolist()),
             "/scene/aircraft": aircraft_scene(EPOCH_NS),
             "/points/terrain": clouds.ground_cloud(EPOCH_NS, setup.scenario),
             "/points/threats": clouds.threats_cloud(EPOCH_NS, setup.scenario.threats),
-            "/points/plan": clouds.plan_cloud(EPOCH_NS, setup.shown_waypoints),
+            "/points/plan": clouds.plan_cloud(EPOCH_NS, setup.display_waypoints),
             "/points/aircraft": clouds.aircraft_cloud(EPOCH_NS),
         }
         scenario_with_fence = with_fence_zones(setup).scenario

@@ -92,7 +92,7 @@ def draw_scene(view: SceneView) -> Figure:
     is_narrow = not np.array_equal(bounds, scene_limits)
     terrain = setup.scenario.terrain
     grid = ground_grid(terrain, bounds, _MAX_CELLS)
-    route = setup.shown_waypoints
+    route = setup.display_waypoints
     projection = _make_projection(route, bounds, exaggeration(setup, bounds, grid), is_narrow)
     with clean_style():
         figure, axes = _make_axes(setup, projection, bounds, grid)

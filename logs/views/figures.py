@@ -87,7 +87,7 @@ def _path_arguments(subject: Subject) -> dict[str, Any]:
     plan = subject.setup.plan
     return {
         "plan_waypoints": plan.waypoints if plan is not None else None,
-        "route_waypoints": subject.setup.shown_waypoints,
+        "route_waypoints": subject.setup.display_waypoints,
         "track": subject.track,
         "verdict": subject.verdict,
         "stops": subject.setup.route.stops.tolist(),

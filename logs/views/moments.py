@@ -71,7 +71,7 @@ def leg_names(setup: FlightSetup) -> list[str]:
 
 def waypoint_names(setup: FlightSetup) -> list[str]:
     """Return the name of each waypoint, with its mission item and altitude."""
-    heights, numbers = setup.shown_waypoints[:, 2].tolist(), setup.route.stops.tolist()
+    heights, numbers = setup.display_waypoints[:, 2].tolist(), setup.route.stops.tolist()
     return [
         f"{place_text(Place('waypoint', k, item=_item_or_none(item), number=numbers[k]))}\n{heights[k]:.0f} m AMSL"
         for k, item in enumerate(setup.route.items.tolist())

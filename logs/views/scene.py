@@ -120,7 +120,7 @@ def scene_data(view: SceneView) -> dict[str, object]:
             for k, name in enumerate(threats.names)
         ],
         **_zone_walls(setup),
-        "plan": np.round(setup.shown_waypoints, 1).tolist(),
+        "plan": np.round(setup.display_waypoints, 1).tolist(),
         "numbers": [[k, stops[k]] for k in stop_rows(stops)],
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }

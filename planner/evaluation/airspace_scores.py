@@ -209,6 +209,7 @@ def airspace_excess(
 def _leg_zone_penetration(
     data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
+    """Return the depth of a leg in zones enlarged by the tracking error (m), integrated over its length, m x km."""
     zones = data.airspace.zones
     return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, start, end, lateral, below, above)
 
@@ -299,6 +300,7 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
 
 @compiled
 def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:
+    """Return the number of pieces (n,) in each path (n, w, 3) that violate a zone or the maximum height."""
     path_count, waypoints, _ = paths.shape
     counts = np.zeros(path_count, np.int64)
     a, b = np.empty(3), np.empty(3)

@@ -170,6 +170,7 @@ def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
 
 def _slope_fault_text(slope: float, climb: float, dive: float, place_text: str = "") -> str:
+    """Describe a slope (rad, positive up) beyond the climb or dive limit (rad)."""
     verb, limit = ("climbs", climb) if slope > 0 else ("sinks", dive)
     return f"{verb} {math.degrees(abs(slope)):.1f} deg{place_text}, allowed {math.degrees(limit):.1f} deg"
 

@@ -286,6 +286,7 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
 
 @inner
 def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool, number: int, out: Record) -> None:
+    """Fill the `CERTIFIED_PIECE` record of the straight piece from `start` to `end`, on leg or arc `number`."""
     height, _ = segment_clearance(data.heights, data.to_pixel, start, end)
     out.of_arc, out.number, out.height = of_arc, number, height
     out.buffer = required_buffer(data, data.buffer, (data.start_buffer, data.destination_buffer), start, end)

@@ -252,6 +252,7 @@ def legs_about(
 
 @inlined
 def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> None:
+    """Set row `row` of vertices (k, 3) to a position, m."""
     out[row, 0] = east
     out[row, 1] = north
     out[row, 2] = up

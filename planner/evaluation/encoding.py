@@ -210,6 +210,7 @@ class Space:
 
 
 def _add_ends(space: Space, inner_waypoints: Floats) -> Floats:
+    """Return the paths (n, w, 3) of inner waypoints (n, w - 2, 3), with start and destination added."""
     out = np.empty((len(inner_waypoints), inner_waypoints.shape[1] + 2, 3))
     out[:, 0], out[:, 1:-1], out[:, -1] = space.start, inner_waypoints, space.destination
     return out

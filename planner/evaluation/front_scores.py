@@ -43,14 +43,17 @@ def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) 
     """
     out = np.zeros((len(paths), len(Value)))
     energy_cost = TIME_COST if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)
-    _fill(data, TIME_COST, energy_cost, np.ascontiguousarray(paths), out)
+    _fill_values(data, TIME_COST, energy_cost, np.ascontiguousarray(paths), out)
     if energy is None:
         out[:, Value.ENERGY] = np.nan
     return out
 
 
 @compiled
-def _fill(data: ProblemArrays, time_cost: TravelCost, energy_cost: TravelCost, paths: Floats, out: Floats) -> None:
+def _fill_values(
+    data: ProblemArrays, time_cost: TravelCost, energy_cost: TravelCost, paths: Floats, out: Floats
+) -> None:
+    """Add the values of paths (n, w, 3) to a zeroed table (n, 5), in the order of `Value`."""
     for n in range(paths.shape[0]):
         path = paths[n]
         min_height = math.inf

@@ -254,6 +254,7 @@ def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
 
 @compiled
 def _score_paths(data: ProblemArrays, paths: Floats, violations: Records, objectives: Records) -> None:
+    """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3)."""
     limits = precompute_limits(data)
     scratch = make_scratch(paths.shape[1])
     for n in range(paths.shape[0]):

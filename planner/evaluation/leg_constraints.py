@@ -25,6 +25,7 @@ PATHS_PER_BLOCK = 128
 
 
 def _block_rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
+    """Return record fields with these names and one value of a type for each path of a block."""
     return [(name, kind, (PATHS_PER_BLOCK,)) for name in names]
 
 
@@ -201,6 +202,7 @@ def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
 
 @inlined
 def _straight_distance(start: Floats, destination: Floats) -> float:
+    """Return the distance between start and destination, m."""
     total = 0.0
     for k in range(3):
         total += (destination[k] - start[k]) ** 2

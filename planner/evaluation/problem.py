@@ -210,6 +210,7 @@ def required_headroom(data: ProblemArrays) -> RequiredClearance:
 def _make_required_clearance(
     data: ProblemArrays, clearance: float, buffer: float, start_buffer: float, destination_buffer: float
 ) -> RequiredClearance:
+    """Make the required clearance: a height above ground (m), with buffers (m) at both ends and away from them."""
     same_everywhere = min(start_buffer, destination_buffer) >= buffer
     growth = 0.0 if same_everywhere else data.buffer_growth
     return RequiredClearance(
@@ -446,6 +447,7 @@ def _map_edges(bounds: Floats) -> dict[str, float]:
 
 
 def _or_nan(value: float | None) -> float:
+    """Return a number, or NaN for None."""
     return math.nan if value is None else float(value)
 
 
@@ -457,6 +459,7 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
 
 
 def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
+    """Return upper bounds on the slope of the terrain: of all of it, and of each tile with its neighbours."""
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
     max_slope = float(slopes.max())
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.

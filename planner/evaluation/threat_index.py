@@ -72,7 +72,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
     if positive_radii.size:
         cell_size = min(max(cell_size, CELL_SIDE_FRACTION * float(np.median(positive_radii))), float(size.max()))
     columns, rows = max(1, math.ceil(size[0] / cell_size)), max(1, math.ceil(size[1] / cell_size))
-    first, units = _lists(
+    first, units = _list_units(
         np.ascontiguousarray(position), radius, float(min_corner[0]), float(min_corner[1]), cell_size, columns, rows
     )
     # Whole metres, widened against rounding.
@@ -87,6 +87,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
+    """Fill the records of cells: start and length of their list of units, and the altitude range of these units."""
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]
@@ -98,9 +99,10 @@ def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitud
 
 
 @compiled
-def _lists(
+def _list_units(
     position: Floats, radius: Floats, west: float, south: float, cell_size: float, columns: int, rows: int
 ) -> tuple[Int32s, Int32s]:
+    """Return the units of each cell as one list of all cells, and the index of each cell's first entry in the list."""
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
     units = np.empty(0, dtype=np.int32)

@@ -62,8 +62,9 @@ LENGTH_COST = TravelCost(1.0, 0.0, 0.0, _EMPTY_TABLE, _EMPTY_TABLE, _EMPTY_TABLE
 
 
 def make_travel_cost(objective: Objective, envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
-    """Make the cost of an objective, in m: length, or time or energy relative to a metre of level flight.
+    """Make the cost function of an objective, in equivalent metres.
 
+    The cost is the path's length, or its time or energy divided by the time or energy of a metre of level flight.
     Returns None for energy if the aircraft's power is unknown.
 
     >>> from planfly.workflow.airframe import load_airframe
@@ -261,7 +262,7 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
     _add_step_model(
         curvature,
         slopes,
-        _fill_length_curvature(step_curvature, step, length),
+        _fill_length_hessian(step_curvature, step, length),
         travel.length,
         step,
         travel.length / length,
@@ -311,13 +312,14 @@ def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish
 
 
 @inner
-def _fill_length_curvature(curvature: Floats, step: tuple[float, float, float], length: float) -> Floats:
-    """Fill the curvature (3, 3) of a leg's length with respect to its step."""
+def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, float], length: float) -> Floats:
+    """Fill in the Hessian (3, 3) of a leg's length with respect to its displacement (east, north, up)."""
     for axis in range(3):
         for other_axis in range(3):
             identity = 1.0 if axis == other_axis else 0.0
-            curvature[axis, other_axis] = (identity - step[axis] * step[other_axis] / (length * length)) / length
-    return curvature
+            outer = displacement[axis] * displacement[other_axis]
+            hessian[axis, other_axis] = (identity - outer / (length * length)) / length
+    return hessian
 
 
 @inner

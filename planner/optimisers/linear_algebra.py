@@ -71,6 +71,7 @@ def multiply_by_sparse(rows: Floats, basis: Floats) -> Floats:
 
 @inner
 def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
+    """Add `factor` times `values` to `out`, (n,) each."""
     for n in range(out.size):
         out[n] += values[n] * factor
 

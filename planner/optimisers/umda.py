@@ -101,4 +101,5 @@ class Umda(BoxSearch):
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
+    """Multiply rows (n, d) by a basis (d, k), copied where the kernel needs contiguous arrays."""
     return multiply_by_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))

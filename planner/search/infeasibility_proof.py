@@ -111,6 +111,7 @@ def closing_missiles(data: ProblemArrays) -> list[int] | None:
 
 
 def _index_mask(indices: Ints, count: int) -> Flags:
+    """Return flags (count,), True at the given indices."""
     flags = np.zeros(count, dtype=np.bool_)
     flags[indices] = True
     return flags

@@ -76,9 +76,10 @@ def no_corners(count: int, margin: float) -> FlownCorners:
 def corners_near_ground(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
 ) -> FlownCorners:
-    """Return the corners of a path (w, 3) that are flown near the ground.
+    """Return where the turns of a path (w, 3) pass close to the ground.
 
-    margin: additional margin, m.
+    corners, lags: simulated turns at the waypoints, and altitude errors of the legs.
+    margin: height added to the required clearance, m.
     """
     count = path.shape[0]
     flown, point = no_corners(count, margin), np.empty(3)
@@ -171,6 +172,7 @@ def leg_of(sample: int) -> int:
 
 @inner
 def _horizontal_length(start: Floats, end: Floats) -> float:
+    """Return the horizontal distance between two points, at least 1 mm, m."""
     return max(1e-3, math.hypot(end[0] - start[0], end[1] - start[1]))
 
 

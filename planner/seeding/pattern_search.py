@@ -162,6 +162,7 @@ def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
 
 @inner
 def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:
+    """Make a candidate path with start and destination set, and scratch memory to score it."""
     path = np.empty((waypoints, 3))
     copy_into(path[0], data.start)
     copy_into(path[-1], data.destination)
@@ -209,6 +210,7 @@ def _evaluate_merit(
 
 @inner
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
+    """Return the merit of scores (the length ratio plus prices of violations), and True if nothing is violated."""
     price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += ANY_EXPOSURE_PRICE

@@ -234,6 +234,7 @@ def _lowest_index(values: Floats, count: int) -> int:
 
 @inlined
 def _distance(start: Floats, end: Floats) -> float:
+    """Return the distance between two points (3,), m."""
     return math.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
 
 

@@ -21,10 +21,10 @@ START = (46.0, 8.0)
 @pytest.mark.parametrize("gear", ["belly", "wheels"])
 def test_contacts_are_the_same_on_both_sides_and_carry_on_three_points(gear: Gear) -> None:
     made = default_contacts(load_aircraft("x8"), gear)
-    assert sum(one.stands for one in made) == 3
+    assert sum(one.is_support for one in made) == 3
     assert sum(one.right for one in made) == pytest.approx(0.0)
     # The centre of gravity is within what carries.
-    ahead = [one.forward for one in made if one.stands]
+    ahead = [one.forward for one in made if one.is_support]
     assert min(ahead) < 0.0 < max(ahead)
 
 
@@ -78,7 +78,7 @@ def test_a_model_with_skids_of_its_own_stands_on_its_lowest_points_and_one_with_
     def standing(*contacts: tuple[str, str, float, float]) -> list[str]:
         text = "".join(contact_xml(*one) for one in contacts)
         model = f"<fdm_config><ground_reactions>{text}</ground_reactions></fdm_config>".encode()
-        return [one.name for one in _model_contacts(model) if one.stands]
+        return [one.name for one in _model_contacts(model) if one.is_support]
 
     assert standing(*skids) == ["front", "rear"]
     assert standing(*skids, ("BOGEY", "wheel", 0.1, 0.3)) == ["wheel"]
@@ -89,7 +89,7 @@ def test_a_model_with_skids_of_its_own_stands_on_its_lowest_points_and_one_with_
 def test_an_aircraft_at_rest_stays_where_it_is(name: str, gear: Gear, slope: float) -> None:
     """On level ground, and on ground that is as high as a slope of 8 % makes it below the aircraft."""
     aircraft = load_aircraft(name)
-    stands = max(one.down for one in find_contacts(aircraft, gear) if one.stands)
+    stands = max(one.down for one in find_contacts(aircraft, gear) if one.is_support)
     fdm = Fdm(aircraft, gear=gear)
     fdm.release((*START, 300.0 + stands), (0.0, 0.0, 0.5), (0.0, 0.0, 0.0), terrain_amsl=300.0)
     terrain = fdm.properties.setter("position/terrain-elevation-asl-ft")

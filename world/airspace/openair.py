@@ -25,9 +25,9 @@ ARC_BEND = 1.0
 # Largest radius and width, nautical miles: half the circumference of the Earth.
 MAX_LENGTH_NMI = 10_800.0
 # Classes of airspace that require no clearance.
-_FREE_CLASSES = ("E", "F", "G", "UNC", "W", "GSEC", "FIR", "UIR", "FIS")
+_OPEN_CLASSES = ("E", "F", "G", "UNC", "W", "GSEC", "FIR", "UIR", "FIS")
 # Types of airspace that require no clearance either.
-_FREE_TYPES = ("", "NONE", "FIR", "UIR", "FIS", "GSEC", "ACCSEC", "TRZ", "VFRSEC", "VFRR")
+_OPEN_TYPES = ("", "NONE", "FIR", "UIR", "FIS", "GSEC", "ACCSEC", "TRZ", "VFRSEC", "VFRR")
 
 _Position = tuple[float, float]
 _COORDINATE = re.compile(r"(?P<lat>[\d:.]+)\s*(?P<ns>[NS])[\s,]*(?P<lon>[\d:.]+)\s*(?P<ew>[EW])", re.IGNORECASE)
@@ -117,11 +117,14 @@ def _clean_line(line: str) -> str:
 
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
-    """Return the location and entries of an airspace, as `openair_zones` yields them."""
+    """Return the location of an airspace in its file, and the entries of its zone or the reason why it is skipped.
+
+    Raises ScenarioError if the airspace does not have exactly one shape.
+    """
     name = "".join(character for character in block.name if character.isprintable())[:80]
     location = f"line {block.line}" + (f" ({name})" if name else "")
     label = ", ".join(part for part in (block.airspace_class, block.kind) if part)
-    if block.airspace_class in _FREE_CLASSES and block.kind in _FREE_TYPES:
+    if block.airspace_class in _OPEN_CLASSES and block.kind in _OPEN_TYPES:
         return location, f"class {label}, open to all"
     entries: dict[str, Any] = {"name": f"{name or f'line {block.line}'} ({label})"[:100]}
     entries |= published_entries(block.limits, f"{source}: {location}")
@@ -129,7 +132,7 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
         entries["times"] = block.times
     has_shape = [bool(block.corners), bool(block.airway), block.circle is not None]
     if not any((*has_shape, block.name, block.limits)):
-        return location, "without name, limits and shape"
+        return location, "without a name, limits or a shape"
     if sum(has_shape) != 1:
         allowed = "expected one shape: corners and arcs, a circle, or an airway"
         raise ScenarioError(f"{source}: {location}: {allowed}", file=source, allowed=allowed)

@@ -409,7 +409,7 @@ class ArduPlaneFromGround:
         ground.contacts = len(contacts)
         for index, contact in enumerate(contacts):
             ground.contact[index] = contact.forward, contact.right, contact.down
-            ground.is_support[index] = contact.stands
+            ground.is_support[index] = contact.is_support
         ground.turnover_speed = _TURNOVER_SPEED_RATIO * self.aircraft.stall_speed
         ground.stage = IN_AIR
         if self.ground_phases.take_off is not None:
@@ -523,7 +523,7 @@ def read_loiter_radius(loiter: Loiter) -> float:
 
 
 def _radius_growth(up: float) -> float:
-    """Return the factor by which a loiter is wider at an altitude (m AMSL).
+    """Return the factor by which a loiter is wider at an altitude (m AMSL) than at sea level.
 
     It is the square of the ratio of true to equivalent airspeed.
     """

@@ -202,12 +202,12 @@ def airspeed_target(
 ) -> float:
     """Return the target airspeed (equivalent, m/s): the commanded airspeed plus an increase for a minimum ground speed.
 
-    The shortfall of the ground speed along the heading is added to the measured airspeed. The increase is in whole m/s,
-    and is reduced only by more than a hysteresis (`Plane::calc_airspeed_errors`, `Plane::calc_gndspeed_undershoot`).
-    The result is within AIRSPEED_MIN and AIRSPEED_MAX.
+    The increase is the amount by which the ground speed along the heading is too low, rounded to whole m/s. It grows at
+    once, and drops only by the hysteresis or more (`Plane::calc_airspeed_errors`, `Plane::calc_gndspeed_undershoot`).
+    The result is limited to AIRSPEED_MIN and AIRSPEED_MAX.
 
     commanded_airspeed: equivalent, m/s.
-    target: the leg's end, with the minimum ground speed.
+    target: record of the leg's end point, which holds the minimum ground speed, m/s; 0 for none.
     """
     target_airspeed = commanded_airspeed
     if target.min_ground_speed > 0.0:

@@ -349,10 +349,15 @@ class SitlFlight(ProgramFlight):
         self._make_loop(self._ground_tick)
 
     def _set_unit_factors(self) -> None:
-        """Copy the factors from JSBSim's units to SI into the block, for the ticks."""
+        """Copy unit conversions from JSBSim into the workspace, for the compiled ticks.
+
+        These are the factors of the state's values, and of each output for positive and for other values.
+        """
         access = self.fdm.loop_access()
         self._work.state_factors = access.factors[0]
-        self._work.scale_above, self._work.scale_below = (tuple(scales) for scales in zip(*access.scales, strict=True))
+        self._work.scale_positive, self._work.scale_negative = (
+            tuple(scales) for scales in zip(*access.scales, strict=True)
+        )
 
     def _make_loop(self, tick: Tick) -> None:
         """Continue the flight over the terrain, with a compiled tick that records the track."""

@@ -119,15 +119,15 @@ def depth_bounds(
 
 
 @inner
-def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Record, length: float) -> float:
-    """Return an upper bound of a part's distance beyond zone z's outline, m.
+def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record, length: float) -> float:
+    """Return an upper bound (m) on how far part of a move is inside exclusion z, or outside inclusion z.
 
-    The bound uses the edges nearest to the part's ends.  The distance from an edge, or from a center, is greatest at an
-    end of a straight line.  An arc of less than a radian leaves its chord by at most an eighth of its curvature times
-    its length squared.
+    It is inf if the part turns by more than a radian.  The bound uses the edges nearest to the part's ends: on a
+    straight line, the distance from an edge, or from the centre of a circle, is greatest at an end.  An arc of less
+    than a radian deviates from its chord by at most curvature x length^2 / 8.
     """
     zone = records.zones[z]
-    bow: float = 0.125 * abs(move.curvature) * length * length
+    chord_deviation: float = 0.125 * abs(move.curvature) * length * length
     if abs(move.curvature) * length > 1.0:
         return math.inf
     if not zone.round:
@@ -139,9 +139,9 @@ def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Reco
                 distance_to_edge(edge, part.end_east, part.end_north),
             )
             min_distance = min(min_distance, max(start_distance, end_distance))
-        return min_distance + bow
+        return min_distance + chord_deviation
     if not zone.exclusion:
-        return float(max(part.outline_distance, part.end_outline_distance) + bow)
+        return float(max(part.outline_distance, part.end_outline_distance) + chord_deviation)
     step_e, step_n = part.end_east - part.east, part.end_north - part.north
     offset_e, offset_n = zone.centre_east - part.east, zone.centre_north - part.north
     length_square = step_e * step_e + step_n * step_n
@@ -150,7 +150,7 @@ def farthest_from_outline(records: ZoneRecords, z: int, move: Record, part: Reco
     )
     offset_e -= fraction * step_e
     offset_n -= fraction * step_n
-    return float(zone.radius - math.sqrt(offset_e * offset_e + offset_n * offset_n) + bow)
+    return float(zone.radius - math.sqrt(offset_e * offset_e + offset_n * offset_n) + chord_deviation)
 
 
 # How a path meets one zone.  depth: greatest distance beyond the zone's limit, m, negative if the path complies.  It is
@@ -361,7 +361,7 @@ def _bisect_move(
         is_certain = is_certain or _is_unknown(exclusion, part)
         if not is_certain:
             # Bound again with the nearest edges, which takes longer.
-            max_distance = farthest_from_outline(records, z, move, part, span)
+            max_distance = max_violation_bound(records, z, move, part, span)
             min_depth, max_depth = depth_bounds(exclusion, part, span, change, max_distance)
             is_certain = max_depth <= target_depth
         if is_certain:

@@ -172,7 +172,7 @@ class Returns:
     reserve: energy that has to be left, Wh.
     flown: True if the returns begin on a flown track, False for the planned path.
     jsbsim_differences: for each return flown again in JSBSim, its clearance minus the clearance of the point mass, m.
-    stands_in: True if ArduPlane's law stands in for an autopilot without a return law.
+    stands_in: True if ArduPlane's return is simulated because the autopilot has no return law.
     unjudged_parts: parts that are not judged.
     autoland: RTL_AUTOLAND; None for the mission of another autopilot.
     landings: the mission's landing sequences.

@@ -70,7 +70,7 @@ _ACTION_TEXTS = {
 }
 _UNJUDGED_PART_TEXTS: dict[UnjudgedPart, str] = {
     "terrain": "with TERRAIN_FOLLOW returns follow the terrain, which is not simulated",
-    "law": "the autopilot's own return is not simulated; ArduPlane's return stands in",
+    "law": "the autopilot's own return is not simulated; ArduPlane's return is used instead",
     "autoland": "mode AUTOLAND lands by a pattern of its own",
     "return path": "RTL_AUTOLAND 4 returns along the mission's return path",
     "landing": "the landing sequence begins with the landing itself",

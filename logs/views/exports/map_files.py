@@ -61,7 +61,7 @@ def plan_line(setup: FlightSetup) -> MapLine:
     >>> line.name, line.marks
     ('example plan', ('0 (item 1)', '1 (item 2)', '2 (item 3)'))
     """
-    points, items = setup.shown_waypoints, setup.route.items
+    points, items = setup.display_waypoints, setup.route.items
     lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
     marks = tuple(f"{k} (item {item})" if item >= 0 else str(k) for k, item in enumerate(items))
     return MapLine(f"{setup.scenario.name} plan", np.asarray(lat), np.asarray(lon), points[:, 2], marks)

@@ -148,7 +148,7 @@ def _start_entry(log: FlightLog) -> TimelineEntry:
 def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List the start of each leg with course, length, slope and airspeed; one entry for a whole loiter."""
     route = log.setup.route
-    points = log.setup.shown_waypoints
+    points = log.setup.display_waypoints
     courses, runs, slopes = leg_courses(points), leg_runs(points), leg_slopes(points)
     entries = []
     for group in _group_by_loiter(parts, route):

@@ -56,7 +56,7 @@ LEG_COLUMNS = (
 
 def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -> list[LegRow]:
     """List the legs of the route: planned shape and flown values."""
-    waypoints = setup.shown_waypoints
+    waypoints = setup.display_waypoints
     runs, courses, slopes = leg_runs(waypoints), np.degrees(leg_courses(waypoints)), np.degrees(leg_slopes(waypoints))
     turns = np.degrees(signed_turns(waypoints))
     heights_above_ground = ground_clearance(setup, track) if track is not None else None

@@ -351,7 +351,7 @@ def refly_lines(again: Reflight) -> list[str]:
 def trust_line(again: Reflight) -> str:
     """Describe in one line how well the model represents this aircraft."""
     model = again.setup.aircraft
-    model_text = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
+    model_text = f"{model}, used because no aircraft was named," if again.stands_in else model
     if not again.spreads:
         return f"Model and flight have no part in common: it is unknown how far {model_text} can be trusted"
     spread_texts = [

@@ -61,11 +61,11 @@ def test_the_landing_is_that_of_the_last_leg_and_its_wind() -> None:
 
 
 def test_pictures_show_the_ends_that_are_flown_on_the_ground() -> None:
-    heights = circuit(RAIL, STRIP).shown_waypoints[:, 2].tolist()
+    heights = circuit(RAIL, STRIP).display_waypoints[:, 2].tolist()
     assert heights == pytest.approx([0.0, 80.0, 70.0, 54.0, 0.0], abs=0.02)
     # The landing leg itself is level, and begins the flight where nothing else is flown.
     for launch, strip, ends in ((RAIL, None, (0.0, 54.0)), (None, STRIP, (60.0, 0.0)), (None, None, (60.0, 54.0))):
-        heights = circuit(launch, strip).shown_waypoints[:, 2].tolist()
+        heights = circuit(launch, strip).display_waypoints[:, 2].tolist()
         assert (heights[0], heights[-1]) == pytest.approx(ends, abs=0.02)
 
 

@@ -76,7 +76,7 @@ def make_workspace() -> Workspace:
     work.position_map = linear_map((0.0, 0.0, RADIUS), (0.0, RADIUS, 0.0), 0.01).record
     work.north_map = north_at(0.0).record
     work.pixel_map = linear_map((1.0, 1e-4, 0.0), (1.0, 0.0, 1e-4), 1e4).record
-    for factors in (work.state_factors, work.scale_above, work.scale_below):
+    for factors in (work.state_factors, work.scale_positive, work.scale_negative):
         for name in field_names(factors.dtype):
             factors[name] = 1.0
     work.timing.dt = 1.0 / 60.0

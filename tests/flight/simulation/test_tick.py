@@ -98,7 +98,7 @@ def test_views_of_one_field_do_not_reach_into_another(space: Workspace) -> None:
     space.readings[:] = 9.0
     assert all(space.record.state[name] == 0.0 for name in ("time", "wind_north", "wind_east", "wind_down"))
     space.output[:] = 9.0
-    assert all(value == 1.0 for value in space.record.scale_above.tolist())
+    assert all(value == 1.0 for value in space.record.scale_positive.tolist())
 
 
 def test_gains_are_the_aircrafts(space: Workspace) -> None:
@@ -373,7 +373,7 @@ def test_outputs_are_scaled_each_by_its_own_factor_above_and_below_zero(name: st
         space = make_workspace()
         space.record.wind.speed, space.record.wind.cos, space.record.wind.sin = 5.0, -0.6, 0.8
         space.record.air.gust_down, space.record.memory.trim_throttle = -0.5, 0.6
-        space.record.scale_above[name], space.record.scale_below[name] = above, below
+        space.record.scale_positive[name], space.record.scale_negative[name] = above, below
         read(space, roll=0.2, up=HEIGHT + 3.0, pitch_rate=0.1)
         planfly_tick(space.block, level_ground())
         return {key: float(space.record.output[key]) for key in field_names(OUTPUT)}

@@ -137,7 +137,10 @@ def test_by_px4s_law_returns_are_not_judged(hill: Path, capsys: pytest.CaptureFi
     assert "it returns: the pilot's RTL" in capsys.readouterr().out
     assert main([*asked, "px4", "--json", "px4.json"]) == 3
     out = capsys.readouterr().out
-    assert "not judged in full (the autopilot's own return is not simulated; ArduPlane's return stands in): all " in out
+    assert (
+        "not judged in full"
+        " (the autopilot's own return is not simulated; ArduPlane's return is used instead): all " in out
+    )
     assert "the return of PX4 is not simulated; ArduPlane's return is used instead" in out
     for words in ("FS_", "RTL_AUTOLAND", "it returns:", "it does not:"):
         assert words not in out

@@ -136,7 +136,7 @@ def test_colours_without_an_airspace_are_none(tmp_path: Path) -> None:
     path.write_text(f"{colours}{HEAD}{SQUARE}AC CTR\nSB 1,1,1\n", encoding="utf-8")
     found = read_zone_file(path, "z.openair")
     assert [zone.name for zone in found.zones] == ["LAKE (R)"]
-    assert found.notes == ["z.openair: 2 zones restrict no flight: without name, limits and shape"]
+    assert found.notes == ["z.openair: 2 zones restrict no flight: without a name, limits or a shape"]
     path.write_text(f"{colours}{HEAD}", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"line 5 \(LAKE\): expected one shape"):
         read_zone_file(path, "z.openair")

@@ -12,7 +12,7 @@ from logs.verdict.measures.zone_visits import (
     copy_move_part,
     depth_bounds,
     distances_outside_zone,
-    farthest_from_outline,
+    max_violation_bound,
     path_zones,
 )
 from tests.soak import scaled
@@ -281,7 +281,7 @@ def test_no_place_is_beyond_the_bounds(kind: str) -> None:
         moves: Records = np.array([row], MOVE)
         one, part = moves[0], whole(moves[0], records)
         rise = max(abs(one.climb), abs(one.climb + 2.0 * one.bend))
-        farthest = farthest_from_outline(records, 0, one, part, length)
+        farthest = max_violation_bound(records, 0, one, part, length)
         low, high = depth_bounds(kind == "exclusion", part, length, rise, farthest)
         depths = []
         for share in np.linspace(0.0, 1.0, 101):
@@ -298,7 +298,7 @@ def test_no_place_is_beyond_the_bounds(kind: str) -> None:
 def test_along_an_edge_the_bound_is_exact() -> None:
     records = zone_records([Zone("z", "exclusion", make_polygon([[(0.0, -900.0), (900.0, -900.0), (0.0, 5000.0)]]))])
     way: Records = np.array([move(5.0, 0.0, 0.0, course=0.0, length=2000.0)], MOVE)
-    assert farthest_from_outline(records, 0, way[0], whole(way[0], records), 2000.0) == pytest.approx(5.0)
+    assert max_violation_bound(records, 0, way[0], whole(way[0], records), 2000.0) == pytest.approx(5.0)
 
 
 def test_unknown_ground_tells_nothing_but_beside_the_shape() -> None:
@@ -354,7 +354,7 @@ def test_through_a_cylinder_the_bound_is_where_the_way_is_nearest_to_its_axis(le
     records = zone_records([Zone("z", "exclusion", Cylinder(70.0, -40.0, 300.0))])
     start = (70.0 - half - side, -40.0 - half + side, 0.0)
     way: Records = np.array([move(*start, course=45.0, length=length)], MOVE)
-    found = farthest_from_outline(records, 0, way[0], whole(way[0], records), length)
+    found = max_violation_bound(records, 0, way[0], whole(way[0], records), length)
     assert found == pytest.approx(farthest, abs=1e-9)
 
 
@@ -364,7 +364,7 @@ def test_an_arc_is_bounded_by_its_bow_up_to_a_radian(turned: float, bounded: boo
     records = zone_records([Zone("z", "inclusion", Cylinder(0.0, 0.0, 900.0))])
     way: Records = np.array([move(0.0, 0.0, 0.0, length=length, curvature=turned / length)], MOVE)
     part = whole(way[0], records)
-    found = farthest_from_outline(records, 0, way[0], part, length)
+    found = max_violation_bound(records, 0, way[0], part, length)
     bow = 0.125 * turned / length * length**2
     assert found == (
         pytest.approx(max(part.outline_distance, part.end_outline_distance) + bow) if bounded else math.inf

@@ -165,7 +165,7 @@ def test_the_trust_is_a_line_with_medians() -> None:
     scenario = with_wind(AGAIN.setup.scenario, 4.0, 0.0, "light")
     gusty = replace(AGAIN, setup=replace(AGAIN.setup, scenario=scenario))
     assert "in 4.0 m/s of wind, light turbulence, against" in trust_line(gusty)
-    assert "which stands in for an aircraft that is not named" in trust_line(replace(AGAIN, stands_in=True))
+    assert "used because no aircraft was named" in trust_line(replace(AGAIN, stands_in=True))
     assert "ended early: departure" in trust_line(replace(AGAIN, ended="departure"))
     assert "no part in common" in trust_line(replace(AGAIN, spreads=()))
 
