@@ -29,8 +29,8 @@ class NamedFlight:
     track: Track
 
 
-def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
-    """Return map and route of the first flight with both tracks, and both winds if they differ."""
+def make_two_flights_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
+    """Make the map of two flights: the route of the first, both tracks, and both winds if they differ."""
     first, _ = flights
     winds = [
         NamedWind(flight.setup.scenario.wind, flight.name, role) for flight, role in zip(flights, ROLES, strict=True)
@@ -51,10 +51,11 @@ def both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> MapChart:
     )
 
 
-def both_along(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
-    """Return altitude, height above ground, airspeed, bank, cross-track error and throttle of both over distance flown.
+def make_two_flights_chart(flights: tuple[NamedFlight, NamedFlight]) -> Chart:
+    """Make the chart of two flights over the distance flown, with a line for each flight in every panel.
 
-    Without terrain there is no panel of the height above ground.
+    The panels are altitude, height above ground (omitted without terrain), airspeed, bank, cross-track error and
+    throttle.
     """
     distances = [_distance_flown(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in distances), _POINTS)

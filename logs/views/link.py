@@ -40,6 +40,7 @@ def link_chart(setup: FlightSetup, along: LinkAlongPath) -> Chart:
     points = along.points
 
     def panel(title: str, unit: str, values: Floats, limits: tuple[tuple[str, float], ...] = ()) -> Panel:
+        """Return a panel with the flown values over time; limits: names and values of lines to draw."""
         return Panel(title, unit, (series("flown", "flown", along.time, values),), limits=limits)
 
     panels = (
@@ -62,9 +63,11 @@ def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapCh
         segments.append((quality, [*rows, *range(rows[-1] + 1, min(rows[-1] + 2, len(qualities)))]))
 
     def position(k: int) -> tuple[float, float]:
+        """Return east and north of point k, m."""
         return float(along.positions[k, 0]), float(along.positions[k, 1])
 
     def point_text(k: int) -> str:
+        """Describe the link margin at point k."""
         return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB over the fade margin"
 
     layers = path_layers(segments, _LOOKS, position, point_text)

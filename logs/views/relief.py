@@ -6,9 +6,9 @@ from world.arrays import Floats
 
 
 def relief(heights: Floats, pitch: float, span: float) -> Floats:
-    """Return the brightness, about 0.75 to 1.1 clipped at 1.
+    """Return the brightness of shaded relief, (rows, columns): 0.55 in shade to 1.0 in light from the north-west.
 
-    Unknown heights have the brightness of level ground.
+    Where heights are unknown (NaN), the ground is taken as level.
 
     heights: (rows, columns) m, rows from south to north.  pitch: distance between rows, m.  span: difference between
     lowest and highest height, m.
@@ -22,5 +22,6 @@ def relief(heights: Floats, pitch: float, span: float) -> Floats:
     # Exaggerate gentle terrain, so that its ridges show.
     gain = float(np.clip(600.0 / span, 0.5, 4.0))
     slope_e, slope_n = gain * up_east, gain * up_north
-    lit = (0.5 * slope_e - 0.5 * slope_n + 0.707) / np.sqrt(1.0 + slope_e**2 + slope_n**2)
-    return np.asarray(np.clip(0.96 + 0.42 * (lit - 0.707), 0.55, 1.0))
+    # Cosine of the angle between the ground's normal and a light 45 degrees high in the north-west.
+    light = (0.5 * slope_e - 0.5 * slope_n + 0.707) / np.sqrt(1.0 + slope_e**2 + slope_n**2)
+    return np.asarray(np.clip(0.96 + 0.42 * (light - 0.707), 0.55, 1.0))

@@ -21,7 +21,7 @@ from logs.verdict.measures.route_requirements import with_fence_zones
 from logs.verdict.rule_words import RULE_WORDS
 from logs.verdict.verdict import Verdict
 from logs.views.charts import shorten
-from logs.views.compare import ROLES, NamedFlight, both_along, both_on_map
+from logs.views.compare import ROLES, NamedFlight, make_two_flights_chart, make_two_flights_map
 from logs.views.failures import Failures
 from logs.views.figures import View, draw, view_json
 from logs.views.moments import flight_moments
@@ -329,8 +329,8 @@ def comparison_views(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, View
     """
     first, second = flights
     has_same_origin = first.setup.scenario.origin == second.setup.scenario.origin
-    views: dict[str, View] = {"compare-map": both_on_map(flights)} if has_same_origin else {}
-    return views | {"compare-profile": both_along(flights)}
+    views: dict[str, View] = {"compare-map": make_two_flights_map(flights)} if has_same_origin else {}
+    return views | {"compare-profile": make_two_flights_chart(flights)}
 
 
 def comparison_data(flights: tuple[NamedFlight, NamedFlight], views: Mapping[str, View]) -> dict[str, Any]:

@@ -62,7 +62,10 @@ class RuleRow:
 
 @dataclass(frozen=True, slots=True)
 class Badge:
-    """The verdict in one word.  state: "pass", "fail" or "open" (not judged in full)."""
+    """Verdict in one word, with a sign before it.
+
+    state: "pass", "fail", "open" (not judged in full) or "unjudged"; it sets the colour.
+    """
 
     state: str
     sign: str

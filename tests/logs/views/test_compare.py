@@ -10,7 +10,7 @@ from flight.simulation.setup import MissionStretch
 from logs.recording.example_log import example_log
 from logs.verdict.imported.flown_legs import flown_legs
 from logs.verdict.imported.model_comparison import compare_with_model
-from logs.views.compare import NamedFlight, both_along, both_on_map, refly_charts
+from logs.views.compare import NamedFlight, make_two_flights_chart, make_two_flights_map, refly_charts
 from logs.views.draw_map import draw_map
 from logs.views.drawing import draw_chart, png_bytes
 from tests.logs.views.report.report_data import make_setup, make_track
@@ -32,7 +32,7 @@ def line(axes: Any, label: str) -> Any:
 
 def test_the_map_has_both_tracks_and_no_line_that_joins_them() -> None:
     second = shorter()
-    axes = draw_map(both_on_map((FIRST, second))).axes[0]
+    axes = draw_map(make_two_flights_map((FIRST, second))).axes[0]
     for flight in (FIRST, second):
         drawn = line(axes, flight.name).get_xydata()
         np.testing.assert_array_equal(drawn, flight.track.position[:, :2])
@@ -47,7 +47,11 @@ def test_the_map_has_both_tracks_and_no_line_that_joins_them() -> None:
 
 def test_both_winds_are_told_where_they_differ() -> None:
     def notes(second: NamedFlight) -> list[str]:
-        return [text.get_text() for text in draw_map(both_on_map((FIRST, second))).texts if "wind" in text.get_text()]
+        return [
+            text.get_text()
+            for text in draw_map(make_two_flights_map((FIRST, second))).texts
+            if "wind" in text.get_text()
+        ]
 
     assert len(notes(shorter())) == 1
     other = replace(FIRST.setup, scenario=replace(FIRST.setup.scenario, wind=Wind(7.0, 1.0)))
@@ -57,7 +61,7 @@ def test_both_winds_are_told_where_they_differ() -> None:
 
 
 def test_panels_run_over_the_distance_flown_and_end_with_each_flight() -> None:
-    figure = draw_chart(both_along((FIRST, shorter())))
+    figure = draw_chart(make_two_flights_chart((FIRST, shorter())))
     height, above, airspeed, *_ = figure.axes
     assert len(figure.axes) == 6
     first, second = line(height, "first.mcap"), line(height, "second.mcap")
@@ -75,7 +79,7 @@ def test_panels_run_over_the_distance_flown_and_end_with_each_flight() -> None:
 def test_without_terrain_the_height_above_it_is_left_out() -> None:
     bare = make_setup(terrain={"kind": "none"}, threats=[])
     flight = replace(FIRST, setup=bare)
-    panels = draw_chart(both_along((flight, replace(flight, name="second.mcap")))).axes
+    panels = draw_chart(make_two_flights_chart((flight, replace(flight, name="second.mcap")))).axes
     titles = [axes.get_ylabel().split("\n")[0] for axes in panels]
     assert titles == ["altitude", "airspeed", "bank, right +", "cross-track,", "throttle"]
 
@@ -84,7 +88,7 @@ def test_a_small_cross_track_fills_its_panel() -> None:
     """7 cm to either side are seen: the panel ends at 7 cm and its 8 % of air, not at a metre."""
     swing = np.linspace(-0.07, 0.07, len(FIRST.track)).astype(np.float32)
     flight = replace(FIRST, track=replace(FIRST.track, cross_track=swing))
-    panels = draw_chart(both_along((flight, replace(flight, name="second.mcap")))).axes
+    panels = draw_chart(make_two_flights_chart((flight, replace(flight, name="second.mcap")))).axes
     (cross,) = [axes for axes in panels if axes.get_ylabel().startswith("cross-track")]
     assert cross.get_ylim() == pytest.approx((-0.07 - 0.0112, 0.07 + 0.0112), abs=1e-6)
 
