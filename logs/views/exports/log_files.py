@@ -214,7 +214,6 @@ def _make_topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
     wind, battery = track.wind[rows], _battery_values(log, rows)
 
     def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
-        """Return a topic of the ULog with a timestamp for each row; period: interval of its rows, s."""
         return _Topic(name, period, fields, {"timestamp": stamp, **values})
 
     topics = [
