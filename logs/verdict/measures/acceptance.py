@@ -1,7 +1,9 @@
 """Decide when a waypoint is reached, and how far from the legs a flight may be."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,13 +147,18 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 # both.  A step of a few metres in a level path is a cliff; a climb that begins a little early is within its height.
 
 
-def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
+def negligible_kink(
+    requirements: RouteRequirements, i: int, has_room: Callable[[int, int], bool] | None = None
+) -> float | None:
     """Return how far a flyable path without waypoint i passes from the waypoints that it omits, m, or None without one.
 
     The distance is the largest of all omitted waypoints.  The path omits the waypoint and up to `KINK_WAYPOINT_COUNT`
     - 1 of its neighbours, passes each of them within `KINK_FRACTION` of the corridor's half width, and has room for the
     turns at both ends of the gap.
+
+    has_room: `gap_has_room` of these requirements, cached; waypoints next to each other have most gaps in common.
     """
+    has_room = has_room or partial(gap_has_room, requirements)
     max_distance, is_circle = KINK_FRACTION * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
@@ -165,7 +172,7 @@ def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
                 distance <= max_distance
                 and has_length
                 and not is_circle[first : last + 1].any()
-                and _has_room(requirements, first, last)
+                and has_room(first, last)
             ):
                 return distance
     return None
@@ -184,7 +191,7 @@ def _distance_from_leg(point: Floats, leg: Floats) -> float:
     return math.hypot(east - fraction * leg_east, north - fraction * leg_north)
 
 
-def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
+def gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
     """Return True if the route without the waypoints first..last has room for the turns at the gap."""
     # Include two waypoints beyond the ends of the gap: their turns use part of the legs.
     start, end = max(0, first - 4), min(len(requirements.points), last + 5)

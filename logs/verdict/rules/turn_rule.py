@@ -1,13 +1,15 @@
 """The turn rule: judge whether each corner can be flown on its legs, and how it was flown."""
 
 import math
+from collections.abc import Callable
+from functools import cache, partial
 
 import numpy as np
 
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink
+from logs.verdict.measures.acceptance import acceptance_condition, gap_has_room, negligible_kink
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
@@ -38,17 +40,25 @@ def turn_findings(
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
     turnaround_waypoints = requirements.turnaround_waypoints()
+    has_room = cache(partial(gap_has_room, requirements))
     return [
-        _turn_finding(requirements, i, measure, aligned)
+        _turn_finding(requirements, i, measure, aligned, has_room)
         for i, measure in enumerate(measures, 1)
         if i not in turnaround_waypoints
     ]
 
 
 def _turn_finding(
-    requirements: RouteRequirements, i: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
+    requirements: RouteRequirements,
+    i: int,
+    measure: TurnMeasure | None,
+    aligned: AlignedTrack | None,
+    has_room: Callable[[int, int], bool],
 ) -> Finding:
-    """Judge the turn at waypoint i.  measure: the flown turn; None before a flight."""
+    """Judge the turn at waypoint i.  measure: the flown turn; None before a flight.
+
+    has_room: as for `negligible_kink`.
+    """
     planned_turn = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
     # A neighbouring turn that needs more than the whole leg is itself at fault: going straight on needs no length.
@@ -59,7 +69,7 @@ def _turn_finding(
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     faults, facts = [], [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
-        lateral = negligible_kink(requirements, i)
+        lateral = negligible_kink(requirements, i, has_room)
         if lateral is None:
             # The message states the turn and its limit.
             faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []
@@ -76,9 +86,8 @@ def _turn_finding(
         # If the aircraft's limits apply, the turn is judged by them; faults of the flown turn are only reported.
         facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
         faults += [] if requirements.envelope else flown_faults.values()
-        method = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
-        if angle is None:
-            method = "not flown"
+        fit = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
+        method = "not flown" if angle is None else fit
     ok: bool | None = not faults
     if measure is not None and not measure.is_complete:
         facts.append(_unflown_turn_text(requirements, i, measure, aligned))

@@ -6,6 +6,7 @@ import pytest
 
 from logs.verdict.measures.acceptance import negligible_kink, step_height
 from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.rules import turn_rule
 from tests.synthetic import make_setup
 
 
@@ -19,6 +20,14 @@ def zigzag(count: int, aside: float = 3.0) -> list[list[float]]:
 def test_eight_waypoints_in_a_row_are_left_out_at_most(count: int, found: bool) -> None:
     """One of nine that stays turns by less than a degree; two of ten that stay turn by 17 between 20 m of leg."""
     assert (negligible_kink(route_requirements(make_setup(zigzag(count))), 1) is not None) is found
+
+
+def test_each_gap_of_a_long_zigzag_is_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every gap of up to eight of 40 waypoints; each contains up to eight waypoints that ask for it."""
+    judged, judge = [], turn_rule.gap_has_room
+    monkeypatch.setattr(turn_rule, "gap_has_room", lambda *gap: judged.append(gap[1:]) or judge(*gap))
+    turn_rule.turn_findings(route_requirements(make_setup(zigzag(40))), None, geometric=True)
+    assert len(judged) == len(set(judged)) > 40
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.24, True), (0.26, False)])
