@@ -309,6 +309,7 @@ class MissionParts(NamedTuple):
     has_fence: True if the mission carries a fence.
     enables_fence: True if the mission switches the fence on (DO_FENCE_ENABLE).
     throttled_airspeeds: airspeeds that the mission commands together with a throttle, m/s.
+    follows_terrain: True if the mission has a position above terrain.
     moves_payload: True if the mission commands a gripper, a winch or a gimbal, after which PX4 may wait.
     wind: highest mean wind speed on the route, m/s.
     commands: commands of the mission's items.
@@ -323,6 +324,7 @@ class MissionParts(NamedTuple):
     has_fence: bool = False
     enables_fence: bool = False
     throttled_airspeeds: tuple[float, ...] = ()
+    follows_terrain: bool = False
     moves_payload: bool = False
     wind: float = 0.0
     commands: frozenset[int] = frozenset()
@@ -351,6 +353,8 @@ class MissionChecks:
     resets_jump_counters: True if the autopilot resets a jump's counter when it is exhausted: a later pass over the jump
         item jumps again.
     follows_terrain: True if the autopilot follows the ground along a leg to a height above terrain.
+    unites_inclusions: True if a position inside any inclusion of the mission's fence is inside the fence; False if a
+        position must be inside all of them.
     battery_failsafes: failsafes that leave the mission at a state of the battery.
     settings_not_flown: returns a sentence, without full stop, for each setting that changes the flight path of a
         mission but is not simulated.
@@ -361,6 +365,7 @@ class MissionChecks:
     feasibility: FeasibilityLimits = PX4_DEFAULT_LIMITS
     resets_jump_counters: bool = False
     follows_terrain: bool = True
+    unites_inclusions: bool = False
     battery_failsafes: tuple[BatteryFailsafe, ...] = ()
     settings_not_flown: Callable[[MissionParts], list[str]] = _all_settings_flown
     parameter_notes: tuple[str, ...] = ()

@@ -18,6 +18,7 @@ from flight.mission.items import (
     JUMPS,
     LANDINGS,
     OVER_HOME,
+    OVER_TERRAIN,
     PLACES,
     TAKEOFFS,
     Frame,
@@ -43,6 +44,11 @@ _MAX_COUNTED_JUMPS = 100
 _MAX_COUNTED_JUMPS_SMALL_BOARD = 15
 # Number of jumps in a row at which PX4 finds no item (`MAX_JUMP_ITERATION`).
 _MAX_JUMPS_IN_A_ROW = 10
+# Number of jumps in a row at which ArduPlane finds no item (`AP_Mission::get_next_cmd`, `max_loops`).
+_MAX_JUMPS_IN_A_ROW_ARDUPLANE = 65
+# Number of commands before a navigation item at which ArduPlane ends the mission: the first is run, and 255 more are
+# passed (`AP_Mission::advance_current_nav_cmd`, `max_loops`).
+_MAX_COMMANDS_IN_A_ROW_ARDUPLANE = 257
 
 # Simulated duration of a loiter without end, s; the mission ends there.
 ENDLESS_LOITER_TIME_S = 60.0
@@ -281,9 +287,16 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     elif len(jumps) > _MAX_COUNTED_JUMPS_SMALL_BOARD:
         board_text = f"a board with little memory passes over jumps beyond {_MAX_COUNTED_JUMPS_SMALL_BOARD}"
         builder.notes.arduplane.add(f"{len(jumps)} jumps: {board_text}")
-    if steps.long_jump_chain >= 0:
+    if _MAX_JUMPS_IN_A_ROW in steps.jump_chains:
         text = f"DO_JUMP: flown, where PX4 ends the mission at {_MAX_JUMPS_IN_A_ROW} jumps in a row"
-        builder.add_open_item(text, steps.long_jump_chain, arduplane=False)
+        builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW], arduplane=False)
+    if _MAX_JUMPS_IN_A_ROW_ARDUPLANE in steps.jump_chains:
+        text = f"DO_JUMP: flown, where ArduPlane ends the mission at {_MAX_JUMPS_IN_A_ROW_ARDUPLANE} jumps in a row"
+        builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW_ARDUPLANE], px4=False)
+    if steps.long_command_chain >= 0:
+        count_text = f"{_MAX_COMMANDS_IN_A_ROW_ARDUPLANE} commands without a waypoint"
+        text = f"{count_text}: flown, where ArduPlane ends the mission"
+        builder.add_open_item(text, steps.long_command_chain, px4=False)
     for gate in builder.gates:
         builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)
     unreached = [
@@ -336,7 +349,8 @@ class _Steps:
     passes_exhausted_jump: True if a jump is passed again after its last repeat.
     reached: numbers of the items reached, including jumps.
     endless: seq of the jump without end at which the iteration ended, -1 for none; such a jump is taken once.
-    long_jump_chain: seq of the jump at which PX4 finds no next item, -1 for none.
+    jump_chains: seq of the first jump that is the n-th in a row, by n, for the n at which an autopilot gives up.
+    long_command_chain: seq of the command at which ArduPlane ends the mission, -1 for none.
     """
 
     def __init__(self, mission: Mission, resets_jump_counters: bool) -> None:
@@ -351,7 +365,8 @@ class _Steps:
                 self.tags.setdefault(int(item.params[0]), k)
         self.jump_counts: dict[int, int] = {}
         self.reached: set[int] = set()
-        self.endless, self.long_jump_chain, self._step_count = -1, -1, 0
+        self.jump_chains: dict[int, int] = {}
+        self.endless, self.long_command_chain, self._step_count = -1, -1, 0
 
     def __iter__(self) -> Iterator[_Step]:
         """Iterate over the navigation items, counting jumps."""
@@ -361,6 +376,8 @@ class _Steps:
             index = self._next_item(index, counting=True)
             while index is not None and not is_navigation(self.items[index].command):
                 passed_indices.append(index)
+                if len(passed_indices) == _MAX_COMMANDS_IN_A_ROW_ARDUPLANE and self.long_command_chain < 0:
+                    self.long_command_chain = self.items[index].seq
                 index = self._next_item(index + 1, counting=True)
             leg_commands = self._commands_on_leg(passed_indices[0]) if passed_indices and index is not None else []
             self.reached |= {self.items[command].seq for command in leg_commands}
@@ -398,8 +415,8 @@ class _Steps:
                 return index
             target, repeats = self._jump_target(item), int(item.params[1])
             chain_length += 1
-            if counting and chain_length == _MAX_JUMPS_IN_A_ROW and self.long_jump_chain < 0:
-                self.long_jump_chain = item.seq
+            if counting and chain_length in (_MAX_JUMPS_IN_A_ROW, _MAX_JUMPS_IN_A_ROW_ARDUPLANE):
+                self.jump_chains.setdefault(chain_length, item.seq)
             if not counting and index == first_jump:
                 return None
             first_jump = index if first_jump < 0 else first_jump
@@ -620,6 +637,11 @@ class _ItineraryBuilder:
             message = f"{self.source}: item {item.seq}: {name} has no altitude: expected a number"
             raise MissionError(message, file=self.source, field="altitude", allowed="expected a number")
         self.takeoff = item
+        if item.frame in OVER_TERRAIN:
+            # `Plane::do_takeoff` subtracts home's altitude from the item's number, and `Plane::verify_takeoff` compares
+            # the result with the height over home.
+            text = f"{name} above terrain: flown as written, where ArduPlane takes its height for an altitude AMSL"
+            self.add_open_item(text, item.seq, px4=False)
         if is_vertical:
             self.add_open_item(f"{name}: not flown straight up", item.seq)
         home = self.first_home
@@ -702,6 +724,10 @@ class _ItineraryBuilder:
         self.has_ended = True
         if item.has_position:
             self.notes.add(f"{name}: {LANDING_NOTE}", item.seq)
+            if self.stops[-1].frame in OVER_TERRAIN or item.frame in OVER_TERRAIN:
+                # `AP_Landing::type_slope_setup_landing_glide_slope` compares the altitudes of both items.
+                text = f"{name} with an approach above terrain: its glide is not flown as ArduPlane does"
+                self.add_open_item(text, item.seq, px4=False)
             self.landing = self._make_stop(item)
             self.stops.append(replace(self.landing, alt=math.nan))
         else:

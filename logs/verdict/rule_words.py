@@ -45,7 +45,7 @@ class RuleWords:
     urgency: a headline names failures of a greater urgency first.
     phrase: makes the phrase of a failed finding in a headline.
     unjudged: names what was not judged in the headline of a flyable verdict; "" to omit it.
-    unjudged_unit: the unit in which the headline numbers findings that were not judged.
+    unjudged_unit: the unit, in the singular, in which the headline counts findings that were not judged.
     explains_unjudged: True if the summary states why the rule was not judged.
     is_warning: True if the rule's findings are warnings, which decide no verdict.
     """
@@ -58,7 +58,7 @@ class RuleWords:
     urgency: int = 0
     phrase: HeadlinePhrase = name_excess
     unjudged: str = ""
-    unjudged_unit: str = "legs"
+    unjudged_unit: str = "leg"
     explains_unjudged: bool = False
     is_warning: bool = False
 
@@ -138,7 +138,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             margin=Margin("depth", "m", 10.0),
             phrase=name_zone,
             unjudged="airspace",
-            unjudged_unit="zones",
+            unjudged_unit="zone",
             explains_unjudged=True,
         ),
         RuleWords(

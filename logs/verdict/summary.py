@@ -135,9 +135,9 @@ def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
     unjudged_count = sum(finding.ok is None for finding in rule_findings)
     if not unjudged_count:
         return ""
-    return f"{rule.unjudged} not judged" + (
-        "" if unjudged_count == len(rule_findings) else f" on {unjudged_count} {rule.unjudged_unit}"
-    )
+    if unjudged_count == len(rule_findings):
+        return f"{rule.unjudged} not judged"
+    return f"{rule.unjudged} not judged on {unjudged_count} {rule.unjudged_unit}{'s' if unjudged_count > 1 else ''}"
 
 
 def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:

@@ -100,6 +100,8 @@ def test_every_setting_that_leaves_the_verdict_open_stands_on_its_page() -> None
         (r"SERVO\d+_FUNCTION", "SERVOn_FUNCTION"),
         (r"FW_(RR|PR)_(?:P|I|D|FF)", r"FW_\1_*"),
         (r"CA_SV_CS\d_TYPE", "CA_SV_CSn_TYPE"),
+        (r"CA_(SV|R)\d+_SLEW", r"CA_\1n_SLEW"),
+        (r"[A-Z0-9_]+_FUNC\d+", "PWM_MAIN_FUNCn"),
     )
 
     def group_of(name: str) -> str:

@@ -72,6 +72,7 @@ _LEG_FIELDS = (
         "rtl_climb_complete",
         "terrain_leg",
         "sloped_leg",
+        "from_item_height",
     ),
 )
 
@@ -84,6 +85,8 @@ _NEUTRAL = {
     "Q_ENABLE": 0.0,
     "RUDDER_ONLY": 0.0,
 }
+# Bit of FENCE_OPTIONS: a position inside any inclusion is inside the fence (`AC_PolyFence_loader::breached`).
+_UNION_OF_INCLUSIONS_BIT = 1 << 1
 
 
 @dataclass(frozen=True)
@@ -171,24 +174,29 @@ class ArduPlane(Autopilot):
 
     @property
     def checks(self) -> MissionChecks:
-        """Checks by ArduPlane's list of commands, from TERRAIN_ENABLE, MIS_OPTIONS and BATT_*."""
+        """Checks by ArduPlane's list of commands, from TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*."""
         parameters = self.parameters
         return MissionChecks(
             dialect="ardupilot",
             resets_jump_counters=parameters.resets_jump_counters,
             follows_terrain=parameters.terrain_enable == 1.0,
+            unites_inclusions=bool(int(self._stated_values.get("FENCE_OPTIONS", 0.0)) & _UNION_OF_INCLUSIONS_BIT),
             battery_failsafes=battery_failsafes(parameters),
             settings_not_flown=partial(self.settings_not_flown, by_program=False),
             parameter_notes=(*parameters.notes, *_mission_notes(parameters)),
         )
+
+    @property
+    def _stated_values(self) -> dict[str, float]:
+        """Values of all parameters of the set, by name."""
+        return {name: value for name, value, _ in self.parameters.values}
 
     def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
         """Return `_NEUTRAL` settings that are not neutral, an own fence, RTL over terrain, and others.
 
         The others are those of `flight.autopilots.arduplane.open_settings`.
         """
-        parameters = self.parameters
-        values = {name: value for name, value, _ in parameters.values}
+        parameters, values = self.parameters, self._stated_values
         texts = [
             f"{name} {values[name]:g} affects the flight, but is not simulated"
             for name, neutral in _NEUTRAL.items()

@@ -431,6 +431,7 @@ def _begin_first_leg(
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+    memory.from_item_height = 0.0
     waypoints[ground.leg + 1].without_crosstrack = True
     # Advance to the first piece of that leg.
     while pieces[guidance.piece].leg < ground.leg and guidance.piece + 1 < pieces.shape[0]:

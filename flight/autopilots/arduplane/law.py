@@ -40,6 +40,7 @@ ARDUPILOT_MEMORY = record_dtype(
     "from_east",  # m, start of the leg's line (`prev_WP_loc`)
     "from_north",
     "from_up",  # m, start of its altitude slope
+    "from_item_height",  # m, height above terrain of the item at its start; 0 if that is no item above terrain
     "cross_track_integrator",  # rad, L1's cross-track integrator (`_L1_xtrack_i`)
     ("reached_loiter_target", np.bool_),  # True while the loiter is followed, not just approached (`_WPcircle`)
     ("loiter_started", np.bool_),  # True once this loiter was captured (`loiter.start_time_ms` is set)
@@ -196,6 +197,11 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
         return end_altitude
     remaining_fraction = 1.0 - max(0.0, progress)
     slope_altitude: float = end_altitude - altitude_change * remaining_fraction
+    if memory.from_item_height != 0.0:
+        # `Plane::constrain_target_altitude_location` compares the numbers of both ends: it takes the height above
+        # terrain of an item for an altitude AMSL, so that a descent from there is usually a step.
+        lower, upper = min(memory.from_item_height, end_altitude), max(memory.from_item_height, end_altitude)
+        return min(upper, max(lower, slope_altitude))
     current_altitude: float = estimated.up
     slope_threshold = parameters.altitude_slope_threshold
     if slope_threshold <= 0.0 or altitude_change <= 0.0 or current_altitude <= slope_altitude + slope_threshold:

@@ -214,12 +214,15 @@ def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) 
     memory.loiter_started, memory.loiter_complete, memory.reached_target_altitude = False, False, False
     memory.loiter_time, memory.loiter_angle_sum, memory.exit_wait_angle, memory.next_sum_lap = 0.0, 0.0, 0.0, 0.0
     memory.from_up = start.up
+    memory.from_item_height = start.above_ground if start.follows_terrain else 0.0
     memory.from_east, memory.from_north = target_position(start)
     if start.loiter_radius != 0.0 and start.exits_on_tangent:
         memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+        memory.from_item_height = 0.0
     target_e, target_n = target_position(target)
     if not target.is_rtl and is_past_finish_line(estimated, memory.from_east, memory.from_north, target_e, target_n):
         memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
+        memory.from_item_height = 0.0
 
 
 @inner

@@ -49,6 +49,8 @@ _LANDING = Phase.LANDING
 OPEN_SETTINGS = {
     # `Plane::stabilize_pitch_get_pitch_out` raises the pitch demand with the throttle.
     "KFF_THR2PTCH": OpenSetting(_FLIGHT, by_program=True),
+    # `Plane::stabilize_yaw` steers by the rudder below this height; lower values concern take-off and landing alone.
+    "GROUND_STEER_ALT": OpenSetting(_FLIGHT, 0.0, 20.0, by_program=True),
     # `Plane::throttle_watt_limiter` and, in 4.7, `FWD_BATT_CMP::apply_min_max` reduce the throttle.
     "BATT_WATT_MAX": OpenSetting(_FLIGHT),
     "FWD_BAT_THR_CUT": OpenSetting(_FLIGHT),
@@ -131,6 +133,19 @@ _ITEMS_FOR_ARMING = {
     1 << 3: C.NAV_TAKEOFF,
     1 << 6: C.NAV_RETURN_TO_LAUNCH,
 }
+# Limits without which ArduPlane does not arm (`AP_Arming_Plane::pre_arm_checks`): lowest and highest value.
+_LIMITS_FOR_ARMING = {
+    "ROLL_LIMIT_DEG": (3.0, math.inf),
+    "PTCH_LIM_MAX_DEG": (3.0, math.inf),
+    "PTCH_LIM_MIN_DEG": (-math.inf, -3.0),
+    "AIRSPEED_MIN": (5.0, math.inf),
+}
+# Marks with which ArduPlane does not arm if RTL_AUTOLAND is 0 (`AP_Arming_Plane::mission_checks`).
+_MARKS_OF_AUTOLAND = (C.DO_LAND_START, C.DO_RETURN_PATH_START)
+# Largest TERRAIN_SPACING whose grid follows the ground as the elevation data do, m: ArduPlane's default.
+_MAX_TERRAIN_SPACING_M = 100.0
+# Number of outputs without SERVO_32_ENABLE.
+_BASE_OUTPUT_COUNT = 16
 # Servo functions of mixed surfaces: differential spoilers, elevons.
 _ELEVON_FUNCTIONS = (16.0, 17.0, 86.0, 87.0, 77.0, 78.0)
 # Servo functions by the part that they move: aileron, flaperons; elevator, V-tails; throttles.
@@ -183,8 +198,14 @@ def _describe_others(
     """Describe settings that depend on one another, on the mission or on the aircraft."""
     yield from _describe_airspeed_sensor(values)
     yield from _describe_estimate(values)
-    yield from _describe_arming(values, mission)
+    yield from _describe_arming(parameters, values, mission)
     yield from _describe_outputs(parameters, values)
+    if mission.follows_terrain and parameters.terrain_spacing > _MAX_TERRAIN_SPACING_M:
+        # `AP_Terrain::height_amsl` interpolates between points of that spacing.
+        yield (
+            f"TERRAIN_SPACING {parameters.terrain_spacing:g} follows a coarser ground than the elevation data,"
+            " which is not simulated"
+        )
     yield from _describe_rate_gains(parameters, mission.aircraft)
     # `Plane::set_servos_flaps` compares the demanded airspeed in whole m/s, which only a landing demands below the
     # minimum.
@@ -261,11 +282,21 @@ def _describe_estimate(values: Mapping[str, float]) -> Iterator[str]:
         yield f"EK3_SRC1_POSZ {height_source:g} uses neither barometer nor GPS for the altitude, which is not simulated"
 
 
-def _describe_arming(values: Mapping[str, float], mission: MissionParts) -> Iterator[str]:
-    """Describe an item that the mission lacks, and without which ArduPlane does not arm."""
+def _describe_arming(
+    parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
+) -> Iterator[str]:
+    """Describe missing items, marks and limits with which ArduPlane does not arm."""
     # 4.7 has ARMING_SKIPCHK for ARMING_CHECK.
-    if values["ARMING_CHECK"] == 0.0 or values["ARMING_SKIPCHK"] != 0.0:
+    if values["ARMING_CHECK"] == 0.0 or values["ARMING_SKIPCHK"] != 0.0 or values["ARMING_REQUIRE"] == 0.0:
         return
+    for name, (lowest, highest) in _LIMITS_FOR_ARMING.items():
+        if not lowest <= values[name] <= highest:
+            limit_text = f"at least {lowest:g}" if math.isinf(highest) else f"at most {highest:g}"
+            yield f"{name} {values[name]:g} prevents arming, which needs {limit_text}"
+    if parameters.by_origin("file").get("RTL_AUTOLAND") == 0.0:
+        for mark in _MARKS_OF_AUTOLAND:
+            if mark in mission.commands:
+                yield f"RTL_AUTOLAND 0 prevents arming with {mark.name} in the mission"
     for bit, command in _ITEMS_FOR_ARMING.items():
         if int(values["ARMING_MIS_ITEMS"]) & bit and command not in mission.commands:
             yield f"ARMING_MIS_ITEMS {values['ARMING_MIS_ITEMS']:g} prevents arming without {command.name}"
@@ -275,10 +306,13 @@ def _describe_outputs(parameters: ArduPilotParameters, values: Mapping[str, floa
     """Describe outputs that move no ailerons, no elevator or no motor."""
     if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
         return
-    functions = {values[f"SERVO{output}_FUNCTION"] for output in range(1, 33)}
+    count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
+    pins = int(values["SERVO_GPIO_MASK"])
+    functions = {values[f"SERVO{output}_FUNCTION"] for output in range(1, count + 1) if not pins & 1 << (output - 1)}
+    names = f"SERVO1_FUNCTION to SERVO{count}_FUNCTION" + (f" without SERVO_GPIO_MASK {pins}" if pins else "")
     for part, moving in _FUNCTIONS_BY_PART.items():
         if functions.isdisjoint(moving):
-            yield f"SERVO1_FUNCTION to SERVO32_FUNCTION move no {part}, which is not simulated"
+            yield f"{names} move no {part}, which is not simulated"
 
 
 def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:

@@ -197,7 +197,8 @@ _WHEN_STATED = {
     "INS_ENABLE_MASK": 127.0,
     # Arming and outputs.
     **dict.fromkeys(("ARMING_MIS_ITEMS", "ARMING_SKIPCHK", "MIXING_OFFSET"), 0.0),
-    "ARMING_CHECK": 1.0,
+    **dict.fromkeys(("ARMING_CHECK", "ARMING_REQUIRE", "FENCE_OPTIONS"), 1.0),
+    **dict.fromkeys(("GROUND_STEER_ALT", "SERVO_32_ENABLE", "SERVO_GPIO_MASK"), 0.0),
     "MIXING_GAIN": 0.5,
     **{f"SERVO{output}_FUNCTION": 0.0 for output in range(5, 33)},
     "SERVO1_FUNCTION": 4.0,

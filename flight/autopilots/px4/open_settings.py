@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from aircraft.catalog import Aircraft
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.parameter_set import AIRCRAFT_FILE
-from flight.autopilots.px4.parameters import Px4Parameters
+from flight.autopilots.px4.parameters import OUTPUT_FUNCTION_NAMES, SLEW_NAMES, Px4Parameters
 from flight.autopilots.rate_loop import RateGains, rate_gains_fault
 
 # Bits of EKF2_GPS_CTRL: position and altitude.
@@ -28,6 +28,8 @@ _SURFACES_BY_PART = {
 }
 # CA_AIRFRAME of a fixed wing.
 _FIXED_WING = 1.0
+# First and last output function of each part.
+_OUTPUT_FUNCTIONS_BY_PART = {"motor": (101.0, 112.0), "surface": (201.0, 208.0)}
 # ArduPlane's gains of an aircraft that PX4 has under another name.  ArduPlane's give degrees, of 45, per degree a
 # second, PX4's fractions of the throw per radian a second; both apply at cruise speed.
 _GAIN_NAMES = {
@@ -49,6 +51,8 @@ def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None,
     """
     yield from _describe_estimate(parameters)
     yield from _describe_outputs(parameters)
+    yield from _describe_slew_rates(parameters)
+    yield from _describe_connections(parameters)
     if not by_program:
         yield from _describe_rate_gains(parameters, aircraft)
 
@@ -77,6 +81,25 @@ def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
         for part, types in _SURFACES_BY_PART.items():
             if {stated[name] for name in names}.isdisjoint(types):
                 yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
+
+
+def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
+    """Describe outputs that move slowly: `ControlAllocation::applySlewRateLimit`, s for the whole range."""
+    stated = parameters.by_origin("file")
+    for name in SLEW_NAMES:
+        if (value := stated.get(name, 0.0)) > 0.0:
+            yield f"{name} {value:g} slows an output, which is not simulated"
+
+
+def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
+    """Describe outputs of the file of which none is a motor, or none a surface."""
+    stated = parameters.by_origin("file")
+    functions = {stated[name] for name in OUTPUT_FUNCTION_NAMES if name in stated}
+    if not functions:
+        return
+    for part, (first, last) in _OUTPUT_FUNCTIONS_BY_PART.items():
+        if not any(first <= function <= last for function in functions):
+            yield f"the output functions (PWM_MAIN_FUNC1 and others) connect no {part}, which is not simulated"
 
 
 def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -> Iterator[str]:

@@ -148,6 +148,26 @@ FROM_ARDUPILOT = {
     "TECS_SINK_MIN": ("FW_T_SINK_MIN", 1.0),
     "TECS_SINK_MAX": ("FW_T_SINK_MAX", 1.0),
 }
+# Slew rates of servos and motors, s for the whole range.
+SLEW_NAMES = (*(f"CA_SV{servo}_SLEW" for servo in range(8)), *(f"CA_R{rotor}_SLEW" for rotor in range(12)))
+# Drivers of outputs with the number of their outputs.
+_OUTPUT_COUNT_BY_DRIVER = {
+    "PWM_MAIN": 14,
+    "PWM_AUX": 11,
+    "PCA9685": 16,
+    "UAVCAN_EC": 8,
+    "UAVCAN_SV": 8,
+    "HIL_ACT": 16,
+    "SIM_GZ_EC": 8,
+    "SIM_GZ_SV": 8,
+    "TAP_ESC": 8,
+    "VOXL_ESC": 4,
+    "VOXL2_IO": 4,
+}
+# Functions of the outputs: motors, surfaces, others, or 0 for none.
+OUTPUT_FUNCTION_NAMES = tuple(
+    f"{driver}_FUNC{output}" for driver, count in _OUTPUT_COUNT_BY_DRIVER.items() for output in range(1, count + 1)
+)
 # Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
@@ -183,6 +203,8 @@ _WHEN_STATED = {
     # Surfaces and motors.
     **dict.fromkeys(("CA_AIRFRAME", "CA_ROTOR_COUNT", "CA_SV_CS_COUNT"), 0.0),
     **{f"CA_SV_CS{surface}_TYPE": 0.0 for surface in range(8)},
+    **dict.fromkeys(SLEW_NAMES, 0.0),
+    **dict.fromkeys(OUTPUT_FUNCTION_NAMES, 0.0),
     "NAV_MIN_GND_DIST": -1.0,
 }
 TABLE = ParameterTable(

@@ -20,7 +20,7 @@ from aircraft.path_limits import (
     turn_radius_between,
 )
 from flight.guidance.path import FlyByPath, path_polyline
-from flight.mission.fences import fence_zones
+from flight.mission.fences import fence_zones, unite_inclusions
 from flight.mission.ground_ways import GroundPhases
 from flight.mission.route import Route
 from flight.mission.surveys import Survey, camera_spacing, find_surveys
@@ -93,6 +93,8 @@ def judged_airspace(setup: FlightSetup) -> Airspace:
     fence_fault, mission_zones = "", tuple[Zone, ...]()
     try:
         mission_zones = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
+        if setup.autopilot.checks.unites_inclusions:
+            mission_zones = unite_inclusions(mission_zones)
     except MissionError as error:
         fence_fault = str(error)
     zones = (*setup.scenario.zones, *mission_zones) if mission_zones else setup.scenario.zones

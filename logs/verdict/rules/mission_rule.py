@@ -277,6 +277,7 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
             for item in items
             if item.command == C.DO_CHANGE_SPEED and item.params[0] == 0.0 and min(item.params[1:3]) > 0.0
         ),
+        follows_terrain=any(item.frame in OVER_TERRAIN and item.has_position for item in items),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
         wind=setup.scenario.wind.max_speed_at(setup.route.waypoints[:, 2]),
         commands=frozenset(commands),
@@ -467,6 +468,9 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
+        return
+    if setup.autopilot.checks.unites_inclusions:
+        # Rule `zones` judges the flight against the union.
         return
     origin, route = setup.scenario.origin, setup.route
     for point, item in zip(route.waypoints, route.items, strict=True):

@@ -229,6 +229,21 @@ def test_long_missions_walk_in_linear_time() -> None:
     assert len(stops) == 9000
 
 
+@pytest.mark.parametrize(("frame", "is_open"), [(3, False), (10, True)])
+def test_arduplane_takes_the_height_of_a_take_off_above_terrain_for_an_altitude(frame: int, is_open: bool) -> None:
+    """`Plane::do_takeoff` subtracts home's altitude from the number of the item."""
+    stops = make_itinerary(mission(wp(0, 300, 60, command=22, frame=frame), wp(0, 900), wp(0, 1800)))
+    assert [one.item for one in stops.open_items] == [1] * is_open
+    assert stops.px4_open_items == ()
+
+
+@pytest.mark.parametrize(("frames", "is_open"), [((3, 3), False), ((10, 3), True), ((3, 10), True)])
+def test_a_glide_from_or_to_an_item_above_terrain_is_open(frames: tuple[int, int], is_open: bool) -> None:
+    stops = make_itinerary(mission(wp(0, 0), wp(0, 900, frame=frames[0]), wp(0, 1800, 0, command=21, frame=frames[1])))
+    assert [one.item for one in stops.open_items] == [3] * is_open
+    assert stops.px4_open_items == ()
+
+
 def test_a_vertical_take_off_is_over_home_and_its_place_is_not_flown_to() -> None:
     """As ArduPlane does it: it climbs where it stands, and a fixed wing of it passes the item over."""
     flown = route(wp(0, 700, 80, command=84), wp(900, 700))

@@ -165,3 +165,22 @@ def test_a_home_that_is_set_counts_for_the_altitudes_and_the_return_behind_it() 
     here = route(wp(0, 0), wp(0, 900), "2 179 1 0 0 0 0 0 0", wp(900, 900))
     assert [one.item for one in here.open_items] == [3]
     assert route("2 179 1 0 0 0 0 0 0", wp(0, 0), wp(0, 900)).open_items == ()
+
+
+@pytest.mark.parametrize(("jumps", "open_item"), [(63, None), (64, 2)])
+def test_arduplane_ends_a_mission_at_65_jumps_in_a_row(jumps: int, open_item: int | None) -> None:
+    """`AP_Mission::get_next_cmd`: the 65th jump item ends the search; after 64 repeats the item is read once more."""
+    read = mission(wp(0, 0), f"0 177 2 {jumps} 0 0 0 0 0", wp(0, 900))
+    # The jump leads to itself; it is passed for the last time after its repeats.
+    flown = make_itinerary(read)
+    counted = [one for one in flown.open_items if "jumps in a row" in one.text]
+    assert [one.item for one in counted] == ([] if open_item is None else [open_item])
+
+
+@pytest.mark.parametrize(("repeats", "open_item"), [(255, None), (256, 2)])
+def test_arduplane_ends_a_mission_at_257_commands_without_a_waypoint(repeats: int, open_item: int | None) -> None:
+    """`AP_Mission::advance_current_nav_cmd`: the first command is run, and 255 more are passed."""
+    read = mission(wp(0, 0), "0 206 50 0 0 0 0 0 0", f"0 177 2 {repeats} 0 0 0 0 0", wp(0, 900))
+    flown = make_itinerary(read)
+    counted = [one for one in flown.open_items if "commands without a waypoint" in one.text]
+    assert [one.item for one in counted] == ([] if open_item is None else [open_item])

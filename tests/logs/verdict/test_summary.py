@@ -66,7 +66,7 @@ def test_terrain_that_was_not_judged_is_named_where_all_else_passes() -> None:
     known = make_finding("clearance", leg(0), ok=True, reason="")
     unknown = make_finding("clearance", leg(1), ok=None, reason="")
     assert headline([known], True) == "flyable"
-    assert headline([known, unknown], True) == "flyable; terrain not judged on 1 legs"
+    assert headline([known, unknown], True) == "flyable; terrain not judged on 1 leg"
     assert headline([unknown], True) == "flyable; terrain not judged"
 
 

@@ -127,3 +127,26 @@ def test_a_leg_begins_at_the_height_of_its_waypoint_above_the_ground_there(
     # The waypoint is at 500 m, the ground at 300 m.
     assert (own.terrain_leg, own.from_height_above_terrain) == (1, 200.0)
     assert own.altitude_offset == pytest.approx(offset)
+
+
+@pytest.mark.parametrize(
+    ("from_up", "item_height", "to_up", "expected"),
+    [
+        # From 250 m above ground of 526 m down to 421 m AMSL: no more than 421, from the first moment.
+        (776.0, 250.0, 421.0, 421.0),
+        # A climb from 50 m above ground of 300 m: the slope, halfway up.
+        (350.0, 50.0, 450.0, 400.0),
+        # By the sea, 120 m above ground of 5 m down to 60 m: the slope from 120 m on.
+        (125.0, 120.0, 60.0, 92.5),
+        # From an item that is not above terrain.
+        (776.0, 0.0, 421.0, 598.5),
+    ],
+)
+def test_a_leg_from_an_item_above_terrain_compares_its_height_with_an_altitude(
+    from_up: float, item_height: float, to_up: float, expected: float
+) -> None:
+    """`Plane::constrain_target_altitude_location` reads the numbers of both ends, whatever their frames."""
+    own = memory(from_up=from_up, from_item_height=item_height)
+    (b,) = waypoints((0, 1000, to_up))
+    update_height_demand(flying(0.0, 500.0, expected), b, parameters(), own, DT)
+    assert own.altitude_demand_in == pytest.approx(expected)

@@ -121,6 +121,7 @@ def test_arduplanes_defaults_leave_nothing_open_stated_or_not() -> None:
         ("CHUTE_CRT_SINK 8", IN_THE_AIR),
         ("ICE_IDLE_PCT 12", IN_THE_AIR),
         ("ICE_IDLE_RPM 0", IN_THE_AIR),
+        ("GROUND_STEER_ALT 120", IN_THE_AIR),
         ("TKOFF_OPTIONS 1", FROM_GROUND),
         ("TKOFF_ACCEL_CNT 2", FROM_GROUND),
         ("TKOFF_TDRAG_ELEV 20", FROM_GROUND),
@@ -228,10 +229,24 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("ARMING_MIS_ITEMS 64", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_CHECK 0", ""),
         ("ARMING_MIS_ITEMS 8\nARMING_SKIPCHK -1", ""),
+        ("ARMING_MIS_ITEMS 8\nARMING_REQUIRE 0", ""),
+        # `AP_Arming_Plane::pre_arm_checks`.
+        ("PTCH_LIM_MIN_DEG -2.9", "PTCH_LIM_MIN_DEG -2.9 prevents arming, which needs at most -3"),
+        ("PTCH_LIM_MIN_DEG -3", ""),
+        ("PTCH_LIM_MAX_DEG 2.9", "PTCH_LIM_MAX_DEG 2.9 prevents arming, which needs at least 3"),
+        ("PTCH_LIM_MAX_DEG 3", ""),
+        ("AIRSPEED_MIN 4.9", "AIRSPEED_MIN 4.9 prevents arming, which needs at least 5"),
+        ("AIRSPEED_MIN 5", ""),
+        ("AIRSPEED_MIN 4.9\nARMING_CHECK 0", ""),
         # Outputs: elevons on 77 and 78, a V-tail on 79 and 80, two motors on 73 and 74.
-        ("SERVO1_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no ailerons"),
-        ("SERVO2_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no elevator"),
-        ("SERVO3_FUNCTION 0", "SERVO1_FUNCTION to SERVO32_FUNCTION move no motor"),
+        ("SERVO1_FUNCTION 0", "SERVO1_FUNCTION to SERVO16_FUNCTION move no ailerons"),
+        ("SERVO2_FUNCTION 0", "SERVO1_FUNCTION to SERVO16_FUNCTION move no elevator"),
+        ("SERVO3_FUNCTION 0", "SERVO1_FUNCTION to SERVO16_FUNCTION move no motor"),
+        # Outputs above 16 need SERVO_32_ENABLE; a bit of SERVO_GPIO_MASK makes output 3 a pin.
+        ("SERVO1_FUNCTION 0\nSERVO17_FUNCTION 4", "SERVO1_FUNCTION to SERVO16_FUNCTION move no ailerons"),
+        ("SERVO1_FUNCTION 0\nSERVO17_FUNCTION 4\nSERVO_32_ENABLE 1", ""),
+        ("SERVO_GPIO_MASK 4", "SERVO1_FUNCTION to SERVO16_FUNCTION without SERVO_GPIO_MASK 4 move no motor"),
+        ("SERVO_GPIO_MASK 16", ""),
         ("SERVO1_FUNCTION 77\nSERVO2_FUNCTION 78\nSERVO4_FUNCTION 0", ""),
         ("SERVO2_FUNCTION 79\nSERVO4_FUNCTION 80", ""),
         ("SERVO1_FUNCTION 0\nSERVO3_FUNCTION 73\nSERVO5_FUNCTION 74\nSERVO9_FUNCTION 4", ""),
@@ -241,6 +256,22 @@ def test_what_leaves_no_airspeed_position_or_control(text: str, name: str) -> No
     mission = IN_THE_AIR._replace(commands=frozenset({16, 20}))
     assert len(said(text, mission)) == bool(name)
     assert all(one.startswith(name) for one in said(text, mission))
+
+
+def test_a_coarse_grid_of_the_ground_matters_above_terrain() -> None:
+    over_terrain = IN_THE_AIR._replace(follows_terrain=True)
+    assert said("TERRAIN_SPACING 101", over_terrain)[0].startswith("TERRAIN_SPACING 101 follows a coarser ground")
+    assert said("TERRAIN_SPACING 100", over_terrain) == said("TERRAIN_SPACING 2000", IN_THE_AIR) == []
+
+
+@pytest.mark.parametrize("mark", [189, 188])
+def test_landing_marks_without_a_landing_prevent_arming(mark: int) -> None:
+    """`AP_Arming_Plane::mission_checks`: DO_LAND_START (189) and DO_RETURN_PATH_START (188) need RTL_AUTOLAND."""
+    marked = IN_THE_AIR._replace(commands=frozenset({16, mark}))
+    (text,) = said("RTL_AUTOLAND 0", marked)
+    assert text.startswith("RTL_AUTOLAND 0 prevents arming with DO_")
+    assert said("RTL_AUTOLAND 1", marked) == said("RTL_AUTOLAND 0", IN_THE_AIR) == said("WP_RADIUS 60", marked) == []
+    assert said("RTL_AUTOLAND 0\nARMING_CHECK 0", marked) == []
 
 
 @pytest.mark.parametrize(

@@ -183,8 +183,8 @@ def test_a_return_that_goes_on_to_what_is_not_flown_is_left_open(autoland: int) 
         assert verdict.headline.endswith("the destination of the return is unknown")
         assert "item 5 begins with the landing itself" in of(verdict, "return").reason
         assert of(verdict, "landing").reason == "the return does not continue to it"
-    # As without RTL_AUTOLAND, and as to a sequence that can be flown, nothing is open.
-    assert not judge_geometry(by_arduplane(setup_of(*WAY, *lands, home=HOME), RTL_AUTOLAND=0)).undecided
+    # As without RTL_AUTOLAND and the arming check that then fails, and as to a sequence that can be flown.
+    assert not judge_geometry(by_arduplane(setup_of(*WAY, *lands, home=HOME), RTL_AUTOLAND=0, ARMING_CHECK=0)).undecided
     assert not judge_geometry(by_arduplane(setup_of(*WAY, *flown_on, home=HOME), RTL_AUTOLAND=autoland)).undecided
 
 
