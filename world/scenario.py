@@ -77,10 +77,8 @@ def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
             initialise(self, *args, **values)
         except (TypeError, ValueError) as error:
             reason = str(error).removeprefix("Scenario.__init__() ")
-            raise ArgumentError(
-                f"Scenario: {reason}: planfly.make_scenario makes a scenario from another one, with other threats and"
-                " tables"
-            ) from error
+            allowed = "planfly.make_scenario makes a scenario from another one, with other threats and tables"
+            raise ArgumentError(f"Scenario: {reason}: {allowed}", field="Scenario", allowed=allowed) from error
 
     scenario_class.__init__ = initialise_or_refuse  # type: ignore[assignment]
     return scenario_class
