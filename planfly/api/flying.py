@@ -198,6 +198,7 @@ def fly(
 
     A plan that cannot be flown gives a verdict, not an error; bad input raises a `planfly.PlanflyError`.
 
+    >>> import planfly
     >>> flown = planfly.fly(planfly.plan("paper-07", seed=1), wind=(4, 270))
     >>> flown.ended, flown.verdict.flyable, flown.setup.scenario.wind.speed
     ('completed', True, 4.0)
@@ -311,6 +312,7 @@ def judge(
     plan, flight, datum: for an autopilot's log, see `planfly.import_log`.
     Raises a `planfly.PlanflyError` for bad input.
 
+    >>> import planfly
     >>> plan = planfly.plan("paper-07", seed=1)
     >>> [planfly.judge(plan, geometry=geometry).verdict.level for geometry in (False, True)]
     ['autopilot', 'geometric']

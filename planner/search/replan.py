@@ -112,7 +112,7 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
     >>> check_same_mission(scenario, plan)
     >>> check_same_mission(load_scenario("tight"), plan)
     Traceback (most recent call last):
-    world.errors.MissionError: tight: start: 742 m from that of the plan; the plan belongs to another mission
+    world.errors.MissionError: tight: start: 742 m from the plan's start: the plan is for another mission
     """
     for name, plan_end, scenario_end in (
         ("start", old_plan.waypoints[0], scenario.start),
