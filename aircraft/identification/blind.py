@@ -104,8 +104,25 @@ class Band:
         return float(np.median(0.5 * (self.high - self.low)[known])) if known.any() else float("nan")
 
     @property
+    def known_fraction(self) -> float:
+        """Fraction of the flight's known values at which the band is known; NaN without known values."""
+        flown = np.isfinite(self.flown)
+        return float(self._known[flown].mean()) if flown.any() else float("nan")
+
+    @property
+    def is_informative(self) -> bool:
+        """False if the band is as wide as if the quantity stayed as at the start, or wider."""
+        return not self.half_width >= self.unchanged
+
+    @property
     def _known(self) -> Flags:
         return np.isfinite(self.flown) & np.isfinite(self.low) & np.isfinite(self.high)
+
+
+def uninformative_note(bands: Sequence[Band]) -> str:
+    """Return a sentence that names the quantities of which the model says nothing; empty if there are none."""
+    names = ", ".join(band.name for band in bands if not band.is_informative)
+    return f"the model says nothing of {names}: the band is as wide as without a model, or wider" if names else ""
 
 
 def band_limits(values: Floats) -> tuple[Floats, Floats]:

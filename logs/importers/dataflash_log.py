@@ -18,7 +18,15 @@ from flight.mission.items import Home, MissionItem, round_to_grid
 from logs.importers.clean_positions import remove_clock_jumps
 from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
 from logs.importers.logged_missions import LoggedItem, combine_items, logged_mission, plane_mode
-from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from logs.importers.raw_log import (
+    HeightSource,
+    LoggedMission,
+    LogSeries,
+    ModeChange,
+    RawLog,
+    VehicleKind,
+    with_used_energy,
+)
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -293,9 +301,7 @@ class _Reader:
         for name in ("BAT", "CURR"):
             volts = self._table(name, ("Volt", "Curr"))
             if volts is not None and len(volts.time) and np.any(volts.values[:, 1]):
-                step = np.diff(volts.time, prepend=volts.time[0])
-                energy = np.cumsum(volts.values[:, 0] * volts.values[:, 1] * np.clip(step, 0.0, 10.0)) / 3600.0
-                return LogSeries(name, volts.time, np.stack([volts.values[:, 1], energy], axis=1))
+                return with_used_energy(volts)
         return None
 
     def _throttle(self) -> LogSeries | None:

@@ -20,7 +20,15 @@ from flight.simulation.setup import Damage
 from logs.importers.dataflash_frames import MappedFile, piece_ends
 from logs.importers.logged_missions import px4_items, px4_state, without_gaps
 from logs.importers.px4_formats import MessageFormats
-from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from logs.importers.raw_log import (
+    HeightSource,
+    LoggedMission,
+    LogSeries,
+    ModeChange,
+    RawLog,
+    VehicleKind,
+    with_used_energy,
+)
 from world.address_space import AddressSpaceError
 from world.arrays import Bytes, Ints
 from world.errors import LogError
@@ -34,6 +42,8 @@ _LETTERS = b"BFIMPQARDLCSO"
 # Topics of the wind, the first with rows is read: of the state estimator, of the airspeed selector (PX4 1.12 and 1.13
 # log only this one), and of releases before 1.12.
 WIND_TOPICS = ("wind", "airspeed_wind", "wind_estimate")
+# Current that marks a sample without a measurement, A (battery_status.msg).
+CURRENT_NOT_MEASURED_A = -1.0
 _TOPICS = [
     "vehicle_global_position",
     "vehicle_local_position",
@@ -302,8 +312,9 @@ class Topics:
             if status is None or ("connected" in data and not np.any(data["connected"])):
                 continue
             kind = float(data["source"][0]) if "source" in data else 0.0
-            is_finite = np.isfinite(status.time) & np.isfinite(status.values).all(axis=1)
-            chosen.append((kind, LogSeries(status.source, status.time[is_finite], status.values[is_finite])))
+            measured = np.isfinite(status.time) & np.isfinite(status.values).all(axis=1)
+            measured &= status.values[:, 1] != CURRENT_NOT_MEASURED_A
+            chosen.append((kind, LogSeries(status.source, status.time[measured], status.values[measured])))
         batteries = [series for kind, series in chosen if kind == chosen[0][0]]
         if not batteries or not all((series.values[:, 1] > 0.0).any() for series in batteries):
             return None
@@ -316,12 +327,7 @@ class Topics:
 
     def _battery(self) -> LogSeries | None:
         battery = self.battery()
-        if battery is None:
-            return None
-        step = np.clip(np.diff(battery.time, prepend=battery.time[0]), 0.0, 10.0)
-        current = np.maximum(battery.values[:, 1], 0.0)
-        energy = np.cumsum(current * battery.values[:, 0] * step) / 3600.0
-        return LogSeries(battery.source, battery.time, np.stack([current, energy], axis=1))
+        return None if battery is None else with_used_energy(battery)
 
     def _heights(self) -> Iterable[HeightSource]:
         gps = self._gps()

@@ -26,6 +26,8 @@ COLUMNS = {
     "throttle": ("share",),
     "height": ("up",),
 }
+# Longest time for which a sample of the current counts, s.
+_MAX_SAMPLE_TIME_S = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,19 @@ class LogSeries:
     source: str
     time: Floats
     values: Floats
+
+
+def with_used_energy(battery: LogSeries) -> LogSeries:
+    """Return current, A, and used energy, Wh, (n, 2) from voltage, V, and current (n, 2).
+
+    >>> battery = LogSeries("BAT", np.array([0.0, 1.0, 2.0]), np.array([[36.0, 0.0], [36.0, 100.0], [36.0, 100.0]]))
+    >>> with_used_energy(battery).values.tolist()
+    [[0.0, 0.0], [100.0, 1.0], [100.0, 2.0]]
+    """
+    step = np.clip(np.diff(battery.time, prepend=battery.time[0]), 0.0, _MAX_SAMPLE_TIME_S)
+    current = np.maximum(battery.values[:, 1], 0.0)
+    energy = np.cumsum(current * battery.values[:, 0] * step) / 3600.0
+    return LogSeries(battery.source, battery.time, np.stack([current, energy], axis=1))
 
 
 @dataclass(frozen=True, slots=True)

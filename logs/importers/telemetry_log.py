@@ -30,7 +30,15 @@ from logs.importers.logged_missions import (
     px4_mode,
     without_gaps,
 )
-from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from logs.importers.raw_log import (
+    HeightSource,
+    LoggedMission,
+    LogSeries,
+    ModeChange,
+    RawLog,
+    VehicleKind,
+    with_used_energy,
+)
 from world.arrays import Floats
 from world.errors import LogError
 
@@ -151,6 +159,8 @@ NUMBERS = {
     "SYS_STATUS": ("current_battery", "voltage_battery"),
     "BATTERY_STATUS": ("current_battery", "energy_consumed"),
 }
+# Values of a battery's fields that mark them as not measured (MAVLink, common.xml).
+NOT_MEASURED = {"voltage_battery": 65535.0, "current_battery": -1.0, "energy_consumed": -1.0}
 # Greatest number of kept messages of each other kind.
 _MAX_MESSAGES = 200_000
 
@@ -387,17 +397,27 @@ class VehicleMessages:
         return covered if covered is not None and np.any(covered.values) else None
 
     def _battery(self) -> LogSeries | None:
-        table = self.table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
-        if table is not None and (table.values >= 0.0).all() and np.any(table.values[:, 1]):
-            return LogSeries(table.source, table.time, table.values * np.array([0.01, 1.0 / 36.0]))
-        table = self.table("SYS_STATUS", ("current_battery", "voltage_battery"))
-        if table is None or (table.values[:, 0] < 0.0).any() or not np.any(table.values[:, 0]):
+        table = self._measured("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+        if table is not None and np.any(table.values[:, 1] > 0.0):
+            current = np.maximum(table.values[:, 0] * 0.01, 0.0)
+            return LogSeries(table.source, table.time, np.stack([current, table.values[:, 1] / 36.0], axis=1))
+        battery = self.battery()
+        return None if battery is None else with_used_energy(battery)
+
+    def battery(self) -> LogSeries | None:
+        """Return the battery's voltage, V, and current, A, (n, 2); None if the current was not measured."""
+        table = self._measured("SYS_STATUS", ("voltage_battery", "current_battery"))
+        if table is None or not np.any(table.values[:, 1] > 0.0):
             return None
-        current, volts = table.values[:, 0] * 0.01, table.values[:, 1] * 1e-3
-        step = np.clip(np.diff(table.time, prepend=table.time[0]), 0.0, 10.0)
-        return LogSeries(
-            table.source, table.time, np.stack([current, np.cumsum(current * volts * step) / 3600.0], axis=1)
-        )
+        return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
+
+    def _measured(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
+        """Return columns of a battery's message, without the rows in which one is marked as not measured."""
+        table = self.table(name, columns)
+        if table is None:
+            return None
+        measured = np.all([table.values[:, k] != NOT_MEASURED[column] for k, column in enumerate(columns)], axis=0)
+        return LogSeries(name, table.time[measured], table.values[measured]) if measured.any() else None
 
     def _heights(self) -> Iterable[HeightSource]:
         gps = self._gps_place()

@@ -37,7 +37,6 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
     wind = _reordered(raw.series.get("wind"), [1, 0])
     if not len(wind.time):
         wind = estimate_wind(velocity, attitude, _reordered(true_airspeed, [0]))
-    battery = messages.table("SYS_STATUS", ("voltage_battery", "current_battery"))
     return MotionLog(
         source=str(path),
         sha256=digest,
@@ -51,7 +50,7 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
         airspeed=NO_SAMPLES if true_airspeed is None else _reordered(messages.table("VFR_HUD", ("airspeed",)), [0]),
         ratio=NO_SAMPLES,
         height=_reordered(position, [2]),
-        battery=_reordered(battery, [0, 1], [1e-3, 0.01]) if "battery" in raw.series else NO_SAMPLES,
+        battery=_reordered(messages.battery(), [0, 1]),
         modes=tuple(messages.mode_numbers()),
         parameters=raw.parameters,
         home=first_ground_position(_reordered(position, [0, 1, 2]), velocity),

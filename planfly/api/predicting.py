@@ -9,7 +9,7 @@ from typing import Literal, Unpack
 import numpy as np
 
 from aircraft.catalog import Aircraft, find_aircraft
-from aircraft.identification.blind import DRAWS, Band, BlindPrediction, band_limits
+from aircraft.identification.blind import DRAWS, Band, BlindPrediction, band_limits, uninformative_note
 from aircraft.identification.estimate import align_clocks
 from aircraft.identification.flight_record import FlightRecord
 from flight.dynamics.fdm import Variation
@@ -313,8 +313,10 @@ def _band_lines(bands: Sequence[Band]) -> list[str]:
             continue
         unchanged = "" if math.isnan(band.unchanged) else f" (if the value did not change: ±{band.unchanged:.3g})"
         width = f"band of ±{band.half_width:.3g} {band.unit} at the median"
-        lines.append(f"  {band.name:<12} {100.0 * band.inside:.1f} % of the flight inside, {width}{unchanged}")
-    return lines
+        part = "" if band.known_fraction > 0.995 else f"{100.0 * band.known_fraction:.0f} % of "
+        lines.append(f"  {band.name:<12} {100.0 * band.inside:.1f} % of {part}the flight inside, {width}{unchanged}")
+    note = uninformative_note(bands)
+    return [*lines, f"  {note}"] if note else lines
 
 
 def _write_page(folder: Path, predicted: Predicted) -> tuple[Path, ...]:

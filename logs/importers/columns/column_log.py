@@ -81,8 +81,16 @@ class ColumnLog:
 
     @property
     def sha256(self) -> str:
-        """SHA-256 of the bytes of all data files, in the order of their paths, and of the table."""
-        digest = hashlib.sha256(self.table_path.read_bytes())
+        """SHA-256 of the table and of all data files."""
+        return hashlib.sha256(self.table_path.read_bytes() + self.data_sha256.encode()).hexdigest()
+
+    @property
+    def data_sha256(self) -> str:
+        """SHA-256 of the bytes of all data files, in the order of their paths, and of the span that is read.
+
+        It tells if an aircraft was identified from these rows, whatever else of the table was edited since.
+        """
+        digest = hashlib.sha256(repr(self.table.span_s).encode())
         for path in sorted({self._file_of(clock) for clock in self.table.clocks.values()}):
             digest.update(path.read_bytes())
         return digest.hexdigest()

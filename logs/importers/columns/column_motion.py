@@ -46,7 +46,7 @@ def read_column_motion(path: Path) -> MotionLog:
     )
     return MotionLog(
         source=str(path),
-        sha256=log.sha256,
+        sha256=log.data_sha256,
         program=log.table.program,
         vehicle="plane",
         inertial=_group(log, *inertial),

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from aircraft.identification.blind import Band
+from aircraft.identification.blind import Band, uninformative_note
 from logs.views.charts import Chart
 from logs.views.figures import draw_pictures, view_json
 from logs.views.report.page import (
@@ -28,6 +28,7 @@ def prediction_page(heading: str, bands: Sequence[Band], chart: Chart) -> str:
     return page_template("prediction.html").render(
         title=chart.title,
         heading=heading,
+        note=uninformative_note(bands),
         bands=[band for band in bands if band.inside == band.inside],
         picture=picture_address(draw_pictures({"bands": chart})["bands.png"]),
         style=Markup(style_text("style", "compare", "identification")),

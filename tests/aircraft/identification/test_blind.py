@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from aircraft.identification.alignment import Clocks, align
-from aircraft.identification.blind import DRAWS, Band, band_limits
+from aircraft.identification.blind import DRAWS, Band, band_limits, uninformative_note
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.level import level_signals
 
@@ -41,6 +41,19 @@ def test_the_share_inside_leaves_out_what_is_not_known() -> None:
     band = Band("bank", "deg", np.arange(5.0), low, high, flown)
     assert band.inside == 2.0 / 3.0
     assert band.half_width == 1.0
+    # Of four logged values, three have a band.
+    assert band.known_fraction == 0.75
+
+
+def test_a_band_as_wide_as_without_a_model_is_named() -> None:
+    """Half of each band is 1 wide: it says something of a quantity that would change by 1.1, and nothing of 0.9."""
+    along, low, high = np.arange(3.0), -np.ones(3), np.ones(3)
+    bank, pitch, power = (
+        Band(name, "", along, low, high, np.zeros(3), unchanged)
+        for name, unchanged in (("bank", 0.9), ("pitch", 1.1), ("power", np.nan))
+    )
+    assert uninformative_note([bank, pitch, power]).startswith("the model says nothing of bank: ")
+    assert not uninformative_note([pitch, power])
 
 
 def _steady_record(bias: float) -> FlightRecord:

@@ -188,6 +188,16 @@ def test_a_battery_whose_current_is_not_measured_leaves_the_current_unknown(tmp_
     assert len(changed(tmp_path, with_second_battery(current_a=-1.0)).battery.time) == 0
 
 
+def test_a_sample_without_current_costs_itself_alone(tmp_path: Path) -> None:
+    topics = px4_topics(short_motion())
+    time, table = topics["battery_status"]
+    amps = np.full(len(time), 10.0)
+    amps[3] = -1.0
+    topics["battery_status"] = (time, table | {"current_a": amps})
+    battery = changed(tmp_path, topics).battery
+    assert battery.values[:, 1].tolist() == [10.0] * (len(time) - 1)
+
+
 def test_elevons_are_half_their_sum_and_difference(tmp_path: Path) -> None:
     elevons = {
         "CA_SV_CS_COUNT": 2,

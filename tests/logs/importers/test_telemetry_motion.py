@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from aircraft.catalog import find_aircraft
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
+from logs.importers.open_log import open_log
 from planfly.identification.records import flight_records, log_outputs
 from tests.instrumented_flights import PARAMETERS
 from world.errors import LogError
@@ -31,7 +32,9 @@ class Sink:
         self.data += struct.pack(">Q", round((1.7e9 + self.now + 0.25) * 1e6)) + packet
 
 
-def write(path: Path, *, autopilot: int = 3, without: tuple[str, ...] = ()) -> Path:
+def write(
+    path: Path, *, autopilot: int = 3, without: tuple[str, ...] = (), currents: tuple[int, ...] = (1250,)
+) -> Path:
     """Write a level flight to the north-east; micros() of 32 bits starts again within it, at 4294.97 s."""
     sink = Sink()
     vehicle = dialect.MAVLink(sink, 1, 1)
@@ -53,7 +56,8 @@ def write(path: Path, *, autopilot: int = 3, without: tuple[str, ...] = ()) -> P
             vehicle.vfr_hud_send(22.0 + 1e-4 * (k % 2), SPEED, 45, 60, 500.0, 0.5)
         if k % 10 == 0:
             vehicle.heartbeat_send(1, autopilot, 81, 10, 4)
-            vehicle.sys_status_send(0, 0, 0, 0, 24_000, 1250, 80, 0, 0, 0, 0, 0, 0)
+            current = currents[k // 10 % len(currents)]
+            vehicle.sys_status_send(0, 0, 0, 0, 24_000, current, 80, 0, 0, 0, 0, 0, 0)
             if "WIND" not in without:
                 vehicle.wind_send(270.0, 3.0, 0.0)
     path.write_bytes(bytes(sink.data))
@@ -75,6 +79,32 @@ def test_each_message_arrives_in_si_units(motion: MotionLog) -> None:
     assert motion.battery.values[0] == pytest.approx([24.0, 12.5])
     assert motion.outputs.values[7, :4].tolist() == [1507.0, 1400.0, 1600.0, 1500.0]
     assert motion.modes[0] == (pytest.approx(BOOT_S, abs=0.2), 10)
+
+
+@pytest.mark.parametrize(
+    ("currents", "rows", "amps"),
+    [
+        # MAVLink: -1 is a current that the autopilot did not measure.
+        ((1250, 1250, -1), 160, {12.5}),
+        # An offset of the sensor is a measurement.
+        ((1250, -5), 240, {12.5, -0.05}),
+        ((-1,), 0, set()),
+    ],
+)
+def test_a_current_that_is_not_measured_costs_its_own_sample_alone(
+    tmp_path: Path, currents: tuple[int, ...], rows: int, amps: set[float]
+) -> None:
+    path = write(tmp_path / "a.tlog", currents=currents)
+    battery = read_motion(path).battery
+    assert len(battery.time) == rows
+    if rows:
+        assert set(battery.values[:, 1].round(3).tolist()) == amps
+        # 24 V times the mean current for 239 s; the sample after a missing one counts for both seconds.
+        mean = 12.5 if -1 in currents else 6.25
+        energy = open_log(path).series["battery"].values[-1, 1]
+        assert energy == pytest.approx(24.0 * mean * 239.0 / 3600.0, rel=0.02)
+    else:
+        assert "battery" not in open_log(path).series
 
 
 def test_rows_have_the_times_at_which_they_were_made(motion: MotionLog) -> None:

@@ -8,6 +8,7 @@ from scipy.io import loadmat
 from logs.importers.columns.column_checks import check_signs_and_units
 from logs.importers.columns.column_log import ColumnLog
 from logs.importers.imported_flight import make_flight, mean_wind
+from logs.importers.motion_log import read_motion
 from logs.importers.open_log import is_imported_log, open_log
 from tests.logs.importers.columns.column_files import AIRSPEED, LAT, LON, TABLE, WIND_EAST, circle, write_log
 from world.errors import LogError
@@ -45,6 +46,14 @@ def test_the_bytes_of_the_data_are_part_of_the_digest(tmp_path: Path) -> None:
     first = ColumnLog(write_log(tmp_path)).sha256
     assert ColumnLog(write_log(tmp_path, volt=circle()["volt"] + 0.1)).sha256 != first
     assert ColumnLog(write_log(tmp_path, f"{TABLE}\n")).sha256 != first
+
+
+def test_rows_are_known_again_after_an_edit_of_their_table(tmp_path: Path) -> None:
+    """An aircraft that was identified from a log has seen it, whatever was edited in the table of its columns since."""
+    first = read_motion(write_log(tmp_path)).sha256
+    assert read_motion(write_log(tmp_path, f"# A comment.\n{TABLE}")).sha256 == first
+    assert read_motion(write_log(tmp_path, f"span_s = [20.0, 60.0]\n{TABLE}")).sha256 != first
+    assert read_motion(write_log(tmp_path, volt=circle()["volt"] + 0.1)).sha256 != first
 
 
 def test_arduplane_of_2013_is_read_from_its_matlab_file() -> None:
