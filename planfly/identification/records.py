@@ -149,6 +149,7 @@ def _check_duration(
         allowed = f"at least {min_seconds:g} s are needed"
         if min_seconds == MIN_SECONDS:
             allowed += f" to identify an aircraft, and {MIN_CHECK_SECONDS:g} s to check one"
+        allowed += f", in stretches of at least {MIN_STRETCH:g} s without gaps"
         raise LogError(f"{log.source}: {message}: {allowed}", file=log.source, value=seconds, allowed=allowed)
 
 

@@ -1,6 +1,7 @@
 """Check output files and folders, and remove old results of planfly; other files are never overwritten."""
 
 import hashlib
+import os
 from pathlib import Path
 
 from world.errors import PlanflyError
@@ -89,9 +90,13 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
 
 
 def check_output_folder(folder: Path, overwrite: bool) -> None:
-    """Raise PlanflyError if the target folder is a file, or is not empty without `overwrite`."""
-    if folder.exists() and not folder.is_dir():
-        raise PlanflyError(f"{folder}: is a file; expected a folder", file=folder)
+    """Raise PlanflyError if a folder is or lies in a file, cannot be made, or is not empty without `overwrite`."""
+    existing = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    if not existing.is_dir():
+        where = folder if existing == folder.absolute() else existing
+        raise PlanflyError(f"{where}: is a file; expected a folder", file=where)
+    if not os.access(existing, os.W_OK | os.X_OK):
+        raise PlanflyError(f"{folder}: cannot be written: {existing} is not writable", file=folder)
     if not overwrite and folder.is_dir() and any(folder.iterdir()):
         raise PlanflyError(f"{folder}: exists and is not empty; overwrite=True replaces its results", file=folder)
 

@@ -13,6 +13,8 @@ from world.errors import LogError
 
 # Interval of the grid on which quantities are compared, s; rates are means over it.
 _STEP_S = 0.5
+# Least time between samples of the ground speed in which the recorder stopped, s.
+_MIN_GAP_S = 5.0
 # Ground speed above which the aircraft flies, m/s.
 _FLYING_MPS = 6.0
 # Correlation beyond which two measurements of one quantity agree, or contradict each other.
@@ -114,7 +116,7 @@ def check_signs_and_units(log: ColumnLog) -> None:
 
 
 def _flying_grid(log: ColumnLog) -> Floats:
-    """Return times at which the aircraft flew, (n,); none if neither velocity nor ground speed tells."""
+    """Return times at which the aircraft flew and was recorded, (n,); none if neither velocity nor ground speed tells."""
     if log.has("velocity_north", "velocity_east"):
         north, east = log.series("velocity_north"), log.series("velocity_east")
         speed = Series(north.time, np.hypot(north.values, np.interp(north.time, *_known(east))))
@@ -126,7 +128,9 @@ def _flying_grid(log: ColumnLog) -> Floats:
     if len(time) < 2:
         return np.zeros(0)
     grid = np.arange(time[0], time[-1], _STEP_S)
-    return np.asarray(grid[np.interp(grid, time, values) > _FLYING_MPS])
+    after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
+    recorded = time[after] - time[after - 1] < _MIN_GAP_S
+    return np.asarray(grid[recorded & (np.interp(grid, time, values) > _FLYING_MPS)])
 
 
 def _known(series: Series) -> tuple[Floats, Floats]:
@@ -272,13 +276,15 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
     time, values = time[inside], values[inside]
     if len(time) < 2:
         return
-    changes = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [len(time) - 1]])
-    durations = np.diff(time[changes])
+    firsts = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1])
+    # A run ends at its last sample: a gap in the log is not a value that stays.
+    lasts = np.append(firsts[1:] - 1, len(time) - 1)
+    durations = time[lasts] - time[firsts]
     limit = max(_FROZEN_S, _FROZEN_RUNS * float(np.quantile(durations, 0.95))) if len(durations) > 1 else _FROZEN_S
     for k in np.flatnonzero(durations > limit).tolist():
-        begin, end = float(time[changes[k]]), float(time[changes[k + 1]])
+        begin, end = float(time[firsts[k]]), float(time[min(lasts[k] + 1, len(time) - 1)])
         flown = np.count_nonzero((grid > begin) & (grid < end)) * _STEP_S
-        if flown > limit and not (quantity == "current" and values[changes[k]] == 0.0):
+        if flown > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
             hint = "expected a sensor that works; leave its cells empty, or read a part (span_s)"
             raise _contradiction(log, quantity, f"keeps one value from {begin:.6g} to {end:.6g} s, in flight", hint)
 

@@ -1,5 +1,6 @@
 """Targets on disk: what may be written over, and what is cleared."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -45,6 +46,17 @@ def test_a_named_folder_is_refused_unless_it_is_empty(tmp_path: Path) -> None:
     with pytest.raises(PlanflyError, match="expected a folder"):
         check_output_folder(file, overwrite=True)
     check_output_folder(tmp_path, overwrite=True)
+
+
+def test_a_folder_that_cannot_be_made_is_refused_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "mine.txt"
+    file.write_text("mine", encoding="utf-8")
+    with pytest.raises(PlanflyError, match=r"mine\.txt: is a file; expected a folder"):
+        check_output_folder(file / "below" / "new", overwrite=False)
+    # For root every folder is writable.
+    monkeypatch.setattr(os, "access", lambda path, mode: Path(path) != tmp_path)
+    with pytest.raises(PlanflyError, match=r"new: cannot be written: .* is not writable"):
+        check_output_folder(tmp_path / "below" / "new", overwrite=False)
 
 
 def test_a_run_clears_its_old_results_and_nothing_of_others(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from logs.importers.columns.column_checks import check_signs_and_units
+from logs.importers.columns.column_log import ColumnLog
 from logs.importers.motion_log import read_motion
 from logs.importers.open_log import open_log
 from tests.logs.importers.columns.column_files import TABLE, circle, write_log
@@ -153,6 +155,12 @@ def test_a_file_that_is_wrong_is_refused_in_one_line(
     tmp_path: Path, columns: dict[str, np.ndarray], expected: str
 ) -> None:
     assert re.search(expected, said(write_log(tmp_path, **columns)))
+
+
+def test_a_gap_is_not_a_sensor_that_stays(tmp_path: Path) -> None:
+    """The recorder stopped for 60 s; each sensor has one value before and another after."""
+    later = TIME + np.where(TIME >= 100.0, 60.0, 0.0)
+    check_signs_and_units(ColumnLog(write_log(tmp_path, t=later)))
 
 
 def test_places_of_four_decimals_are_read(tmp_path: Path) -> None:
