@@ -180,12 +180,12 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
 
 
 def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
-    """Return values (n,) before a first-order lag (s), which are the values plus the lag times their rate of change.
+    """Return values (n,) or (n, k) before a first-order lag (s): the values plus the lag times their rate of change.
 
     >>> invert_first_order_lag(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])
     """
-    return np.asarray(values + lag * hertz * np.gradient(values))
+    return np.asarray(values + lag * hertz * np.gradient(values, axis=0))
 
 
 # Lags of the accelerometers in the grid at which the search starts, s.

@@ -26,7 +26,7 @@ from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
 from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
 from aircraft.identification.prediction import PredictedLog, predict_log
-from aircraft.identification.refinement import IS_MOMENT, LONGER_HORIZONS_S, Refinement, refine_moments
+from aircraft.identification.refinement import IS_MOMENT, OTHER_HORIZONS_S, Refinement, refine_moments
 from aircraft.identification.regression import Fit, correlation_samples
 from world.arrays import Floats
 
@@ -36,8 +36,6 @@ ALIGNED_SECONDS = 200.0
 _PASSES = 2
 # Fraction of a parameter's variance that the logs must remove; with less the logs hardly determine the parameter.
 MIN_LOG_FRACTION = 0.2
-# Name of the shift that shows how much the moments depend on the times ahead of the compared predictions.
-LONGER_PREDICTIONS = "time ahead of the predictions (0.1 to 0.2 s longer)"
 # Title, unit and samples per second of each equation.
 _EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
     "lift": ("angle of attack", "rad", GRID_HZ),
@@ -141,10 +139,10 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
             shifts[fixed.name] = shifted_estimate.values - nominal.values
     shifts |= _lift_shifts(signals, base, nominal)
     if nominal.refinement is not None:
-        longer = refine_moments(signals, base, nominal.values, LONGER_HORIZONS_S, steps=2)
-        shift = np.zeros(len(PARAMETERS))
-        shift[IS_MOMENT] = longer.values - nominal.refinement.values
-        shifts[LONGER_PREDICTIONS] = shift
+        for name, horizons in OTHER_HORIZONS_S.items():
+            other = refine_moments(signals, base, nominal.values, horizons, steps=2)
+            shifts[name] = np.zeros(len(PARAMETERS))
+            shifts[name][IS_MOMENT] = other.values - nominal.refinement.values
     # Noise in a regressor flattens its slope; the effect of doubling the noise is subtracted (Cook and Stefanski 1994,
     # with the straight line of their extrapolants).
     noise_bias = np.where(IS_MOMENT, shifts[ACCELEROMETER_NOISE], 0.0)

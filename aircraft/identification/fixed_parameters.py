@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aircraft.identification.alignment import Signals
+from aircraft.identification.alignment import Signals, invert_first_order_lag
 from aircraft.identification.base_model import BaseModel
+from aircraft.identification.flight_record import apply_delay, apply_lag
 from aircraft.identification.flow import VANE_CUTOFF_HZ
 from world.arrays import Floats
 
@@ -117,6 +118,19 @@ def _delay_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (replace(signals, surfaces=signals.delay(signals.surfaces, seconds)), base)
 
 
+def _trade_servo_lag(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a change of the lag of the servos at the same total delay."""
+
+    def change(signals: Signals, base: BaseModel) -> Changed:
+        surfaces = np.empty_like(signals.surfaces)
+        for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
+            commands = invert_first_order_lag(signals.surfaces[first:last], base.servo_lag, signals.hertz)
+            surfaces[first:last] = apply_delay(apply_lag(commands, base.servo_lag + seconds), -seconds)
+        return replace(signals, surfaces=surfaces), base
+
+    return change
+
+
 def _scale_current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
     return lambda signals, base: (replace(signals, current=signals.current * factor), base)
 
@@ -142,6 +156,7 @@ FIXED_PARAMETERS = (
     FixedParameter("product of inertia (50 %)", _change_product_of_inertia(0.5, 0.05)),
     FixedParameter("clock of the accelerometers (15 ms)", _delay_force(0.015)),
     FixedParameter("clock of the servos (15 ms)", _delay_surfaces(0.015)),
+    FixedParameter("lag of the servos (15 ms, at the same total delay)", _trade_servo_lag(0.015)),
     FixedParameter("airspeed (as the wind triangle has it)", _scale_airspeed),
     # An error of the level also shows as a bias of the forward accelerometer, which is removed.
     FixedParameter(

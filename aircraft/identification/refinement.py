@@ -24,14 +24,23 @@ from world.arrays import Flags, Floats, Ints
 
 # Times ahead of the compared predictions, s.
 HORIZONS_S = (0.1, 0.3)
-# Times ahead whose estimate shows how much the estimate depends on them, s.
-LONGER_HORIZONS_S = (0.2, 0.5)
+# Times ahead whose estimates show how much the estimate depends on them, s. The autopilot answers gusts within these
+# times, so that controls and gusts are correlated and the estimate is biased (Forssell and Ljung 1999, Closed-loop
+# identification revisited, Automatica 35); the sandwich covariance, from residuals, does not contain this bias.
+OTHER_HORIZONS_S = {
+    "time ahead of the predictions (0.06 to 0.2 s shorter)": (0.04, 0.1),
+    "time ahead of the predictions (0.1 to 0.2 s longer)": (0.2, 0.5),
+}
 # Number of compared predictions.
 _COUNT = 600
 # Factor on the standard deviations of the prior in the refinement.
 PRIOR_SPREAD = 2.5
 # Number of Gauss-Newton steps.
 MAX_STEPS = 4
+# Largest condition index of a direction that the log determines. Errors of the measured regressors grow by this index
+# in the estimate (Belsley, Kuh and Welsch 1980, Regression Diagnostics, section 3.2: 10 is a beginning and 30 a strong
+# dependency): the rounding to 1 us of a rudder that only follows the ailerons, a mix, would be taken for its motion.
+MAX_CONDITION_INDEX = 15.0
 # Step of the difference quotients, in standard deviations of the prior.
 _DIFFERENCE_STEP = 0.02
 # True for the parameters of the moments.
@@ -92,6 +101,7 @@ def refine_moments(
             moved_values, change = values.copy(), _DIFFERENCE_STEP * sds[column]
             moved_values[k] += change
             slopes[:, column] = ((errors - errors_of(moved_values)) / (scales * change)).ravel()
+        slopes = without_collinear_directions(slopes)
         target = (errors / scales).ravel() + slopes @ values[IS_MOMENT]
         blocks = np.broadcast_to(signals.block[starts][:, np.newaxis], errors.shape).ravel()
         fit = fit_with_prior(slopes, target, means, sds, blocks)
@@ -102,6 +112,22 @@ def refine_moments(
     gains = np.linalg.solve(weight * slopes.T @ slopes + np.diag(1.0 / np.square(sds)), weight * slopes.T)
     gains = gains / np.broadcast_to(scales, errors.shape).ravel()
     return Refinement(values[IS_MOMENT], fit.covariance, starts, filters, errors, gains)
+
+
+def without_collinear_directions(slopes: Floats) -> Floats:
+    """Return slopes (n, m) that are zero along the directions of the parameters that the log does not determine.
+
+    The columns are compared at equal length. Along these directions an estimate keeps its prior.
+
+    >>> aileron = np.array([1.0, -1.0, 2.0, 0.5])
+    >>> slopes = np.column_stack([aileron, aileron + 0.01 * np.array([1.0, 1.0, -1.0, 0.0])])
+    >>> [int(np.linalg.matrix_rank(some)) for some in (slopes, without_collinear_directions(slopes))]
+    [2, 1]
+    """
+    lengths = np.linalg.norm(slopes, axis=0) + 1e-300
+    left, singular, right = np.linalg.svd(slopes / lengths, full_matrices=False)
+    determined = singular * MAX_CONDITION_INDEX > singular[0]
+    return np.asarray((left[:, determined] * singular[determined]) @ right[determined] * lengths)
 
 
 def prediction_errors(

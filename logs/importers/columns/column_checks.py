@@ -116,7 +116,7 @@ def check_signs_and_units(log: ColumnLog) -> None:
 
 
 def _flying_grid(log: ColumnLog) -> Floats:
-    """Return times at which the aircraft flew and was recorded, (n,); none if neither velocity nor ground speed tells."""
+    """Return recorded times in flight, (n,); none if neither velocity nor ground speed tells them."""
     if log.has("velocity_north", "velocity_east"):
         north, east = log.series("velocity_north"), log.series("velocity_east")
         speed = Series(north.time, np.hypot(north.values, np.interp(north.time, *_known(east))))

@@ -112,6 +112,8 @@ REFITTED = {
     "downward accelerometer (0.03 m/s2)",
     "noise of the accelerometers",
     "scale of the current (2 %)",
+    "lag of the servos (15 ms, at the same total delay)",
+    "time ahead of the predictions (0.06 to 0.2 s shorter)",
     "time ahead of the predictions (0.1 to 0.2 s longer)",
     "lift curve, axis 1",
     "lift curve, axis 2",

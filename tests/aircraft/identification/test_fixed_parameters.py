@@ -113,3 +113,19 @@ def test_sensors_are_in_doubt_by_what_is_said() -> None:
     for title, name in (("clock of the accelerometers", "acceleration"), ("clock of the servos", "surfaces")):
         late = getattr(titled(title).change(rising, base)[0], name)
         assert late[100:, 1] == pytest.approx(ramp[100:] - 0.015)
+
+
+def test_the_lag_of_the_servos_is_in_doubt_at_the_same_total_delay() -> None:
+    base = base_model(load_aircraft("aerosonde"))
+    still, time = steady(), np.arange(2000) / 50.0
+    trade = titled("lag of the servos").change
+    # A ramp of 1 a second is 50 ms late after a lag of 50 ms, and so it is after one of 65 ms 15 ms earlier.
+    late = trade(replace(still, surfaces=np.column_stack([time] * 3)), base)[0].surfaces
+    assert late[100:-10, 0] == pytest.approx(time[100:-10], abs=1e-3)
+    # A step comes 1 - exp(-t / 0.05) after 50 ms of lag, and 1 - exp(-(t + 0.015) / 0.065) after the other.
+    after = time - 10.0
+    step = np.where(after > 0.0, 1.0 - np.exp(-np.clip(after, 0.0, None) / 0.05), 0.0)
+    changed_step = trade(replace(still, surfaces=np.column_stack([step] * 3)), base)[0].surfaces[:, 2]
+    rows = (after > 0.055) & (after < 0.3)
+    assert changed_step[rows] == pytest.approx(1.0 - np.exp(-(after[rows] + 0.015) / 0.065), abs=0.02)
+    assert np.abs(changed_step - step)[rows].max() > 0.03
