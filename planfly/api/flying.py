@@ -193,8 +193,7 @@ def fly(
 
     log_hz: rows per second in the log.
     max_hours, max_log: limits of flight time, h, and log size, MB, at which a flight is stopped.
-    levels: True also flies a mission that passes with planfly's guidance and compares the two flights; without this
-    option only a mission that fails is flown again.
+    levels: True compares with a flight by planfly's guidance even if the mission passes, not only if it fails.
 
     A plan that cannot be flown gives a verdict, not an error; bad input raises a `planfly.PlanflyError`.
 
