@@ -307,6 +307,8 @@ class MissionParts(NamedTuple):
     takes_off, lands: True if the take-off or the landing is flown from or to the ground.
     loiters_to_land: True if the last item before a landing is a loiter.
     has_fence: True if the mission carries a fence.
+    has_rally: True if the mission carries rally points.
+    has_rally_at_home: True if a rally point is within 10 m of home.
     enables_fence: True if the mission switches the fence on (DO_FENCE_ENABLE).
     throttled_airspeeds: airspeeds that the mission commands together with a throttle, m/s.
     follows_terrain: True if the mission has a position above terrain.
@@ -322,6 +324,8 @@ class MissionParts(NamedTuple):
     lands: bool = False
     loiters_to_land: bool = False
     has_fence: bool = False
+    has_rally: bool = False
+    has_rally_at_home: bool = False
     enables_fence: bool = False
     throttled_airspeeds: tuple[float, ...] = ()
     follows_terrain: bool = False

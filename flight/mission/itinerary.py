@@ -280,23 +280,7 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
     if steps.endless >= 0:
         name = command_name(mission.items[steps.index[steps.endless]].command)
         builder.notes.add(f"{name} has no end: it is flown once, and the flight ends there", steps.endless)
-    jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
-    if len(jumps) > _MAX_COUNTED_JUMPS:
-        text = f"flown, where ArduPlane passes over jumps beyond the first {_MAX_COUNTED_JUMPS} that it meets"
-        builder.add_open_item(f"DO_JUMP: {text}", jumps[_MAX_COUNTED_JUMPS], px4=False)
-    elif len(jumps) > _MAX_COUNTED_JUMPS_SMALL_BOARD:
-        board_text = f"a board with little memory passes over jumps beyond {_MAX_COUNTED_JUMPS_SMALL_BOARD}"
-        builder.notes.arduplane.add(f"{len(jumps)} jumps: {board_text}")
-    if _MAX_JUMPS_IN_A_ROW in steps.jump_chains:
-        text = f"DO_JUMP: flown, where PX4 ends the mission at {_MAX_JUMPS_IN_A_ROW} jumps in a row"
-        builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW], arduplane=False)
-    if _MAX_JUMPS_IN_A_ROW_ARDUPLANE in steps.jump_chains:
-        text = f"DO_JUMP: flown, where ArduPlane ends the mission at {_MAX_JUMPS_IN_A_ROW_ARDUPLANE} jumps in a row"
-        builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW_ARDUPLANE], px4=False)
-    if steps.long_command_chain >= 0:
-        count_text = f"{_MAX_COMMANDS_IN_A_ROW_ARDUPLANE} commands without a waypoint"
-        text = f"{count_text}: flown, where ArduPlane ends the mission"
-        builder.add_open_item(text, steps.long_command_chain, px4=False)
+    _add_command_limits(mission, steps, builder)
     for gate in builder.gates:
         builder.notes.px4.add("CONDITION_GATE: no waypoint follows it, so it is passed at once", gate.item)
     unreached = [
@@ -323,6 +307,27 @@ def make_itinerary(mission: Mission, *, resets_jump_counters: bool = False) -> I
         passes_exhausted_jump=steps.passes_exhausted_jump,
         unreached=tuple(unreached),
     )
+
+
+def _add_command_limits(mission: Mission, steps: "_Steps", builder: "_ItineraryBuilder") -> None:
+    """Add open items and notes where an autopilot counts or follows fewer jumps and commands than the mission has."""
+    jumps = [item.seq for item in mission.items if item.command in JUMPS and item.seq in steps.reached]
+    if len(jumps) > _MAX_COUNTED_JUMPS:
+        text = f"flown, where ArduPlane passes over jumps beyond the first {_MAX_COUNTED_JUMPS} that it meets"
+        builder.add_open_item(f"DO_JUMP: {text}", jumps[_MAX_COUNTED_JUMPS], px4=False)
+    elif len(jumps) > _MAX_COUNTED_JUMPS_SMALL_BOARD:
+        board_text = f"a board with little memory passes over jumps beyond {_MAX_COUNTED_JUMPS_SMALL_BOARD}"
+        builder.notes.arduplane.add(f"{len(jumps)} jumps: {board_text}")
+    if _MAX_JUMPS_IN_A_ROW in steps.jump_chains:
+        text = f"DO_JUMP: flown, where PX4 ends the mission at {_MAX_JUMPS_IN_A_ROW} jumps in a row"
+        builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW], arduplane=False)
+    if _MAX_JUMPS_IN_A_ROW_ARDUPLANE in steps.jump_chains:
+        text = f"DO_JUMP: flown, where ArduPlane ends the mission at {_MAX_JUMPS_IN_A_ROW_ARDUPLANE} jumps in a row"
+        builder.add_open_item(text, steps.jump_chains[_MAX_JUMPS_IN_A_ROW_ARDUPLANE], px4=False)
+    if steps.long_command_chain >= 0:
+        count_text = f"{_MAX_COMMANDS_IN_A_ROW_ARDUPLANE} commands without a waypoint"
+        text = f"{count_text}: flown, where ArduPlane ends the mission"
+        builder.add_open_item(text, steps.long_command_chain, px4=False)
 
 
 class _Step(NamedTuple):

@@ -308,7 +308,11 @@ def _describe_outputs(parameters: ArduPilotParameters, values: Mapping[str, floa
         return
     count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
     pins = int(values["SERVO_GPIO_MASK"])
-    functions = {values[f"SERVO{output}_FUNCTION"] for output in range(1, count + 1) if not pins & 1 << (output - 1)}
+    functions = {
+        values[f"SERVO{output}_FUNCTION"]
+        for output in range(1, count + 1)
+        if not pins & 1 << (output - 1) and values[f"SERVO{output}_MIN"] < values[f"SERVO{output}_MAX"]
+    }
     names = f"SERVO1_FUNCTION to SERVO{count}_FUNCTION" + (f" without SERVO_GPIO_MASK {pins}" if pins else "")
     for part, moving in _FUNCTIONS_BY_PART.items():
         if functions.isdisjoint(moving):

@@ -29,6 +29,7 @@ from flight.autopilots.px4.open_settings import describe_open_settings
 from flight.autopilots.px4.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, Px4Parameters
 from flight.autopilots.px4.tracking_error import altitude_miss_probability, tracking_error
 from flight.guidance.equivalent_airspeed import true_by_equivalent
+from flight.mission.items import LANDINGS, Command
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.arrays import Floats
@@ -92,6 +93,10 @@ _RTL_TYPES_NOT_FLOWN = {
 
 # Values of RTL_TYPE for an RTL along the mission.
 _ALONG_THE_MISSION = (2.0, 4.0)
+# Values of RTL_TYPE for an RTL that may go to the mission's landing.
+_TO_LANDING = (1.0, 3.0)
+# Value of RTL_TYPE for an RTL to a rally point alone.
+_TO_RALLY_POINT = 5.0
 # COM_WIND_MAX_ACT and GF_ACTION that only warn.
 _WARN_OF_WIND = 1.0
 _WARN_OF_FENCE = 1.0
@@ -202,9 +207,8 @@ class Px4(Autopilot):
 
     def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
         """Describe settings that end a mission or change its flight and are not simulated."""
-        parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX"]
-        if parameters["GF_ACTION"] > 0.0:
-            ending_names += ["GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
+        # `FeasibilityChecker` refuses a mission beyond GF_MAX_*, whatever GF_ACTION is.
+        parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
         if parameters["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and parameters["COM_WIND_MAX"] < mission.wind:
             ending_names += ["COM_WIND_MAX"]
         ending_texts = [
@@ -235,8 +239,15 @@ class Px4(Autopilot):
             yield "FW_LND_EARLYCFG 1 affects the loiter before the landing, but is not simulated"
         if not mission.returns:
             return
-        if parameters["RTL_TYPE"] in _ALONG_THE_MISSION:
-            yield f"RTL_TYPE {parameters['RTL_TYPE']:g} returns along the mission, which is not simulated"
+        return_type = parameters["RTL_TYPE"]
+        if return_type in _ALONG_THE_MISSION:
+            yield f"RTL_TYPE {return_type:g} returns along the mission, which is not simulated"
+        if return_type in _TO_LANDING and not mission.commands.isdisjoint((*LANDINGS, Command.DO_LAND_START)):
+            yield f"RTL_TYPE {return_type:g} may return to the mission's landing, which is not simulated"
+        if return_type == _TO_RALLY_POINT and not mission.has_rally:
+            yield f"RTL_TYPE {return_type:g} without a rally point loiters where it begins, which is not simulated"
+        if return_type != _TO_RALLY_POINT and mission.has_rally_at_home:
+            yield "PX4 ignores a rally point within 10 m of home, to which the return is simulated"
         if parameters["RTL_DESCEND_ALT"] != parameters["RTL_RETURN_ALT"]:
             end_text = f"RTL_DESCEND_ALT {parameters['RTL_DESCEND_ALT']:g}"
             yield f"{end_text} ends the return, which is flown to RTL_RETURN_ALT {parameters['RTL_RETURN_ALT']:g}"

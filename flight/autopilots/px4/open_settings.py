@@ -26,6 +26,8 @@ _SURFACES_BY_PART = {
     "ailerons": (1.0, 2.0, 15.0, *_BOTH_AXES),
     "elevator": (3.0, 7.0, 8.0, 13.0, 14.0, *_BOTH_AXES),
 }
+# End of the name of a surface's torque by the part; without it the allocation does not move the surface.
+_TORQUE_BY_PART = {"ailerons": "TRQ_R", "elevator": "TRQ_P"}
 # CA_AIRFRAME of a fixed wing.
 _FIXED_WING = 1.0
 # First and last output function of each part.
@@ -79,7 +81,9 @@ def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
     names = [f"CA_SV_CS{surface}_TYPE" for surface in range(int(stated.get("CA_SV_CS_COUNT", 0.0)))]
     if "CA_SV_CS_COUNT" in stated and stated.keys() >= set(names):
         for part, types in _SURFACES_BY_PART.items():
-            if {stated[name] for name in names}.isdisjoint(types):
+            torque = _TORQUE_BY_PART[part]
+            moved_types = {stated[name] for name in names if stated.get(name.replace("TYPE", torque), 1.0) != 0.0}
+            if moved_types.isdisjoint(types):
                 yield f"CA_SV_CS_COUNT {len(names)} and CA_SV_CS*_TYPE leave no {part}, which is not simulated"
 
 

@@ -203,6 +203,7 @@ _WHEN_STATED = {
     # Surfaces and motors.
     **dict.fromkeys(("CA_AIRFRAME", "CA_ROTOR_COUNT", "CA_SV_CS_COUNT"), 0.0),
     **{f"CA_SV_CS{surface}_TYPE": 0.0 for surface in range(8)},
+    **{f"CA_SV_CS{surface}_TRQ_{axis}": 1.0 for surface in range(8) for axis in "RP"},
     **dict.fromkeys(SLEW_NAMES, 0.0),
     **dict.fromkeys(OUTPUT_FUNCTION_NAMES, 0.0),
     "NAV_MIN_GND_DIST": -1.0,

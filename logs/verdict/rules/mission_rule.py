@@ -271,6 +271,8 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         lands=procedures.approach is not None,
         loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
         has_fence=bool(setup.mission.fences),
+        has_rally=bool(setup.mission.rally),
+        has_rally_at_home=_has_rally_at_home(setup.mission),
         enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
         throttled_airspeeds=tuple(
             item.params[1]
@@ -282,6 +284,21 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         wind=setup.scenario.wind.max_speed_at(setup.route.waypoints[:, 2]),
         commands=frozenset(commands),
         aircraft=aircraft,
+    )
+
+
+# Distance from home within which PX4 ignores a rally point, m (`MAX_DIST_FROM_HOME_FOR_LAND_APPROACHES` in rtl.cpp).
+_RALLY_HOME_DISTANCE_M = 10.0
+
+
+def _has_rally_at_home(mission: Mission) -> bool:
+    """Return True if a rally point is so close to home that PX4 ignores it."""
+    if mission.home is None:
+        return False
+    origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
+    return any(
+        math.hypot(*map(float, to_map(origin, point.lat_deg, point.lon_deg))) <= _RALLY_HOME_DISTANCE_M
+        for point in mission.rally
     )
 
 

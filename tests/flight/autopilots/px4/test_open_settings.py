@@ -81,6 +81,11 @@ def test_px4s_defaults_leave_nothing_open_stated_or_not(name: str) -> None:
         ("CA_AIRFRAME 1\nCA_ROTOR_COUNT 0", "CA_ROTOR_COUNT 0 leaves no motor"),
         ("CA_AIRFRAME 1\nCA_SV_CS_COUNT 2\nCA_SV_CS0_TYPE 3\nCA_SV_CS1_TYPE 4", "CA_SV_CS_COUNT 2"),
         ("CA_AIRFRAME 1\nCA_SV_CS_COUNT 2\nCA_SV_CS0_TYPE 5\nCA_SV_CS1_TYPE 6", ""),
+        (
+            "CA_AIRFRAME 1\nCA_SV_CS_COUNT 2\nCA_SV_CS0_TYPE 1\nCA_SV_CS1_TYPE 3\nCA_SV_CS1_TRQ_P 0",
+            "CA_SV_CS_COUNT 2 and CA_SV_CS*_TYPE leave no elevator",
+        ),
+        ("CA_AIRFRAME 1\nCA_SV_CS_COUNT 2\nCA_SV_CS0_TYPE 1\nCA_SV_CS1_TYPE 3\nCA_SV_CS1_TRQ_R 0", ""),
         # `ControlAllocation::applySlewRateLimit`.
         ("CA_SV1_SLEW 0.5", "CA_SV1_SLEW 0.5 slows an output"),
         ("CA_R0_SLEW 10", "CA_R0_SLEW 10 slows an output"),
@@ -124,3 +129,27 @@ def test_gains_of_the_aircraft_leave_nothing_open(name: str) -> None:
 def test_px4s_own_program_flies_the_gains_but_has_a_gps() -> None:
     made = Px4Sitl(Px4Parameters.of_text("FW_RR_FF 0\nFW_RR_P 0\nFW_RR_I 0\nEKF2_GPS_CTRL 0", "mine.params"))
     assert [text.split()[0] for text in made.checks.settings_not_flown(MissionParts())] == ["EKF2_GPS_CTRL"]
+
+
+@pytest.mark.parametrize(
+    ("text", "mission", "name"),
+    [
+        # `RTL::findRtlDestination`: 1 leaves out home where there is a landing, 3 takes the nearest of all.
+        ("RTL_TYPE 1", MissionParts(returns=True, commands=frozenset({16, 20, 21})), "RTL_TYPE 1 may return to the"),
+        ("RTL_TYPE 3", MissionParts(returns=True, commands=frozenset({16, 20, 189})), "RTL_TYPE 3 may return to the"),
+        ("RTL_TYPE 0", MissionParts(returns=True, commands=frozenset({16, 20, 21})), ""),
+        ("RTL_TYPE 1", MissionParts(returns=True, commands=frozenset({16, 20})), ""),
+        ("RTL_TYPE 1", MissionParts(commands=frozenset({16, 21})), ""),
+        ("RTL_TYPE 5", MissionParts(returns=True), "RTL_TYPE 5 without a rally point loiters"),
+        ("RTL_TYPE 5", MissionParts(returns=True, has_rally=True, has_rally_at_home=True), ""),
+        ("RTL_TYPE 0", MissionParts(returns=True, has_rally=True, has_rally_at_home=True), "PX4 ignores a rally point"),
+        ("RTL_TYPE 0", MissionParts(returns=True, has_rally=True), ""),
+    ],
+)
+def test_returns_to_other_places_than_the_simulated_one(text: str, mission: MissionParts, name: str) -> None:
+    made = Px4(
+        Px4Parameters.of_text(f"{text}\nRTL_DESCEND_ALT 100\nRTL_RETURN_ALT 100\nRTL_LAND_DELAY -1", "mine.params")
+    )
+    texts = made.checks.settings_not_flown(mission)
+    assert len(texts) == bool(name)
+    assert all(one.startswith(name) for one in texts)

@@ -391,7 +391,8 @@ def test_settings_leave_the_verdict_open_where_an_item_makes_them_matter(lines: 
     [
         ({}, ()),
         ({"GF_MAX_HOR_DIST": 300.0, "GF_MAX_VER_DIST": 50.0}, ("GF_MAX_HOR_DIST 300", "GF_MAX_VER_DIST 50")),
-        ({"GF_MAX_HOR_DIST": 300.0, "GF_ACTION": 0.0}, ()),
+        # Upload refuses items beyond it, whatever GF_ACTION is.
+        ({"GF_MAX_HOR_DIST": 300.0, "GF_ACTION": 0.0}, ("GF_MAX_HOR_DIST 300",)),
         ({"COM_FLT_TIME_MAX": 60.0}, ("COM_FLT_TIME_MAX 60",)),
         ({"FW_USE_AIRSPD": 0.0}, ("FW_USE_AIRSPD 0",)),
         ({"WEIGHT_BASE": 2.0, "WEIGHT_GROSS": 2.5}, ("WEIGHT_BASE 2", "WEIGHT_GROSS 2.5")),
@@ -466,7 +467,7 @@ LAND = wp(0, 0, 0, command=21)
         ({"RTL_LAND_DELAY": 0.0}, RETURN, ["RTL_LAND_DELAY 0"]),
         ({"RTL_TYPE": 2.0}, RETURN, ["RTL_TYPE 2"]),
         ({"RTL_TYPE": 4.0}, RETURN, ["RTL_TYPE 4"]),
-        ({"RTL_TYPE": 5.0}, RETURN, []),
+        ({"RTL_TYPE": 5.0}, RETURN, ["RTL_TYPE 5"]),
     ],
 )
 def test_settings_of_px4_leave_the_verdict_open_where_an_item_makes_them_matter(
