@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-import shapely
 
 from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem, round_to_grid
 from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneKind, is_hole, make_cylinder, make_polygon
@@ -302,43 +301,6 @@ def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north:
 
 # ----------------------------------------------------------------------
 # Conversion of a mission's own fence to airspace zones on the map.
-
-
-# Number of corners of a circle in a union of inclusions: it leaves out 1e-4 of the radius at most.
-_CIRCLE_CORNERS = 256
-
-
-def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
-    """Return zones with all inclusions united into one, as for an autopilot that stays inside any of them.
-
-    A circle becomes a polygon inside it.
-
-    >>> circles = [Zone(f"fence item {k}", "inclusion", make_cylinder(800.0 * k, 0.0, 500.0)) for k in range(2)]
-    >>> union, = unite_inclusions(circles)
-    >>> union.name, len(union.shape.rings), round(max(east for east, _ in union.shape.rings[0]))
-    ('fence item 0 and 1 more', 1, 1300)
-    """
-    inclusions = [zone for zone in zones if zone.kind == "inclusion"]
-    if len(inclusions) < 2:
-        return tuple(zones)
-    union = shapely.union_all([_outline(zone.shape) for zone in inclusions])
-    rings = [
-        [(east, north) for east, north in ring.coords]
-        for part in shapely.get_parts(union)
-        for ring in (part.exterior, *part.interiors)
-    ]
-    name = f"{inclusions[0].name} and {len(inclusions) - 1} more"
-    exclusions = [zone for zone in zones if zone.kind != "inclusion"]
-    return (Zone(name, "inclusion", make_polygon(rings)), *exclusions)
-
-
-def _outline(shape: Polygon | Cylinder) -> shapely.Polygon:
-    """Return the shape of a fence on the map."""
-    if isinstance(shape, Polygon):
-        return shapely.Polygon(shape.rings[0])
-    angles = np.linspace(0.0, 2.0 * math.pi, _CIRCLE_CORNERS, endpoint=False)
-    corners = np.column_stack([shape.east + shape.radius * np.cos(angles), shape.north + shape.radius * np.sin(angles)])
-    return shapely.Polygon(corners)
 
 
 def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str = "fence") -> tuple[Zone, ...]:

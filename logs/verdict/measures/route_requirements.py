@@ -20,7 +20,7 @@ from aircraft.path_limits import (
     turn_radius_between,
 )
 from flight.guidance.path import FlyByPath, path_polyline
-from flight.mission.fences import fence_zones, unite_inclusions
+from flight.mission.fences import fence_zones
 from flight.mission.ground_ways import GroundPhases
 from flight.mission.route import Route
 from flight.mission.surveys import Survey, camera_spacing, find_surveys
@@ -28,6 +28,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.places import Place
 from logs.verdict.tolerances import MAX_FLY_BY_OFFSET_RADII, SPEED_TOLERANCE_MPS, U_TURN_RAD
+from world.airspace.inclusions import unite_inclusions
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
 from world.arrays import Floats
