@@ -49,6 +49,8 @@ PARAMETER_SUFFIXES = (".parm",)
 _JUDGED_PREFIXES = ("RTL_", "RALLY_", "LAND_", "TECS_LAND_", "TKOFF_", "FW_LND_", "FW_TKO_", "NAV_DLL_ACT")
 # Suffixes of formats for flight logs only.
 LOG_SUFFIXES = (".csv", ".parquet", ".tlog", ".ulg")
+# Suffixes of files that contain the fence of a mission.
+_FENCE_SUFFIXES = (".plan", ".fence")
 # Names of contents in messages, keyed by the kind of the file.
 _CONTENT_NAMES = {"fence": "fence items", "rally": "rally points"}
 
@@ -79,7 +81,8 @@ class _SourceContent:
     lines: lines on a map, keyed by their meaning; empty if no target is a map.
     zones: zones on a map; empty if no target is a map.
     returns, footprint: coloured lines and shapes on a KML map.
-    notes: parts of the plan that the mission does not contain.
+    fence_notes: parts of the plan that a fence does not contain.
+    notes: parts of the plan that the autopilot would reject.
     log: the input, if it is a flight log.
     autopilot: the autopilot that flies the mission; None if no target needs it.
     """
@@ -90,6 +93,7 @@ class _SourceContent:
     zones: list[MapZone] = field(default_factory=list)
     returns: list[MapLine] = field(default_factory=list)
     footprint: list[MapZone] = field(default_factory=list)
+    fence_notes: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     log: FlightLog | None = None
     autopilot: Autopilot | None = None
@@ -133,7 +137,13 @@ def export(
     for target, (data, _) in zip(targets, contents, strict=True):
         write_atomically(target, data)
     loss = "" if source_content.log is None else loss_text(source_content.log)
-    notes = (*source_content.mission.warnings, *source_content.notes, *([loss] if loss else []))
+    writes_fence = any(target.suffix.lower() in _FENCE_SUFFIXES for target in targets)
+    notes = (
+        *source_content.mission.warnings,
+        *(source_content.fence_notes if writes_fence else ()),
+        *source_content.notes,
+        *([loss] if loss else []),
+    )
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
 
 
@@ -229,14 +239,14 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     mission, notes = add_plan_fence(setup)
     checks = setup.autopilot.checks
     missing_ends = missing_ends_text(mission, checks.feasibility) if checks.dialect == "px4" else ""
-    return replace(source, mission=mission, notes=(*notes, *([missing_ends] if missing_ends else [])))
+    return replace(source, mission=mission, fence_notes=notes, notes=(missing_ends,) if missing_ends else ())
 
 
 def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
     """Add the zones of the scenario to the fences of the mission."""
     fence_items, notes = zone_fences(scenario.zones, scenario.origin)
     mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
-    return replace(source, mission=mission, notes=tuple(notes))
+    return replace(source, mission=mission, fence_notes=tuple(notes))
 
 
 def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:

@@ -97,6 +97,8 @@ def _threat_table(row: Mapping[str, Any]) -> dict[str, Any]:
         radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
         if values.get(radius) == 0.0:
             values = {key: value for key, value in values.items() if key not in (radius, scale)}
+        elif isinstance(values.get(radius), str):
+            raise ArgumentError.of_argument(f"threats: column {radius}", values[radius], "expected numbers, not text")
         elif radius in values:
             values.setdefault(scale, ratio * values[radius])
     return values

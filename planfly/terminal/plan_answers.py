@@ -44,7 +44,7 @@ class FrontEntry:
     file: str
     length_m: float
     exposure_s: float
-    """Exposure to radars: the density of detection, integrated over the flight time."""
+    """Exposure to radars: density of detection, integrated over the flight time; not the time inside their range."""
     clearance_m: float
     """Lowest height above ground, m."""
     energy_wh: float | None
@@ -101,6 +101,13 @@ def front_answer(front: "Front", folder: Path, code: int) -> FrontAnswer:
 
 def fewer_plans_line(front: "Front") -> str:
     """Return a line that explains why a front has fewer plans than requested."""
+    if front.ended != "completed":
+        cause = "the time budget" if front.ended == "budget" else "an interruption"
+        unit = "evaluation" if front.evaluations == 1 else "evaluations"
+        return (
+            f"{len(front.plans)} of the {front.asked} requested: stopped by {cause} after {front.evaluations:,} "
+            f"{unit}; more time may find more plans"
+        )
     from planner.search.plan_front import NOTICEABLE_CLEARANCE_M, NOTICEABLE_EXPOSURE_FRACTION, NOTICEABLE_GAIN_FRACTION
 
     min_fraction, min_exposure = f"{NOTICEABLE_GAIN_FRACTION:.1%}", f"{NOTICEABLE_EXPOSURE_FRACTION:.0%}"

@@ -89,7 +89,10 @@ NOTICEABLE_CLEARANCE_M = 1.0
 
 @dataclass(frozen=True, slots=True)
 class FrontPlan:
-    """Plan of a front, and its values in SI units: m, s, m, s, J (NaN if the aircraft's power is unknown)."""
+    """Plan of a front, and its values in SI units: m, s, m, s, J (NaN if the aircraft's power is unknown).
+
+    exposure: density of detection by radars, integrated over the flight time; not the time inside their range.
+    """
 
     plan: Plan
     length: float
@@ -111,6 +114,7 @@ class Front:
     reference: (4,) reference point of the hypervolume, clearance negated; plans beyond it are ignored.
     evaluations: paths evaluated, without the default plan's evaluations.
     refused: number of other plans that were not safe once they were completed.
+    ended: "completed", or the reason why the search ended early: "budget" or "interrupted".
     """
 
     plans: tuple[FrontPlan, ...]
@@ -120,6 +124,7 @@ class Front:
     reference: Floats
     evaluations: int
     refused: int = 0
+    ended: str = "completed"
 
     def objectives(self) -> Floats:
         """Return the objectives (n, 4) of the plans; smaller is better for all of them."""
@@ -171,15 +176,16 @@ def plan_front(
     reference = reference_point(task, default_plan)
     if not default.safe or len(path) == 2:
         # A path of two waypoints has no inner waypoint to move.
-        return Front((default_plan,) if default.safe else (), count, task.fourth, default_plan, reference, 0)
+        only_plans = (default_plan,) if default.safe else ()
+        return Front(only_plans, count, task.fourth, default_plan, reference, 0, ended=default.ended)
     size = max(MIN_ARCHIVE_SIZE, SOLUTIONS_PER_PLAN * count)
     search = make_sampling(task, len(path), reference, size, stream(seed, PLANNER))
-    evaluations = _run_generations(task, search, path, progress, stop, generations)
+    evaluations, ended = _run_generations(task, search, path, progress, stop, generations)
     front_plans, unsafe_count = _certify_distinct(
         task, search, count, default_plan, replace(default, evaluations=evaluations), finish
     )
     plans = tuple(sorted(front_plans, key=lambda plan: plan.length))
-    return Front(plans, count, task.fourth, default_plan, reference, evaluations, unsafe_count)
+    return Front(plans, count, task.fourth, default_plan, reference, evaluations, unsafe_count, ended)
 
 
 # --- The problem ---
@@ -348,25 +354,25 @@ def _run_generations(
     progress: SearchProgress | None,
     stop: StopCondition | None,
     generations: int,
-) -> int:
-    """Sample generations from the seeds, and return the number of paths evaluated."""
-    paths = []
+) -> tuple[int, str]:
+    """Sample generations from the seeds; return the number of paths evaluated, and why the search ended."""
+    paths, reason = [], ""
     for path in seed_paths(task, np.array(default)):
         paths.append(path)
-        if stop is not None and stop():
+        if stop is not None and (reason := stop()):
             break
     seeds = np.array(paths)
     search.tell(task.vectors(seeds), *task.scores(seeds))
     evaluations = len(seeds)
     for generation in range(generations):
-        if len(search.vectors) == 0 or (stop is not None and stop()):
+        if len(search.vectors) == 0 or (stop is not None and (reason := stop())):
             break
         vectors = search.ask()
         search.tell(vectors, *task.scores(task.paths(vectors)))
         evaluations += len(vectors)
         if progress is not None:
             progress(generation + 1, generations, f"{len(search.vectors)} paths that no other dominates")
-    return evaluations
+    return evaluations, reason or "completed"
 
 
 def make_sampling(

@@ -193,7 +193,8 @@ def _loiter_finding(
     ok: bool | None = not (faults or failed_corners)
     if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
-        facts.append("the flight did not reach its end")
+        is_complete = aligned is not None and bool(aligned.passed[-1])
+        facts.append("a part of the circle was not flown" if is_complete else "the flight did not reach its end")
     if ok and hazards_text:
         ok = None
         facts.append(hazards_text)

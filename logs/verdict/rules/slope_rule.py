@@ -40,12 +40,19 @@ def slope_findings(
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
             measure = measure_slope(requirements, aligned, leg)
-        findings.append(_leg_finding(requirements, leg, measure))
+        is_complete = aligned is not None and bool(aligned.passed[-1])
+        findings.append(_leg_finding(requirements, leg, measure, is_complete=is_complete))
     return findings
 
 
-def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> Finding:
-    """Judge the slope of a leg, and how the leg was flown.  measure: None before a flight."""
+def _leg_finding(
+    requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None, *, is_complete: bool
+) -> Finding:
+    """Judge the slope of a leg, and how the leg was flown.
+
+    measure: None before a flight.
+    is_complete: True if the flight reached the last waypoint.
+    """
     planned_slope = float(requirements.slopes[leg])
     limit, source = slope_limit(requirements, leg)
     sign = 1.0 if planned_slope >= 0.0 else -1.0
@@ -83,8 +90,8 @@ def _leg_finding(requirements: RouteRequirements, leg: int, measure: SlopeMeasur
         ok, check = None, UNKNOWN_AIRCRAFT
         facts.insert(0, uncertainty)
     if measure is not None and not measure.is_finished:
-        facts.append("the flight did not reach its end")
-        ok = None if ok else False
+        facts.append("the leg was not flown to its end" if is_complete else "the flight did not reach its end")
+        ok = False if faults else None
     judged = planned_slope if fit is None else fit.value
     return make_finding(
         "slope",

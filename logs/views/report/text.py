@@ -175,6 +175,15 @@ def failed_groups(verdict: Verdict) -> list[FailedGroup]:
     return groups
 
 
+def first_remedy(verdict: Verdict) -> FindingRow | None:
+    """Return the first failed finding with a remedy, a ground contact before all others; None if none has a remedy."""
+    worst = [rule.failed[0] for rule in verdict.present().failed_rules]
+    # A ground contact ended the flight; the sort keeps the order of the others.
+    worst.sort(key=lambda one: not (one.rule == "clearance" and one.flown is not None and one.flown <= 0.0))
+    rows = (_finding_row(finding, verdict.deciding) for finding in worst)
+    return next((row for row in rows if row.remedy), None)
+
+
 def _place_and_value(row: FindingRow) -> str:
     """Describe the place and value of a failed finding."""
     value = row.planned if row.flown == NOTHING else row.flown

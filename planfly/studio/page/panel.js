@@ -258,7 +258,7 @@ export class Panel {
     const of = this.waysOf = rev ?? this.now.rev;
     box.append(element("h2", {}, ways.length === 1 ? "Found" : `${ways.length} paths found`));
     ways.forEach((way, k) => {
-      const figures = [["Length", way.length / 1000, 2, "km"], ["Seen by radars", way.exposure, 0, "s"], ["Above ground at least", way.clearance, 0, "m"], ["Time", way.seconds, 0, "s"], ["Energy", way.energy, 0, "Wh"]];
+      const figures = [["Length", way.length / 1000, 2, "km"], ["Radar exposure, weighted", way.exposure, 0, "s"], ["Above ground at least", way.clearance, 0, "m"], ["Time", way.seconds, 0, "s"], ["Energy", way.energy, 0, "Wh"]];
       const rows = figures.filter((one) => one[1] !== null).map(([name, value, digits, unit]) => [name, `${plain(value, digits)} ${unit}`]);
       const take = element("button", { type: "button", onclick: () => { app.ways([]); app.commit({ kind: "choose", rev: of, which: k }); } }, "Use this path");
       const card = element("section", { class: "card", "data-state": way.state === "safe" ? "ok" : "fail", onpointerenter: () => app.ways(ways, k) },

@@ -100,3 +100,9 @@ def test_a_scenario_from_nothing_is_refused_with_the_function_that_makes_one(val
 def test_a_field_of_a_wrong_type_is_refused() -> None:
     with pytest.raises(planfly.PlanflyError, match="could not convert string to float: 'west'"):
         replace(planfly.make_scenario("tight"), start="west")
+
+
+def test_a_threats_column_of_text_is_named_with_its_value() -> None:
+    columns = {"east_m": [900.0], "north_m": [90.0], "kill_radius_m": ["900"]}
+    with pytest.raises(planfly.PlanflyError, match=r"column kill_radius_m 900: expected numbers, not text"):
+        planfly.make_scenario("tight", threats=columns)

@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
+import planfly
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.mission_files.formats import read_mission
@@ -146,3 +147,12 @@ def test_what_is_about_a_flight_is_not_written_of_a_plan(
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / f"a.{kind}")]) == 2
     assert f".{kind} is written only from a flight log (.mcap)" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_only_a_file_with_a_fence_says_what_the_fence_omits(tmp_path: Path) -> None:
+    scenario = planfly.make_scenario("tight", threats=[[1200.0, 4000.0, 45.0, 0.0]])
+    plan = planfly.plan(scenario, seed=1)
+    assert planfly.export(plan, tmp_path / "m.waypoints", tmp_path / "m.kml").notes == ()
+    for name in ("m.plan", "m.fence"):
+        (note,) = planfly.export(plan, tmp_path / name).notes
+        assert note.startswith("1 missile sphere became an exclusion circle")

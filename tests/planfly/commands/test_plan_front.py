@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 
 from planfly.cli import main
+from planfly.terminal.plan_answers import fewer_plans_line
+from planfly.workflow.airframe import load_airframe
 from planner.plan import read_plan
+from planner.search.plan_front import plan_front
+from planner.search.plan_path import plan_path
+from world.scenario import load_scenario
 
 
 @pytest.mark.usefixtures("short_fronts")
@@ -74,3 +79,13 @@ def test_what_does_not_go_with_a_front_is_refused_in_a_line(
     assert error.count("\n") == 1
     assert line in error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_front_that_its_budget_ended_says_so() -> None:
+    scenario = load_scenario("tight")
+    limits = load_airframe(scenario).limits
+    default = plan_path(scenario, limits, seed=1)
+    front = plan_front(scenario, limits, 10, seed=1, default=default, stop=lambda: "budget")
+    # The search stops after the first seed, which is the default plan.
+    assert (front.ended, front.evaluations, len(front.plans)) == ("budget", 1, 1)
+    assert fewer_plans_line(front).startswith("1 of the 10 requested: stopped by the time budget after 1 evaluation;")

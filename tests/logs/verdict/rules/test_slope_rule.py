@@ -9,6 +9,9 @@ import pytest
 from aircraft.envelope import Envelope
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.rules.slope_rule import slope_findings
 from tests.logs.verdict.judging import failing, judge, leg, of
 from tests.synthetic import (
     Profile,
@@ -259,6 +262,23 @@ def test_a_slope_within_what_is_not_known_is_undecided() -> None:
             " an aircraft from a data sheet"
         )
         assert verdict.levels[0].undecided
+
+
+def test_an_uncertain_slope_that_was_not_flown_is_undecided() -> None:
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(10.0)], table=unsure())
+    # The flight ends halfway along leg 0.
+    item = of(judge(setup, fly_path(setup, stop=500.0)), "slope", leg(1))
+    assert (item.ok, item.check, item.flown) == (None, "unknown aircraft", None)
+    assert item.reason.endswith("the flight did not reach its end")
+    # The flight reaches the last waypoint, but no row belongs to leg 1.
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup))
+    assert aligned is not None
+    rows = aligned.rows.copy()
+    rows[1] = rows[2]
+    item = slope_findings(requirements, replace(aligned, rows=rows))[1]
+    assert (item.ok, item.check, item.method) == (None, "unknown aircraft", "not flown")
+    assert item.reason.endswith("the leg was not flown to its end")
 
 
 def test_what_is_sure_of_an_unsure_aircraft_is_judged() -> None:

@@ -18,6 +18,7 @@ from logs.verdict.wording import place_text, suggestions_text
 from logs.views.report.text import (
     failed_groups,
     finding_rows,
+    first_remedy,
     not_reflown_lines,
     number,
     quantity,
@@ -76,6 +77,18 @@ def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
     change = (Change("height", LEG, None, 9.0, "m"),)
     both = remedy_text(replace(low, suggestions=(change,)), DECIDING)
     assert both == f"{suggestions_text((change,))}; {remedy_text(low, DECIDING)}"
+
+
+@pytest.mark.parametrize(("clearance", "advised"), [(-0.02, "clearance"), (20.0, "slope")])
+def test_the_remedy_of_a_ground_contact_comes_first(clearance: float, advised: str) -> None:
+    changes = {rule: (Change("height", Place("leg", 7), None, 78.0, "m"),) for rule in ("slope", "clearance")}
+    findings = tuple(
+        replace(failed(rule, flown, limit, flown - limit), suggestions=(changes[rule],))
+        for rule, flown, limit in (("slope", -6.0, -4.6), ("clearance", clearance, 30.0))
+    )
+    row = first_remedy(Verdict(findings, False, True, (), "flown"))
+    assert row is not None
+    assert row.rule == advised
 
 
 # ----------------------------------------------------------------------
