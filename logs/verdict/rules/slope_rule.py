@@ -59,14 +59,7 @@ def _leg_finding(
     if abs(planned_slope) <= LEVEL_SLOPE_RAD and not _is_in_envelope(requirements, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL_SLOPE_RAD)
-    faults, facts = [], []
-    if abs(planned_slope) > limit + PLAN_TOLERANCE_RAD:
-        step = step_height(requirements, leg)
-        if step is None:
-            faults.append(_steep_leg_message(requirements, leg, limit, source))
-        else:
-            facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
-    faults += _steep_arc_faults(requirements, leg)
+    faults, facts = _planned_slope_messages(requirements, leg, limit, source)
     # A fault of the plan states the planned slope itself.
     facts = facts if faults else [f"slope {math.degrees(planned_slope):+.2f}°", *facts]
     fit: LegFit | None = None
@@ -111,6 +104,21 @@ def _leg_finding(
         check=check,
         facts=_measured_facts(requirements, leg, measure),
     )
+
+
+def _planned_slope_messages(
+    requirements: RouteRequirements, leg: int, limit: float, source: str
+) -> tuple[list[Message], list[str]]:
+    """Return the faults of a leg's planned slope and of the arc at its end, and a fact about a negligible step."""
+    faults: list[Message] = []
+    facts: list[str] = []
+    if abs(float(requirements.slopes[leg])) > limit + PLAN_TOLERANCE_RAD:
+        step = step_height(requirements, leg)
+        if step is None:
+            faults.append(_steep_leg_message(requirements, leg, limit, source))
+        else:
+            facts.append(f"a step of {step:.1f} m, steeper than {math.degrees(limit):.1f}°, but negligible")
+    return faults + _steep_arc_faults(requirements, leg), facts
 
 
 def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
