@@ -139,7 +139,7 @@ def test_a_loiters_corners_are_one_finding(outcomes: tuple[bool | None, bool | N
     (one, rest) = merge_loiter_findings(requirements, aligned, [at[0], outside, at[1]])
     assert rest is outside
     assert (one.rule, one.place, one.ok) == ("loiter", corners[0], ok)
-    assert ("did not reach its end" in one.reason) is (ok is None)
+    assert ("a part of the circle was not flown" in one.reason) is (ok is None)
 
 
 def test_corners_that_were_not_held_are_counted_and_the_worst_is_named() -> None:
