@@ -215,7 +215,9 @@ class FlightSetup:
     fdm_hz: steps of JSBSim per second.
     engine: flight model to use; both give the same flight.
     source: the imported log that the flight comes from; None for a flight by planfly.
-    path: reference path from route and limits.
+    demanded_route: route with the airspeeds that are demanded in flight, where the autopilot ignores or limits a
+        command.  An imported flight keeps the commanded airspeeds: the limits of its autopilot may be unknown.
+    path: reference path from the demanded route and the limits.
     """
 
     scenario: Scenario
@@ -232,10 +234,15 @@ class FlightSetup:
     fdm_hz: Literal[60, 120] = FDM_HZ
     engine: EngineChoice = field(default="auto", compare=False)
     source: ImportedLog | None = None
+    demanded_route: Route = field(init=False, repr=False, compare=False)
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Build the reference path from the demanded route and the limits."""
+        """Compute the demanded airspeeds and, with them, the reference path."""
+        airspeed = self.autopilot.speeds.flown(self.route.airspeed, self.airspeed)
+        keeps_commands = self.source is not None or np.array_equal(airspeed, self.route.airspeed)
+        demanded_route = self.route if keeps_commands else replace(self.route, airspeed=airspeed)
+        object.__setattr__(self, "demanded_route", demanded_route)
         object.__setattr__(self, "path", fly_by_path(self.demanded_route, self.limits, self.scenario.terrain))
 
     @property
@@ -257,17 +264,6 @@ class FlightSetup:
     def airspeed(self) -> float:
         """Airspeed until the mission sets another one, m/s."""
         return self.limits.airspeed
-
-    @property
-    def demanded_route(self) -> Route:
-        """Route with the airspeeds that are demanded in flight, where the autopilot ignores or limits a command.
-
-        An imported flight keeps the commanded airspeeds: the limits of its autopilot may be unknown.
-        """
-        airspeed = self.autopilot.speeds.flown(self.route.airspeed, self.airspeed)
-        if self.source is not None or np.array_equal(airspeed, self.route.airspeed):
-            return self.route
-        return replace(self.route, airspeed=airspeed)
 
     @property
     def min_ground_speeds(self) -> Floats:

@@ -376,7 +376,8 @@ class RouteRequirements:
 
     def leg(self, index: int) -> Place:
         """Return a leg as the place of a finding, with the item to which it leads."""
-        number = int(self.setup.route.leg_numbers[index])
+        # As in `Route.leg_numbers`, which is too slow to compute for each leg of a long mission.
+        number = max(int(self.setup.route.stops[index + 1]) - 1, 0)
         return Place("leg", index, to_item=self._item_number(index + 1), number=number)
 
     def _item_number(self, waypoint: int) -> int | None:
