@@ -21,7 +21,7 @@ _ARRAY_KERNELS = (
     "world.terrain.steepest_slopes",
     "planner.airspace.zone_limits._reduce_margins",
     "planner.evaluation.threat_index._fill_cells",
-    "planner.evaluation.threat_index._lists",
+    "planner.evaluation.threat_index._list_units",
 )
 # Kernels of a planning problem.
 _PROBLEM_KERNELS = (*_WORLD_KERNELS, *_ARRAY_KERNELS)
@@ -78,7 +78,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     ),
     "fronts": (
         *_PROBLEM_KERNELS,
-        "planner.evaluation.front_scores._fill",
+        "planner.evaluation.front_scores._fill_values",
         "planner.optimisers.hypervolume._mark_covered_probes",
         "planner.optimisers.hypervolume._choose_rows_greedily",
     ),

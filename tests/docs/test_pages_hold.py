@@ -97,7 +97,7 @@ def test_every_setting_that_leaves_the_verdict_open_stands_on_its_page() -> None
         (r"BATT[2-9A-G]_.*", "BATT2_*"),
         (r"(?:RLL|PTCH)_RATE_(FF|P|I|D|FLTT|FLTE|IMAX)", r"*_RATE_\1"),
         (r"ARSPD[3-6]_(TYPE|USE)", r"ARSPD2_\1"),
-        (r"SERVO\d+_(FUNCTION|MIN|MAX)", r"SERVOn_\1"),
+        (r"SERVO\d+_FUNCTION", "SERVOn_FUNCTION"),
         (r"FW_(RR|PR)_(?:P|I|D|FF)", r"FW_\1_*"),
         (r"CA_SV_CS\d_(TYPE|TRQ_R|TRQ_P)", r"CA_SV_CSn_\1"),
         (r"CA_(SV|R)\d+_SLEW", r"CA_\1n_SLEW"),

@@ -50,7 +50,7 @@ OPEN_SETTINGS = {
     # `Plane::stabilize_pitch_get_pitch_out` raises the pitch demand with the throttle.
     "KFF_THR2PTCH": OpenSetting(_FLIGHT, by_program=True),
     # `Plane::stabilize_yaw` steers by the rudder below this height; lower values concern take-off and landing alone.
-    "GROUND_STEER_ALT": OpenSetting(_FLIGHT, 0.0, 20.0, by_program=True),
+    "GROUND_STEER_ALT": OpenSetting(_FLIGHT, 0.0, 20.0),
     # `Plane::throttle_watt_limiter` and, in 4.7, `FWD_BATT_CMP::apply_min_max` reduce the throttle.
     "BATT_WATT_MAX": OpenSetting(_FLIGHT),
     "FWD_BAT_THR_CUT": OpenSetting(_FLIGHT),
@@ -308,11 +308,7 @@ def _describe_outputs(parameters: ArduPilotParameters, values: Mapping[str, floa
         return
     count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
     pins = int(values["SERVO_GPIO_MASK"])
-    functions = {
-        values[f"SERVO{output}_FUNCTION"]
-        for output in range(1, count + 1)
-        if not pins & 1 << (output - 1) and values[f"SERVO{output}_MIN"] < values[f"SERVO{output}_MAX"]
-    }
+    functions = {values[f"SERVO{output}_FUNCTION"] for output in range(1, count + 1) if not pins & 1 << (output - 1)}
     names = f"SERVO1_FUNCTION to SERVO{count}_FUNCTION" + (f" without SERVO_GPIO_MASK {pins}" if pins else "")
     for part, moving in _FUNCTIONS_BY_PART.items():
         if functions.isdisjoint(moving):

@@ -201,8 +201,6 @@ _WHEN_STATED = {
     **dict.fromkeys(("GROUND_STEER_ALT", "SERVO_32_ENABLE", "SERVO_GPIO_MASK"), 0.0),
     "MIXING_GAIN": 0.5,
     **{f"SERVO{output}_FUNCTION": 0.0 for output in range(5, 33)},
-    **{f"SERVO{output}_MIN": 1100.0 for output in range(1, 33)},
-    **{f"SERVO{output}_MAX": 1900.0 for output in range(1, 33)},
     "SERVO1_FUNCTION": 4.0,
     "SERVO2_FUNCTION": 19.0,
     "SERVO3_FUNCTION": 70.0,

@@ -53,7 +53,7 @@ def test_a_return_that_a_program_flies_as_the_law_does_agrees(
         monkeypatch.setattr(program_returns, "fly_and_judge", by_law)
     flat = [word.replace("mound.toml", "flat.toml") for word in ASKED]
     assert main([*flat, "--sitl", str(write_fake(mound)), "--out", "drawn"]) == 0
-    assert " itself: 1 of the worst flown, all of them agree with the simulation" in capsys.readouterr().out
+    assert " itself: 1 of the worst returns flown, all of them agree with the simulation" in capsys.readouterr().out
     (one,) = json.loads((mound / "a.json").read_text(encoding="utf-8"))["by_program"]["returns"]
     assert (one["agrees"], one["worse"], one["reason"]) == (True, False, "")
     assert one["program"]["kind"] == one["law"]["kind"] == "safe"
@@ -70,8 +70,8 @@ def test_harm_that_a_program_does_counts_where_the_law_does_none(
     assert main([*ASKED, "--sitl", str(write_fake(mound, "dives-home")), "--out", "drawn"]) == 4
     out = capsys.readouterr().out
     assert "returns 1 hits the ground" in out
-    program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst flown"
-    assert f"{program}, 0 of them agree with the simulation; 1 worse than simulated" in out
+    program = "by ArduPlane V0.0-fake (0badc0de) itself: 1 of the worst returns flown"
+    assert f"{program}, 0 of them agree with the simulation; 1 ended worse than in the simulation" in out
     assert "the program's outcome applies, because it is worse" in out
     answer = json.loads((mound / "a.json").read_text(encoding="utf-8"))
     (one,) = answer["by_program"]["returns"]

@@ -228,7 +228,7 @@ def test_only_the_commands_file_is_written_over_and_not_if_it_was_changed(tmp_pa
     session, _ = open_session(str(file), MissionOptions(scenario="jacksboro"))
     session.open(open_document(str(other), session.options))
     assert session.sheet()["over"] == ""
-    with pytest.raises(PlanflyError, match="no mission file was named"):
+    with pytest.raises(PlanflyError, match="started without a mission file"):
         session.overwrite_file()
     session.open(open_document(str(file), session.options))
     for _ in range(2):

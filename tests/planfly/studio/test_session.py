@@ -156,7 +156,7 @@ def test_only_the_named_file_is_written_over(tmp_path: Path) -> None:
     session.overwrite_file()
     assert parse_mission(file.read_text(encoding="utf-8"), "m").items == session.mission.items
     session.open(open_dropped("other.waypoints", file.read_bytes(), session.options))
-    with pytest.raises(PlanflyError, match="no mission file was named"):
+    with pytest.raises(PlanflyError, match="started without a mission file"):
         session.overwrite_file()
 
 

@@ -53,7 +53,7 @@ def test_parameters_are_flown_with_and_saved() -> None:
     assert session.settings_json()["parameters"] == {"WP_RADIUS": 60.0}
     set_in(session, autopilot="px4")
     assert session.settings_json()["parameters"] == {}
-    with pytest.raises(PlanflyError, match="no parameter was set here"):
+    with pytest.raises(PlanflyError, match="no parameter was set in the studio"):
         session.save("parm")
 
 

@@ -247,8 +247,6 @@ def test_settings_that_depend_on_others(text: str, mission: MissionParts, expect
         ("SERVO1_FUNCTION 0\nSERVO17_FUNCTION 4\nSERVO_32_ENABLE 1", ""),
         ("SERVO_GPIO_MASK 4", "SERVO1_FUNCTION to SERVO16_FUNCTION without SERVO_GPIO_MASK 4 move no motor"),
         ("SERVO_GPIO_MASK 16", ""),
-        ("SERVO3_MIN 1100\nSERVO3_MAX 1100", "SERVO1_FUNCTION to SERVO16_FUNCTION move no motor"),
-        ("SERVO3_MIN 1000\nSERVO3_MAX 2000", ""),
         ("SERVO1_FUNCTION 77\nSERVO2_FUNCTION 78\nSERVO4_FUNCTION 0", ""),
         ("SERVO2_FUNCTION 79\nSERVO4_FUNCTION 80", ""),
         ("SERVO1_FUNCTION 0\nSERVO3_FUNCTION 73\nSERVO5_FUNCTION 74\nSERVO9_FUNCTION 4", ""),

@@ -259,7 +259,7 @@ def test_the_slider_moves_the_aircraft_and_its_read_out(browser: Browser, track:
     said = browser.value(READ_OUT)
     assert said["time"] == "3.0 s"
     row = int(np.searchsorted(track.time, 3.0))
-    assert float(said["height"].split()[0].replace("−", "-")) == pytest.approx(track.position[row, 2], abs=1.0)
+    assert float(said["altitude"].split()[0].replace("−", "-")) == pytest.approx(track.position[row, 2], abs=1.0)
     assert float(said["airspeed"].split()[0]) == pytest.approx(float(track.airspeed[row]), abs=0.3)
     assert {"leg", "above ground", "bank"} <= set(said)
     assert browser.value(f"{slider}.getAttribute('aria-valuetext')").startswith("3.0 s, leg ")
