@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from flight.autopilots.parts import SpeedLimits
+from flight.autopilots.parts import MissionDialect, SpeedLimits
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
@@ -135,6 +135,19 @@ def mission_of_plan(plan: Plan, airframe: Airframe, source: str = PLAN_FILE) -> 
     return plan_mission(plan, airframe.airspeed, airframe.max_bank, source, airframe.limits.tracking)
 
 
+# Number of items that a common board stores, with the name of the board, by dialect: 724 on a Pixhawk
+# (`StorageManager` of ArduPilot), and `NUM_MISSIONS_SUPPORTED` of PX4.
+_STORED_ITEMS = {"ardupilot": (724, "a Pixhawk with ArduPlane"), "px4": (500, "a flight controller with PX4")}
+
+
+def _item_count_notes(mission: Mission, dialect: MissionDialect) -> tuple[str, ...]:
+    """Note a mission of more items than a common board of the autopilot stores; such a board refuses the upload."""
+    limit, board = _STORED_ITEMS.get(dialect, (len(mission.items), ""))
+    if len(mission.items) <= limit:
+        return ()
+    return (f"{len(mission.items)} items: {board} stores {limit}, and refuses more",)
+
+
 def make_setup(
     scenario: Scenario,
     airframe: Airframe,
@@ -169,6 +182,7 @@ def make_setup(
     notes = autopilot.checks.parameter_notes
     notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters)
     notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
+    notes += _item_count_notes(mission, autopilot.checks.dialect)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
     return FlightSetup(
         scenario=scenario,
