@@ -93,10 +93,11 @@ def judged_airspace(setup: FlightSetup) -> Airspace:
     """
     fence_fault, mission_zones = "", tuple[Zone, ...]()
     try:
-        mission_zones = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
-        if setup.autopilot.checks.unites_inclusions:
-            mission_zones = unite_inclusions(mission_zones)
-    except MissionError as error:
+        stated_zones = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
+        unites = setup.autopilot.checks.unites_inclusions
+        mission_zones = unite_inclusions(stated_zones) if unites else stated_zones
+    # A union may have more corners than a zone may have.
+    except (MissionError, ValueError) as error:
         fence_fault = str(error)
     zones = (*setup.scenario.zones, *mission_zones) if mission_zones else setup.scenario.zones
     return Airspace(zones, _cached_records(zones), fence_fault, len(setup.scenario.zones))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from flight.mission.fences import fence_shapes
+from flight.mission.items import Mission, MissionItem
 from flight.mission_files.formats import read_fence, read_mission
 from flight.simulation.setup import FlightSetup
 from logs.recording.reader import read_log
@@ -21,7 +22,7 @@ from planfly.named_fences import read_named_fences
 from planfly.plan_fence import add_plan_fence
 from planfly.workflow.airframe import airframe_for_setup, load_airframe
 from planfly.workflow.make_plan import make_plan
-from planfly.workflow.open_flight import mission_of_plan, open_flight
+from planfly.workflow.open_flight import _item_count_notes, mission_of_plan, open_flight
 from planner.plan import plan_json
 from tests.mission_lines import a_plan, setup_of, wp
 from tests.planfly.conftest import FIELD
@@ -312,3 +313,15 @@ def test_a_mission_that_lies_beside_the_name_is_named(short_mission: Path) -> No
         open_flight(short_mission.with_name("n.waypoints"), {})
     with pytest.raises(MissionError, match=r"\.waypoints or \.plan file$"):
         open_flight(short_mission.parent / "nowhere" / "m.waypoints", {})
+
+
+@pytest.mark.parametrize(
+    ("dialect", "count", "limit"),
+    # `StorageManager` of ArduPilot on a Pixhawk; `NUM_MISSIONS_SUPPORTED` of PX4; planfly's own guidance has no board.
+    [("ardupilot", 724, None), ("ardupilot", 725, 724), ("px4", 500, None), ("px4", 501, 500), ("planfly", 9000, None)],
+)
+def test_a_mission_that_a_common_board_does_not_store_is_noted(dialect: Any, count: int, limit: int | None) -> None:
+    items = tuple(MissionItem(k, 16, 3, (0.0, 0.0, 0.0, 0.0), 46.0, 8.0, 100.0) for k in range(count))
+    notes = _item_count_notes(Mission(None, items), dialect)
+    assert len(notes) == (limit is not None)
+    assert all(note.startswith(f"{count} items: ") and f" stores {limit}," in note for note in notes)
