@@ -67,7 +67,8 @@ class PhotoLine(NamedTuple):
     first, last: index of the first and last waypoint; the legs of the line are first to last - 1.
     begins, ends: index of the first and last waypoint of the line's run, which may extend beyond the line.
     photo: distance between photos, m; 0 if no item states it.
-    switched_on, switched_off: True if the first waypoint switches the camera on, and if the last one switches it off.
+    camera_on_at, camera_off_at: index of the waypoint of the run that switches the camera on, and of the waypoint that
+        switches it off; -1 if none does.
     """
 
     first: int
@@ -75,8 +76,8 @@ class PhotoLine(NamedTuple):
     begins: int
     ends: int
     photo: float = 0.0
-    switched_on: bool = False
-    switched_off: bool = False
+    camera_on_at: int = -1
+    camera_off_at: int = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +118,7 @@ class Survey:
 
     def takes_photos(self) -> bool:
         """Return True if items of the mission switch the camera on the survey's lines."""
-        return any(line.switched_on or line.switched_off or line.photo > 0.0 for line in self.lines)
+        return any(line.camera_on_at >= 0 or line.camera_off_at >= 0 or line.photo > 0.0 for line in self.lines)
 
     def turn_arounds(self) -> list[tuple[int, int]]:
         """Return the first and last waypoint of each turn-around."""
@@ -497,8 +498,8 @@ def _camera_part(run: tuple[int, int], camera: Floats) -> PhotoLine:
         last_waypoint,
         *run,
         float(np.nan_to_num(camera[first_waypoint])),
-        was_off,
-        bool(camera[last_waypoint] == 0.0),
+        first_waypoint if was_off else -1,
+        last_waypoint if camera[last_waypoint] == 0.0 else -1,
     )
 
 

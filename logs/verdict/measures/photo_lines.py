@@ -100,7 +100,7 @@ def _line_rows(
         "off_line": np.abs(across) <= lateral_tolerance(requirements, survey),
         "banked": np.abs(aligned.track.attitude[window, ROLL]) <= MAX_PHOTO_BANK_RAD,
         "off_height": np.abs(height_error) <= height_tolerance,
-        "camera_off": _camera_on_rows(requirements, line, position, along, is_ahead, axis.length),
+        "camera_off": _camera_on_rows(requirements, line, axis, position, is_ahead),
     }
     return _LineRows(axis, window, position, along, across, is_ahead, height_error, height_tolerance, conditions)
 
@@ -174,27 +174,30 @@ def heights_over_ground(requirements: RouteRequirements, positions: Floats) -> F
 
 
 def _camera_on_rows(
-    requirements: RouteRequirements, line: PhotoLine, position: Floats, along: Floats, is_ahead: Flags, length: float
+    requirements: RouteRequirements, line: PhotoLine, axis: LineAxis, position: Floats, is_ahead: Flags
 ) -> Flags:
     """Return True for each row at which the camera is on.
 
     is_ahead: True for each row that flies along the line.
 
-    The camera is on from reaching the line's first waypoint to reaching its last waypoint.  It is always on if the
-    mission does not switch it on this line.
+    The camera is on from reaching the waypoint that switches it on to reaching the waypoint that switches it off.  Both
+    may be beyond the line's ends, and each is optional.
     """
-    follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(along))
+    follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(position))
+    along = axis.of(position)[0]
 
-    def first_row_at(waypoint: int, min_along: float, first_row: int = 0) -> int:
-        """Return the first row, from `first_row` on, that reaches a waypoint or is `min_along` (m) along the line."""
-        distances = np.hypot(*(position[:, :2] - requirements.points[waypoint, :2]).T)
+    def first_row_at(waypoint: int, first_row: int = 0) -> int:
+        """Return the first row, from `first_row` on, that reaches or passes a waypoint."""
+        point = requirements.points[waypoint]
+        distances = np.hypot(*(position[:, :2] - point[:2]).T)
         # An autopilot that follows a path is at a waypoint where the path passes it.
         radius = 0.0 if follows_path else acceptance_condition(requirements, waypoint).radius
-        indices = np.flatnonzero(((distances <= radius) | (along >= min_along)) & is_ahead & (rows >= first_row))
+        is_at_waypoint = (distances <= radius) | (along >= axis.of(point[None])[0][0])
+        indices = np.flatnonzero(is_at_waypoint & is_ahead & (rows >= first_row))
         return int(indices[0]) if indices.size else len(along)
 
-    on_row = first_row_at(line.first, 0.0) if line.switched_on else 0
-    off_row = first_row_at(line.last, length, on_row) if line.switched_off else len(along)
+    on_row = first_row_at(line.camera_on_at) if line.camera_on_at >= 0 else 0
+    off_row = first_row_at(line.camera_off_at, on_row) if line.camera_off_at >= 0 else len(along)
     return (rows >= on_row) & (rows <= off_row)
 
 

@@ -314,7 +314,7 @@ def test_the_camera_between_photos() -> None:
     read, route = with_camera(*grid())
     assert camera_spacing(read, route).tolist() == [25.0, 0.0] * 4
     [found] = find_surveys(route, camera_spacing(read, route))
-    assert all((line.photo, line.switched_on, line.switched_off) == (25.0, True, True) for line in found.lines)
+    assert all((line.photo, line.camera_on_at, line.camera_off_at) == (25.0, *line[:2]) for line in found.lines)
 
 
 def test_where_the_camera_is_switched_lines_are_where_it_is_on() -> None:

@@ -177,6 +177,26 @@ def test_photos_that_a_waypoint_counted_early_costs() -> None:
     assert "its first 0 m and last 91 m are lost" in first.reason
 
 
+@pytest.mark.parametrize(("lead", "lost"), [(LEAD, 0.0), (60.0, 30.0)])
+def test_camera_switched_off_behind_the_last_lead_costs_only_what_the_lead_is_too_short(
+    lead: float, lost: float
+) -> None:
+    """ArduPlane counts the end of the last lead as reached 90 m before it: 30 m before the line's end if it is 60 m."""
+    law = ArduPlane(ArduPilotParameters.defaults()).with_parameters(WP_RADIUS=90.0)
+    items = [wp(east, north, 100.0) for east, north, _ in lines(lead)]
+    items = [items[0], "2 206 50 0 1 0 0 0 0", *items[1:], "2 206 0 0 1 0 0 0 0"]
+    # One more leg, so that the last lead ends at a right angle, before which ArduPlane turns by all of WP_RADIUS.
+    setup = setup_of(*items, wp(1500.0, LENGTH + lead, 100.0), home="36.5 -84.2 100")
+    setup = replace(
+        setup,
+        autopilot=law,
+        nav="perfect",
+        mission=replace(setup.mission, survey_plans=(SurveyPlan(50.0, lead),)),
+    )
+    last = photo_lines(judge(setup, fly_path(setup, radius=1.0)))[2]
+    assert last.flown == pytest.approx(100.0 - 100.0 * lost / LENGTH, abs=1.0)
+
+
 # A camera that sees 5 m across and 2 m along for each of its height: of 500 m by 200 m from 100 m above ground.  Of it
 # 60 % beside, 200 m apart, and 75 % along, a photo each 50 m.
 CAMERA = Camera(across=5.0, along=2.0, front=0.75, side=0.6)
