@@ -67,9 +67,9 @@ def change_text(change: Change) -> str:
     >>> change_text(Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m"))
     'pass town 40 m further north'
     >>> change_text(Change("descent", Place("leg", 3), None, 12.0, "m"))
-    'fly leg 3 12 m lower'
+    'lower both ends of leg 3 by 12 m'
     >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
-    'fly leg 3, to item 5, 12 m lower'
+    'lower both ends of leg 3, to item 5, by 12 m'
     >>> change_text(Change("full throttle", Place("leg", 3), None, 20.0, "s"))
     'fly a climb of 20 s at full throttle and give its log to planfly aircraft --identify'
     """
@@ -88,8 +88,10 @@ def change_text(change: Change) -> str:
         case "turn":
             return f"turn at most {requested_value:.1f}° at {place_text(change.place)}"
         case "height" | "descent":
-            step = f"{requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
-            return f"fly {place_name} {step}" if change.place.kind == "leg" else f"pass {change.place.name} {step}"
+            if change.place.kind == "leg":
+                verb = "raise" if change.what == "height" else "lower"
+                return f"{verb} both ends of {place_name} by {requested_value:.0f} m"
+            return f"pass {change.place.name} {requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
         case "north" | "east" | "south" | "west":
             verb = "stay in" if change.place.kind == "inclusion" else "pass"
             return f"{verb} {change.place.name} {requested_value:.0f} m further {change.what}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, TypeGuard
 
 from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.parts import Candidate
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.placing import place_stops
 from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
@@ -76,6 +77,11 @@ class NearMiss:
     lines: int
     verdict: Verdict
 
+    @property
+    def worst(self) -> float:
+        """Usable part of the worst photo line, %."""
+        return min(_usable_parts(self.verdict))
+
 
 @dataclass(frozen=True, slots=True)
 class TriedRemedies:
@@ -134,6 +140,25 @@ def _count_usable(verdict: Verdict) -> tuple[int, int]:
     """Return the number of usable photo lines according to a verdict, and the number of all photo lines."""
     lines = [finding.ok for finding in verdict.findings if finding.rule == "survey" and not finding.check]
     return sum(is_usable is True for is_usable in lines), len(lines)
+
+
+def _usable_parts(verdict: Verdict) -> list[float]:
+    """Return the usable part of each photo line that was measured, %; 0 for a line that was not flown."""
+    return [
+        0.0 if finding.flown is None else finding.flown
+        for finding in verdict.findings
+        if finding.rule == "survey" and not finding.check
+    ]
+
+
+def _closeness(verdict: Verdict) -> tuple[int, float, int]:
+    """Return a key that is larger for a flight closer to success.
+
+    It consists of the number of usable lines, the usable part of all lines in whole %, and the negative number of
+    failures.
+    """
+    parts = _usable_parts(verdict)
+    return _count_usable(verdict)[0], round(sum(parts) / max(1, len(parts))), -len(verdict.failed)
 
 
 def _all_lines_usable(verdict: Verdict) -> bool:
@@ -195,13 +220,9 @@ class _Trials:
             trial = Trial(self._changed_setup(mission, airframe), airframe.aircraft)
         except PlanflyError:
             return None
-        usable, lines = _count_usable(trial.flight_verdict)
-        best_trial, failed_count = self.nearest, len(trial.flight_verdict.failed)
-        best_usable = _count_usable(self._verdict)[0] if best_trial is None else best_trial.usable
-        if usable > best_usable or (
-            best_trial is not None and usable == best_usable and failed_count < len(best_trial.verdict.failed)
-        ):
-            self.nearest = NearMiss(description, usable, lines, trial.flight_verdict)
+        best_verdict = self._verdict if self.nearest is None else self.nearest.verdict
+        if _closeness(trial.flight_verdict) > _closeness(best_verdict):
+            self.nearest = NearMiss(description, *_count_usable(trial.flight_verdict), trial.flight_verdict)
         return trial.flight_verdict, mission, trial.setup.path.length
 
     def _fly_layout(self, layout: SurveyLayout, description: str) -> _TrialFlight | None:
@@ -240,9 +261,11 @@ class _Trials:
 
     def find_turn_around(self) -> SurveyRemedy | None:
         """Find the shortest turn-around that passes, among the turn-arounds longer than the current one."""
-        return self._find_shortest_turn_around(
-            1, [length for length in TURN_AROUNDS if length > self._current_turn_around + 1.0], 0.0
-        )
+        return self._find_shortest_turn_around(1, self._longer_turn_arounds(), 0.0)
+
+    def _longer_turn_arounds(self) -> list[float]:
+        """Return the turn-arounds to try that are longer than the current one, m."""
+        return [length for length in TURN_AROUNDS if length > self._current_turn_around + 1.0]
 
     def try_other_side(self) -> SurveyRemedy | None:
         """Try the lines in the opposite order, with turns into the wind; return None in calm air or on failure."""
@@ -265,7 +288,7 @@ class _Trials:
         lead_in = max_turn_around if math.isfinite(max_turn_around) else 0.0
         turn_arounds = [
             self._current_turn_around,
-            *(length for length in TURN_AROUNDS if self._current_turn_around + 1.0 < length < max_turn_around),
+            *(length for length in self._longer_turn_arounds() if length < max_turn_around),
         ]
         max_line_count = max(len(survey.lines) for survey in self._surveys)
         remedies = (
@@ -352,46 +375,65 @@ class _Trials:
     # Two changes together.
 
     def _find_turn_around_with(
-        self, change: str, airframe: Airframe, mission: Mission | None = None
+        self, change: str, airframe: Airframe, turn_arounds: Sequence[float], mission: Mission | None = None
     ) -> SurveyRemedy | None:
         """Find the shortest turn-around that passes in combination with another change.
 
         change: description of the other change.
         airframe, mission: changed airframe, and changed mission or None.
+        turn_arounds: turn-arounds to try, in increasing order, m.
         """
         trials = copy(self)
         trials._airframe, trials._change_prefix = airframe, f"{change}, "
         if mission is not None:
             trials._setup = replace(self._setup, mission=mission)
-        remedy = trials.find_turn_around()
+        remedy = trials._find_shortest_turn_around(1, turn_arounds, 0.0)
         self.nearest = trials.nearest
         return remedy
 
     def find_parameter_and_turn_around(self) -> SurveyRemedy | None:
-        """Try longer turn-arounds combined with one autopilot parameter, half way to the end of its tried range."""
+        """Try longer turn-arounds combined with one autopilot parameter; return the first pair that passes."""
         autopilot = self._airframe.autopilot
-        values = (
-            {}
-            if autopilot.parameters is None
-            else {parameter.name: parameter.value for parameter in autopilot.parameters.values}
+        if autopilot.parameters is None:
+            return None
+        values = {parameter.name: parameter.value for parameter in autopilot.parameters.values}
+        pairs = (
+            self._find_pair(candidate, values[candidate.name]) for candidate in autopilot.deviations.track_candidates
         )
-        for name, step, farthest, unit, _ in autopilot.deviations.track_candidates if values else ():
-            current = values[name]
-            value = round(
-                current + math.copysign(step, farthest - current) * (abs(farthest - current) // (2.0 * step)), 6
+        return next((remedy for remedy in pairs if remedy is not None), None)
+
+    def _find_pair(self, candidate: Candidate, current: float) -> SurveyRemedy | None:
+        """Find the shortest turn-around with the farthest value of a parameter, then the nearest value with it."""
+        remedies = list[SurveyRemedy]()
+        # Do not suggest values below the documented range.
+        start = max(current, candidate.least - candidate.step)
+        step = math.copysign(candidate.step, candidate.far - start)
+
+        def passes_with(value: float, turn_arounds: Sequence[float]) -> bool:
+            autopilot = self._airframe.autopilot.with_parameters(**{candidate.name: value})
+            airframe = replace(self._airframe, autopilot=autopilot)
+            remedy = self._find_turn_around_with(f"{candidate.name} {value:g}", airframe, turn_arounds)
+            if remedy is None:
+                return False
+            remedies.append(
+                replace(
+                    remedy, kind="parameter", name=candidate.name, current=current, value=value, unit=candidate.unit
+                )
             )
-            if value == current:
-                continue
-            airframe = replace(self._airframe, autopilot=autopilot.with_parameters(**{name: value}))
-            remedy = self._find_turn_around_with(f"{name} {value:g}", airframe)
-            if remedy is not None:
-                return replace(remedy, kind="parameter", name=name, current=current, value=value, unit=unit)
-        return None
+            return True
+
+        step_count = int((candidate.far - start) / step + 1e-6)
+        values = [round(start + step * count, 6) for count in range(1, step_count + 1)]
+        if not values or not passes_with(values[-1], self._longer_turn_arounds()):
+            return None
+        turn_around = remedies[0].turn_around
+        least_change(values[:-1], lambda value: passes_with(value, [turn_around]))
+        return remedies[-1]
 
     def find_airspeed_and_turn_around(self) -> SurveyRemedy | None:
         """Try longer turn-arounds combined with the lowest of the reduced airspeeds."""
         for speed, airframe in [*self._slower_airspeeds()][-1:]:
-            remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe)
+            remedy = self._find_turn_around_with(f"{speed:g} m/s", airframe, self._longer_turn_arounds())
             if remedy is not None:
                 return replace(remedy, kind="airspeed", current=self._airframe.airspeed, value=speed, unit="m/s")
         return None
@@ -408,7 +450,9 @@ class _Trials:
             replace(item, params=(item.params[0], default_airspeed, *item.params[2:])) if item in slow_items else item
             for item in mission.items
         )
-        remedy = self._find_turn_around_with(f"{default_airspeed:g} m/s", self._airframe, replace(mission, items=items))
+        remedy = self._find_turn_around_with(
+            f"{default_airspeed:g} m/s", self._airframe, self._longer_turn_arounds(), replace(mission, items=items)
+        )
         if remedy is None:
             return None
         return replace(

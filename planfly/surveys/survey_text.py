@@ -86,20 +86,20 @@ def has_required_overlap(measure: OverlapMeasure | None) -> bool:
 
 
 def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) -> str:
-    """Describe how far after their start lines become usable, which shows the turn-arounds that would be needed."""
+    """Describe how much of the lines is lost at their ends, which shows the turn-arounds that would be needed."""
     usable_lines = [measure for measure in lines if measure is not None and measure.usable > 0.0]
     if not usable_lines:
         return (
             f"no part of the {len(lines)} lines, {survey.spacing:.0f} m apart, can be used, "
             "because there is no room to turn"
         )
-    latest_start, max_length = (
+    start, end = (
         max(measure.lost_at_start for measure in usable_lines),
-        max(measure.length for measure in usable_lines),
+        max(measure.lost_at_end for measure in usable_lines),
     )
     text = (
-        f"every usable line can be used from {latest_start:.0f} m after its start, or earlier;"
-        f" the longest line is {max_length:.0f} m long"
+        f"lines lose at most {start:.0f} m at their start and {end:.0f} m at their end;"
+        f" the longest line is {max(measure.length for measure in usable_lines):.0f} m long"
     )
     return (
         f"{text}, and {len(lines) - len(usable_lines)} of {len(lines)} have no usable part"
@@ -111,8 +111,8 @@ def usable_segments_text(survey: Survey, lines: Sequence[LineMeasure | None]) ->
 def near_miss_text(near_miss: NearMiss) -> str:
     """Describe the trial that came closest to passing, and the reason of its failure."""
     return (
-        f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used;"
-        f" {near_miss.verdict.headline}"
+        f"{near_miss.what}: {near_miss.usable} of {near_miss.lines} photo lines can be used, the worst to"
+        f" {near_miss.worst:.0f} %; {near_miss.verdict.headline}"
     )
 
 

@@ -122,7 +122,7 @@ def test_places(place: Place, text: str) -> None:
         (Change("airspeed", waypoint(1), 25.0, 20.5, "m/s"), "fly through waypoint 1 at 20.5 m/s instead of 25 m/s"),
         (Change("airspeed", leg(3), 35.0, 18.1, "m/s", most=31.0), "command an airspeed of 18.1 to 31.0 m/s on leg 3"),
         (Change("turn", waypoint(1), 90.0, 61.2, "deg"), "turn at most 61.2° at waypoint 1"),
-        (Change("height", leg(4), None, 12.0, "m"), "fly leg 4 12 m higher"),
+        (Change("height", leg(4), None, 12.0, "m"), "raise both ends of leg 4 by 12 m"),
         (Change("inset", FLIGHT, None, 7.0, "m"), "bring the path 7 m further inside the area"),
         (Change("distance", missile("Alfa"), None, 41.0, "m"), "pass Alfa 41 m further away"),
         (Change("distance", Place("missile", 1), None, 41.0, "m"), "pass threat 2 41 m further away"),
@@ -199,7 +199,7 @@ SUGGESTED = {
         lambda: make_setup([[0, 0, 20], [0, 6000, 20]]),
         "clearance",
         leg(0),
-        r"fly leg 0, to item 1, ([\d.]+) m higher",
+        r"raise both ends of leg 0, to item 1, by ([\d.]+) m",
         0,
     ),
     "inset": (

@@ -223,7 +223,7 @@ def test_one_remedy_stands_first_and_no_text_stands_twice() -> None:
     lines = ("not flyable: slope on leg 1", "Not flown as written: item 9: no loiter")
     verdict = Verdict((turn, lower, *FINDINGS[1:2]), False, True, lines, "flown")
     page = Page(report_html(make_setup(), make_track(), verdict, **ARGUMENTS))
-    assert page.text().count("Would pass at leg 1: fly leg 1 9 m higher.") == 1
+    assert page.text().count("Would pass at leg 1: raise both ends of leg 1 by 9 m.") == 1
     # Of each finding the remedy once: of the first at the top, of the other in its place.
     for item in (turn, lower):
         assert page.text().count(item.suggestion) == 1
