@@ -118,9 +118,9 @@ def _level_answers(
         )
     if requirements.envelope and reference is not None and reference.airframe is not None:
         airframe = reference.airframe
+        failed = frozenset(airframe.failed)
         passes_by_place = {
-            (finding.rule, finding.place): (finding.rule, finding.place) not in airframe.failed
-            for finding in flight_findings
+            (finding.rule, finding.place): (finding.rule, finding.place) not in failed for finding in flight_findings
         }
         disagreements = _disagreements("airframe", passes_by_place, flight_findings)
         # An airframe that is not flyable although nothing failed was left undecided.

@@ -91,7 +91,9 @@ def change_text(change: Change) -> str:
             if change.place.kind == "leg":
                 verb = "raise" if change.what == "height" else "lower"
                 return f"{verb} both ends of {place_name} by {requested_value:.0f} m"
-            return f"pass {change.place.name} {requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
+            return (
+                f"pass {change.place.name} {requested_value:.0f} m {'higher' if change.what == 'height' else 'lower'}"
+            )
         case "north" | "east" | "south" | "west":
             verb = "stay in" if change.place.kind == "inclusion" else "pass"
             return f"{verb} {change.place.name} {requested_value:.0f} m further {change.what}"

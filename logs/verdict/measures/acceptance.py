@@ -4,16 +4,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.path_limits import turn_radius_between
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import (
     RouteRequirements,
     performance_tables,
+    sharpest_fly_over_turn,
     slope_limit,
     tighter_turn,
     turn_requirements,
@@ -73,15 +76,16 @@ def position_error(setup: FlightSetup) -> float:
     return NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
 
 
-def corner_depths(requirements: RouteRequirements) -> Floats:
-    """Return the distance by which the turn at each waypoint leaves the legs, m, (w,).
+def corner_depths(requirements: RouteRequirements, leg: int) -> Floats:
+    """Return the distances by which the turns at both ends of a leg leave the legs, m, (2,).
 
     A fly-by arc passes R (1 - cos(turn / 2)) inside the legs.  A fly-over waypoint is passed on the course of the leg
     before it, and the arc from there swings R (1 - cos(turn)) beyond the next leg.
     """
-    turns = np.abs(requirements.turns)
-    depth_ratio = np.where(requirements.setup.route.fly_over, 1.0 - np.cos(turns), 1.0 - np.cos(0.5 * turns))
-    return np.where(np.isfinite(requirements.radius), requirements.radius, 0.0) * depth_ratio
+    ends = slice(leg, leg + 2)
+    turns, radius = np.abs(requirements.turns[ends]), requirements.radius[ends]
+    depth_ratio = np.where(requirements.setup.route.fly_over[ends], 1.0 - np.cos(turns), 1.0 - np.cos(0.5 * turns))
+    return np.where(np.isfinite(radius), radius, 0.0) * depth_ratio
 
 
 def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
@@ -95,7 +99,7 @@ def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, st
     if requirements.setup.scenario.limits.corridor_m is not None:
         return half_width, "scenario"
     ends = slice(leg, leg + 2)
-    depths = corner_depths(requirements)[ends]
+    depths = corner_depths(requirements, leg)
     source = requirements.setup.source
     radius_is_known = source is None or source.aircraft_known
     if radius_is_known and not requirements.setup.autopilot.turns.follows_path:
@@ -147,63 +151,107 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 # both.  A step of a few metres in a level path is a cliff; a climb that begins a little early is within its height.
 
 
+# For the first and last waypoint of a gap: see `shortcut_distance`.
+ShortcutDistance = Callable[[int, int], float | None]
+
+
 def negligible_kink(
-    requirements: RouteRequirements, i: int, has_room: Callable[[int, int], bool] | None = None
+    requirements: RouteRequirements, i: int, distance_of_shortcut: ShortcutDistance | None = None
 ) -> float | None:
     """Return how far a flyable path without waypoint i passes from the waypoints that it omits, m, or None without one.
 
-    The distance is the largest of all omitted waypoints.  The path omits the waypoint and up to `KINK_WAYPOINT_COUNT`
-    - 1 of its neighbours, passes each of them within `KINK_FRACTION` of the corridor's half width, and has room for the
-    turns at both ends of the gap.
+    The path omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.
 
-    has_room: `gap_has_room` of these requirements, cached; waypoints next to each other have most gaps in common.
+    distance_of_shortcut: `shortcut_distance` of these requirements, cached; consecutive waypoints have most gaps in
+        common.
     """
-    has_room = has_room or partial(gap_has_room, requirements)
-    max_distance, is_circle = KINK_FRACTION * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
+    distance_of_shortcut = distance_of_shortcut or partial(shortcut_distance, requirements)
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
-            last = first + count - 1
-            chord = requirements.points[[first - 1, last + 1]]
-            if _distance_from_leg(requirements.points[i], chord) > max_distance:
-                continue
-            distance, _ = farthest_from_legs(requirements.points[first : last + 1], chord)
-            has_length = math.dist(chord[0, :2], chord[1, :2]) > 0.0
-            if (
-                distance <= max_distance
-                and has_length
-                and not is_circle[first : last + 1].any()
-                and has_room(first, last)
-            ):
+            distance = distance_of_shortcut(first, first + count - 1)
+            if distance is not None:
                 return distance
     return None
 
 
-def _distance_from_leg(point: Floats, leg: Floats) -> float:
-    """Return the horizontal distance of a point (3,) from a leg (2, 3), m.
+def shortcut_distance(requirements: RouteRequirements, first: int, last: int) -> float | None:
+    """Return how far the straight path past the waypoints first..last passes from the farthest of them, m.
 
-    `farthest_from_legs` takes ten times as long for one point.
+    Return None if the distance exceeds `KINK_FRACTION` of the corridor's half width, if a waypoint belongs to a loiter,
+    if the path is vertical, or if there is no room for the turns at its ends.
     """
-    (east, north, _), ((start_east, start_north, _), (end_east, end_north, _)) = point.tolist(), leg.tolist()
-    leg_east, leg_north = end_east - start_east, end_north - start_north
-    east, north = east - start_east, north - start_north
+    start, *omitted, end = requirements.points[first - 1 : last + 2, :2].tolist()
+    if start == end:
+        return None
+    distance = max(_distance_from_leg(point, start, end) for point in omitted)
+    if (
+        distance > KINK_FRACTION * requirements.setup.corridor
+        or requirements.setup.route.arcs[first : last + 1].any()
+        or not _gap_has_room(requirements, first, last)
+    ):
+        return None
+    return distance
+
+
+def _distance_from_leg(point: list[float], start: list[float], end: list[float]) -> float:
+    """Return the horizontal distance of a point (east, north) from a leg, m.
+
+    For one point, `farthest_from_legs` takes ten times as long.
+    """
+    leg_east, leg_north = end[0] - start[0], end[1] - start[1]
+    east, north = point[0] - start[0], point[1] - start[1]
     fraction = (east * leg_east + north * leg_north) / max(leg_east * leg_east + leg_north * leg_north, 1e-12)
     fraction = min(1.0, max(0.0, fraction))
     return math.hypot(east - fraction * leg_east, north - fraction * leg_north)
 
 
-def gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
+def _gap_has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
     """Return True if the route without the waypoints first..last has room for the turns at the gap."""
-    # Include two waypoints beyond the ends of the gap: their turns use part of the legs.
-    start, end = max(0, first - 4), min(len(requirements.points), last + 5)
-    nearby_route = _reduced_route(requirements.setup.route, np.r_[start:first, last + 1 : end])
+    before, after = first - 1, last + 1
+    if not (
+        _turn_fits_alone(requirements, before - 1, before, after)
+        and _turn_fits_alone(requirements, before, after, after + 1)
+    ):
+        return False
+    # Include the next turns on both sides, because they use part of the legs.
+    start, end = max(0, first - 3), min(len(requirements.points), last + 4)
+    nearby_route = _reduced_route(requirements.setup.route, np.r_[start:first, after:end])
     turns = turn_requirements(nearby_route, performance_tables(nearby_route, requirements.limits))
-    for new_corner, old_corner in ((first - 1 - start, first - 1), (first - start, last + 1)):
+    for new_corner, old_corner in ((before - start, before), (first - start, after)):
         if not 0 < old_corner < requirements.legs:
             continue
         limit, _ = tighter_turn(requirements, old_corner, float(turns.limit[new_corner]))
         if abs(float(turns.turns[new_corner])) > limit + PLAN_TOLERANCE_RAD:
             return False
     return True
+
+
+def _turn_fits_alone(requirements: RouteRequirements, before: int, corner: int, after: int) -> bool:
+    """Return True if the turn at a corner between two other waypoints fits their legs, without neighbouring turns.
+
+    `_gap_has_room` takes ten times as long as this necessary condition.  The first and last waypoint have no turn.
+    """
+    route = requirements.setup.route
+    if not 0 < corner < requirements.legs:
+        return True
+    points = [requirements.points[index].tolist() for index in (before, corner, after)]
+    (run_in, course_in), (run_out, course_out) = (
+        (math.dist(start[:2], end[:2]), math.atan2(end[0] - start[0], end[1] - start[1]))
+        for start, end in pairwise(points)
+    )
+    if run_in == 0.0 or run_out == 0.0:
+        # A vertical leg has no course.
+        return True
+    table = requirements.limits.performance(float(max(route.airspeed[before], route.airspeed[corner])))
+    radius = turn_radius_between(table, course_in, course_out, points[1][2])
+    if not math.isfinite(radius):
+        aircraft_limit = 0.0
+    elif route.fly_over[corner]:
+        aircraft_limit = sharpest_fly_over_turn(run_out / radius)
+    else:
+        aircraft_limit = 2.0 * math.atan(min(run_in, run_out) / radius)
+    limit, _ = tighter_turn(requirements, corner, aircraft_limit)
+    return abs(math.remainder(course_out - course_in, 2.0 * math.pi)) <= limit + PLAN_TOLERANCE_RAD
 
 
 def _reduced_route(route: Route, waypoints: NDArray[np.int64]) -> Route:

@@ -239,26 +239,27 @@ def _sharpest_turns(
             continue
         length_before, length_after = available_lengths(runs, lengths_before, lengths_after, reversal, i)
         if route.fly_over[i]:
-            limits[i] = _sharpest_fly_over_turn(length_after / min_radius[i])
+            limits[i] = sharpest_fly_over_turn(length_after / min_radius[i])
         else:
             limits[i] = 2.0 * math.atan(min(length_before, length_after) / min_radius[i])
     return limits
 
 
-def _sharpest_fly_over_turn(radii: float) -> float:
-    """Find the sharpest fly-over turn (rad) that uses at most a length of leg, by bisection.
+def sharpest_fly_over_turn(radii: float) -> float:
+    """Return the sharpest fly-over turn (rad) that uses at most a length of the leg after it, in turn radii.
 
-    radii: the length in turn radii.
+    This is the inverse of `fly_over_run`.  With half the turn h and z = (cos h + sqrt(1 + cos^2 h))^2, the square of
+    that length is 6 z - z^2 - 1.
+
+    >>> round(math.degrees(sharpest_fly_over_turn(fly_over_run(math.radians(70.0)))), 6)
+    70.0
     """
-    fitting_turn, too_sharp_turn = 0.0, math.pi
-    if fly_over_run(too_sharp_turn) <= radii:
-        return too_sharp_turn
-    for _ in range(50):
-        middle_turn = 0.5 * (fitting_turn + too_sharp_turn)
-        fitting_turn, too_sharp_turn = (
-            (middle_turn, too_sharp_turn) if fly_over_run(middle_turn) <= radii else (fitting_turn, middle_turn)
-        )
-    return fitting_turn
+    if radii <= 0.0:
+        return 0.0
+    if radii >= math.sqrt(8.0):
+        return math.pi
+    z = 3.0 + math.sqrt(8.0 - radii * radii)
+    return 2.0 * math.acos(min(1.0, (z - 1.0) / (2.0 * math.sqrt(z))))
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ def corridor_findings(
 def _leg_finding(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
     """Judge the greatest distance of the flight, or of the planned turns if ``geometric``, from a leg."""
     limit, source = corridor_limit(requirements, leg)
-    planned_distance, flown_distance, ok = float(corner_depths(requirements)[leg : leg + 2].max()), math.nan, None
+    planned_distance, flown_distance, ok = float(corner_depths(requirements, leg).max()), math.nan, None
     faults, facts = [], []
     if geometric:
         ok = planned_distance <= limit + ROUNDING_M

@@ -1,7 +1,6 @@
 """The turn rule: judge whether each corner can be flown on its legs, and how it was flown."""
 
 import math
-from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
@@ -9,7 +8,12 @@ import numpy as np
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import acceptance_condition, gap_has_room, negligible_kink
+from logs.verdict.measures.acceptance import (
+    ShortcutDistance,
+    acceptance_condition,
+    negligible_kink,
+    shortcut_distance,
+)
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
@@ -40,9 +44,9 @@ def turn_findings(
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
     turnaround_waypoints = requirements.turnaround_waypoints()
-    has_room = cache(partial(gap_has_room, requirements))
+    distance_of_shortcut = cache(partial(shortcut_distance, requirements))
     return [
-        _turn_finding(requirements, i, measure, aligned, has_room)
+        _turn_finding(requirements, i, measure, aligned, distance_of_shortcut)
         for i, measure in enumerate(measures, 1)
         if i not in turnaround_waypoints
     ]
@@ -53,11 +57,11 @@ def _turn_finding(
     i: int,
     measure: TurnMeasure | None,
     aligned: AlignedTrack | None,
-    has_room: Callable[[int, int], bool],
+    distance_of_shortcut: ShortcutDistance,
 ) -> Finding:
     """Judge the turn at waypoint i.  measure: the flown turn; None before a flight.
 
-    has_room: as for `negligible_kink`.
+    distance_of_shortcut: as for `negligible_kink`.
     """
     planned_turn = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
@@ -69,7 +73,7 @@ def _turn_finding(
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     faults, facts = [], [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
-        lateral = negligible_kink(requirements, i, has_room)
+        lateral = negligible_kink(requirements, i, distance_of_shortcut)
         if lateral is None:
             # The message states the turn and its limit.
             faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []

@@ -44,8 +44,8 @@ def test_a_turn_leads_off_its_legs_by_its_own_arc() -> None:
     """R (1 - cos 45) inside a right angle; R beyond the next leg where the waypoint is flown over; 0 straight on."""
     by, over = make_setup(RIGHT_ANGLE), make_setup(RIGHT_ANGLE, fly_over=(1,))
     inside = bank_radius() * (1.0 - math.sqrt(0.5))
-    assert corner_depths(route_requirements(by)).tolist() == pytest.approx([0.0, inside, 0.0, 0.0], abs=1e-9)
-    assert corner_depths(route_requirements(over)).tolist() == pytest.approx([0.0, bank_radius(), 0.0, 0.0], abs=1e-9)
+    assert corner_depths(route_requirements(by), 0).tolist() == pytest.approx([0.0, inside], abs=1e-9)
+    assert corner_depths(route_requirements(over), 1).tolist() == pytest.approx([bank_radius(), 0.0], abs=1e-9)
     assert [corridor_limit(route_requirements(by), leg) for leg in (0, 2)] == [
         (pytest.approx(inside + 10.0), "fly-by path"),
         (30.0, "default"),

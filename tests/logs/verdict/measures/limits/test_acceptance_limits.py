@@ -24,8 +24,8 @@ def test_eight_waypoints_in_a_row_are_left_out_at_most(count: int, found: bool) 
 
 def test_each_gap_of_a_long_zigzag_is_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every gap of up to eight of 40 waypoints; each contains up to eight waypoints that ask for it."""
-    judged, judge = [], turn_rule.gap_has_room
-    monkeypatch.setattr(turn_rule, "gap_has_room", lambda *gap: judged.append(gap[1:]) or judge(*gap))
+    judged, judge = [], turn_rule.shortcut_distance
+    monkeypatch.setattr(turn_rule, "shortcut_distance", lambda *gap: judged.append(gap[1:]) or judge(*gap))
     turn_rule.turn_findings(route_requirements(make_setup(zigzag(40))), None, geometric=True)
     assert len(judged) == len(set(judged)) > 40
 
