@@ -25,16 +25,18 @@ class Range(NamedTuple):
     below: bool = False
 
     def allows(self, value: Any) -> bool:
-        """Return True if a value is a number in the range; True and False are not numbers.
+        """Return True if a value is a number in the range; True, False and texts are not numbers.
 
         >>> Range(0, 20, "a whole number", integer=True).allows(3), Range(0, 1, "a share").allows(float("nan"))
         (True, False)
+        >>> Range(0, 20, "a number").allows("3")
+        False
         """
         try:
             number = int(value) if self.integer else float(value)
         except (TypeError, ValueError, OverflowError):
             return False
-        if isinstance(value, bool) or (self.integer and number != value):
+        if isinstance(value, bool | str) or (self.integer and number != value):
             return False
         is_inside = self.low <= number <= self.high
         return is_inside and not (self.above and number == self.low) and not (self.below and number == self.high)
@@ -124,7 +126,8 @@ def check_arguments(**given: Any) -> None:
             continue
         else:
             allowed = RANGES[name].expected
-        raise ArgumentError.of_argument(_KEYWORDS_IN_MESSAGES.get(name, name), value, allowed)
+        shown = repr(value) if isinstance(value, str) and name in RANGES else None
+        raise ArgumentError.of_argument(_KEYWORDS_IN_MESSAGES.get(name, name), value, allowed, shown=shown)
 
 
 # Keywords in messages, for entries of `RANGES` whose keyword has another range in other calls.

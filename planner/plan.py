@@ -4,10 +4,11 @@ The file format is ``plan.json`` (schema planfly.plan/1): `plan_json` writes it,
 and check every field. `Certificate` is filled by `planner.evaluation.certify`.
 """
 
+import hashlib
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple
@@ -17,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from planner.ground_ways import DepartureAndApproach, DepartureAndApproachFile, departure_and_approach_json
 from world.arrays import Floats
-from world.errors import MissionError
+from world.errors import ArgumentError, MissionError
 from world.files import read_small_file
 from world.html_table import html_table
 from world.scenario import Scenario, from_spec, with_absolute_ends
@@ -25,6 +26,8 @@ from world.scenario_file import first_fault
 from world.terrain import Terrain
 
 PLAN_SCHEMA = "planfly.plan/1"
+# Algorithm of a plan whose waypoints were given instead of searched.
+GIVEN_WAYPOINTS = "given"
 # Maximum size of a file, bytes; ten thousand waypoints with as many threats take 4 MB.
 MAX_BYTES = 64 * 2**20
 
@@ -80,6 +83,7 @@ class Certificate:
     violated, inf without zones.
     headroom: maximum height above ground minus the path's height, m; inf without a maximum.
     problems: one line per failure, empty if the path is certified.
+    path_digest: `path_digest` of the certified path; "" if unknown.
     """
 
     turn: float
@@ -91,6 +95,7 @@ class Certificate:
     problems: tuple[str, ...]
     zone_distance: float = np.inf
     headroom: float = np.inf
+    path_digest: str = field(default="", compare=False, repr=False)
 
     @property
     def ok(self) -> bool:
@@ -98,12 +103,22 @@ class Certificate:
         return not self.problems
 
 
+def path_digest(waypoints: Floats) -> str:
+    """Return a digest of a path (w, 3), by which its certificate is known again.
+
+    >>> path_digest(np.zeros((2, 3))) == path_digest(np.ones((2, 3)))
+    False
+    """
+    return hashlib.sha256(np.ascontiguousarray(waypoints, dtype=np.float64).tobytes()).hexdigest()[:16]
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Plan:
     """Planned path.
 
     scenario: the scenario of the plan.
-    waypoints: (w, 3) world m.
+    waypoints: (w, 3) east and north of the scenario's origin and altitude AMSL, m. They cannot be replaced without the
+    certificate.
     violations, objectives: always at the paper's six points per leg.
     certificate: certificate of the whole path, or of the part after the flown legs.
     seed, algorithm, evaluations: seed, algorithm and number of evaluations of the search.
@@ -129,13 +144,22 @@ class Plan:
     ways: DepartureAndApproach | None = None
 
     def __post_init__(self) -> None:
-        """Lock the arrays, and name the scores, which may be given as any four numbers."""
+        """Lock the arrays, and name the scores, which may be given as any four numbers.
+
+        Raises ArgumentError if the certificate is that of other waypoints.
+        """
         for name in ("waypoints", "history"):
             array = np.array(getattr(self, name), dtype=np.float64)
             array.setflags(write=False)
             object.__setattr__(self, name, array)
         object.__setattr__(self, "violations", Violations(*map(int, self.violations)))
         object.__setattr__(self, "objectives", Objectives(*map(float, self.objectives)))
+        digest = self.certificate.path_digest
+        if digest and digest != path_digest(self.waypoints[self.flown_legs :]):
+            allowed = (
+                "the plan's certificate is for other waypoints; planfly.plan(scenario, waypoints=...) certifies a path"
+            )
+            raise ArgumentError.of_argument("waypoints", self.waypoints, allowed, shown="")
 
     @property
     def feasible(self) -> bool:
@@ -178,6 +202,21 @@ class _CertificateFile(_Model):
     zone_distance_m: float | None = None
     headroom_m: float | None = None
     problems: list[str]
+
+    def certificate(self, certified_path: Floats) -> Certificate:
+        """Return the certificate of a path (w, 3), m."""
+        return Certificate(
+            turn=self.turn_margin_rad,
+            available_length=_none_to_inf(self.turn_room_m),
+            slope=self.slope_margin_rad,
+            clearance=np.nan if self.clearance_margin_m is None else self.clearance_margin_m,
+            bounds=self.bounds_margin_m,
+            kill_distance=_none_to_inf(self.kill_distance_m),
+            zone_distance=_none_to_inf(self.zone_distance_m),
+            headroom=_none_to_inf(self.headroom_m),
+            problems=tuple(self.problems),
+            path_digest=path_digest(certified_path),
+        )
 
 
 class _PlanFile(_Model):
@@ -277,7 +316,7 @@ def parse_plan(
     try:
         plan_file = _PlanFile.model_validate(data)
     except ValidationError as error:
-        raise MissionError(**first_fault(error, data).at(source)) from error
+        raise MissionError(**first_fault(error, data).at(source)) from None
     _check_names(source, "violations", plan_file.violations, Violations._fields)
     _check_names(source, "objectives", plan_file.objectives, Objectives._fields)
     waypoints = np.array(plan_file.waypoints_east_north_amsl_m)
@@ -286,18 +325,6 @@ def parse_plan(
         plan_file.scenario if terrain is None else with_absolute_ends(plan_file.scenario, waypoints[0], waypoints[-1])
     )
     scenario = from_spec(scenario_spec, source, base=base, terrain=terrain, ground=ground)
-    saved_certificate = plan_file.certificate
-    certificate = Certificate(
-        turn=saved_certificate.turn_margin_rad,
-        available_length=_none_to_inf(saved_certificate.turn_room_m),
-        slope=saved_certificate.slope_margin_rad,
-        clearance=np.nan if saved_certificate.clearance_margin_m is None else saved_certificate.clearance_margin_m,
-        bounds=saved_certificate.bounds_margin_m,
-        kill_distance=_none_to_inf(saved_certificate.kill_distance_m),
-        zone_distance=_none_to_inf(saved_certificate.zone_distance_m),
-        headroom=_none_to_inf(saved_certificate.headroom_m),
-        problems=tuple(saved_certificate.problems),
-    )
     history = np.array([[np.nan if value is None else value for value in row] for row in plan_file.history]).reshape(
         -1, 3
     )
@@ -306,7 +333,7 @@ def parse_plan(
         waypoints=waypoints,
         violations=Violations(**plan_file.violations),
         objectives=Objectives(**plan_file.objectives),
-        certificate=certificate,
+        certificate=plan_file.certificate.certificate(waypoints[plan_file.flown_legs :]),
         seed=plan_file.seed,
         algorithm=plan_file.algorithm,
         evaluations=plan_file.evaluations,

@@ -6,6 +6,7 @@ and the setup of a flight.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_grid
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, make_limits
+from planner.plan import Plan
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
 from world.scenario import Scenario, from_spec
@@ -183,3 +185,9 @@ def small_scenario(**changes: Any) -> Scenario:
         planner={"waypoints": 8, "population": 60, "generations": 25},
     )
     return from_spec(spec | changes, "small")
+
+
+def with_path(plan: Plan, waypoints: ArrayLike) -> Plan:
+    """A plan of other waypoints, as if they had its certificate."""
+    certificate = replace(plan.certificate, path_digest="")
+    return replace(plan, waypoints=np.asarray(waypoints, dtype=np.float64), certificate=certificate)

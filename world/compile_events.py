@@ -1,5 +1,9 @@
-"""Callbacks that run before a kernel is compiled, which takes time and happens only for kernels not in the cache."""
+"""Callbacks before a kernel is compiled, and the time that compiling takes.
 
+A kernel is compiled only if it is not in the cache.
+"""
+
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -23,6 +27,34 @@ def notify_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
         yield
     finally:
         _callbacks.remove(callback)
+
+
+class CompileTimer:
+    """Timer of the time during which kernels were compiled in this process.
+
+    seconds: time of the compilations that have ended, s; of compilations at the same time the time is counted once.
+    """
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self._running_count = 0
+        self._start = 0.0
+
+    def begin(self) -> None:
+        """Begin a compilation, perhaps within another one."""
+        if not self._running_count:
+            self._start = time.monotonic()
+        self._running_count += 1
+
+    def end(self) -> None:
+        """End a compilation."""
+        self._running_count -= 1
+        if not self._running_count:
+            self.seconds += time.monotonic() - self._start
+
+
+# Timer of all compilations of this process.
+COMPILE_TIMER = CompileTimer()
 
 
 def announce_compilation() -> None:

@@ -145,12 +145,16 @@ def did_you_mean(name: str, known_names: Iterable[str]) -> str:
 
     >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
     (": did you mean 'jacksboro'?", '')
+    >>> did_you_mean("speed", ["seed", "speed_mps"])
+    ": did you mean 'speed_mps'?"
     """
     # Imported here, as most runs report no fault.
     from difflib import get_close_matches
 
     names_by_folded_name = {candidate.casefold(): candidate for candidate in known_names}
-    matches = get_close_matches(name.casefold(), names_by_folded_name, n=1)
+    # A key without its unit is meant more likely than a key of similar letters.
+    matches = [candidate for candidate in names_by_folded_name if candidate.startswith(f"{name.casefold()}_")]
+    matches = matches or get_close_matches(name.casefold(), names_by_folded_name, n=1)
     return f": did you mean {names_by_folded_name[matches[0]]!r}?" if matches else ""
 
 

@@ -15,7 +15,7 @@ from numba.extending import models, register_model, typeof_impl
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
-from world.compile_events import announce_compilation
+from world.compile_events import COMPILE_TIMER, announce_compilation
 from world.kernel_cache import usable_folder, versioned_folder
 from world.kernel_files import check_files
 from world.kernel_saves import CacheWriteLock
@@ -37,14 +37,16 @@ IS_TEMPORARY = _usable_folder not in (PREFERRED_FOLDER, None)
 
 
 class _CompileListener(event.Listener):
-    """Listener that reports when numba compiles a kernel that is not in its cache."""
+    """Listener that reports and times the compilation of kernels that are not in numba's cache."""
 
     def on_start(self, event: Any) -> None:
         """Report a kernel before it is compiled."""
+        COMPILE_TIMER.begin()
         announce_compilation()
 
     def on_end(self, event: Any) -> None:
-        """Ignore the end of a compilation."""
+        """Count the time of a compilation."""
+        COMPILE_TIMER.end()
 
 
 cast("Any", event).register("numba:compile", _CompileListener())

@@ -28,6 +28,7 @@ from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, ScenarioError, TerrainError
 from world.files import absolute_path, did_you_mean
 from world.frames import GeoOrigin, to_geo
+from world.html_table import html_table
 from world.map_positions import check_inside, make_threats, map_position
 from world.radio import RadioLink, make_link
 from world.raster import open_tiles, read_terrain, tile_bounds
@@ -36,6 +37,7 @@ from world.scenario_file import check_scenario, checked_table, parse_scenario, r
 from world.scenario_tables import (
     MAX_ZONES,
     OWN_GUIDANCE,
+    SCALE_RATIOS,
     AreaTable,
     FlightTable,
     LimitsTable,
@@ -56,10 +58,8 @@ from world.wind import Wind
 # ----------------------------------------------------------------------
 # The scenario, from an embedded name, a file, a plan or a log.
 
-# Scale of a threat whose scale is not stated, as a ratio of its kill radius.
-KILL_SCALE_RATIO = 1.0 / 4.0
-# Scale of a threat whose scale is not stated, as a ratio of its detection radius.
-DETECTION_SCALE_RATIO = 1.0 / 3.0
+# Radius of a threat below which a note asks for its unit, m; no missile or radar has one as small.
+MIN_PLAUSIBLE_RADIUS_M = 10.0
 # Width of terrain that is kept around the area, m: a flight may overshoot a corner at the map's edge.
 GROUND_BUFFER = 1000.0
 
@@ -85,7 +85,7 @@ def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
 
 
 @_with_clear_errors
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Scenario:
     """Environment of one mission, in map axes (m) and radians.
 
@@ -139,8 +139,8 @@ class Scenario:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on zones changed or omitted on reading, and on inactive zones."""
-        notes = list(self.spec.zone_notes or ())
+        """Notes on zones changed or omitted on reading, on inactive zones, and on implausibly small threats."""
+        notes = [*(self.spec.zone_notes or ()), *self._small_threat_notes()]
         timed_tables = [table for table in self.spec.zones or () if table.times]
         if timed_tables and self.spec.at is None:
             count = "1 zone has times of activity, and is active"
@@ -156,6 +156,42 @@ class Scenario:
                 f"not active {span} UTC: ignored"
             )
         return tuple(notes)
+
+    def _small_threat_notes(self) -> list[str]:
+        """Return a note on the threats whose radius is implausibly small, perhaps because it is not in metres."""
+        threats = self.threats
+        small_radii = [
+            f"the {kind} radius of {name} is {radius:g} m"
+            for kind, radii in (("kill", threats.kill_radius), ("detection", threats.detection_radius))
+            for name, radius in zip(threats.names, radii.tolist(), strict=True)
+            if 0.0 < radius < MIN_PLAUSIBLE_RADIUS_M
+        ]
+        if not small_radii:
+            return []
+        others = f" (and {len(small_radii) - 1} more)" if len(small_radii) > 1 else ""
+        return [f"{small_radii[0]}{others}: radii are in metres, not kilometres"]
+
+    def __repr__(self) -> str:
+        distance = math.dist(self.start, self.destination) / 1000.0
+        return f"<Scenario {self.name}: {distance:.1f} km, {len(self.threats)} threats, {len(self.zones)} zones>"
+
+    def _repr_html_(self) -> str:
+        """Return an HTML table for notebooks."""
+        ground, wind, limits = self.terrain, self.wind, self.limits
+        rows = [
+            ("origin", f"{self.origin.lat_deg:.5f}, {self.origin.lon_deg:.5f}"),
+            *(
+                (name, f"east {point[0]:.0f} m, north {point[1]:.0f} m, {point[2]:.0f} m AMSL")
+                for name, point in (("start", self.start), ("destination", self.destination))
+            ),
+            ("terrain", "none" if ground is None else self.spec.terrain.kind),
+            ("threats, zones", f"{len(self.threats)}, {len(self.zones)}"),
+            ("wind", f"{wind.speed:g} m/s from {math.degrees(wind.from_course):.0f}°, turbulence {wind.turbulence}"),
+            ("clearance", f"at least {limits.min_clearance_m:g} m above ground"),
+            ("aircraft", self.flight.aircraft),
+            *(("note", note) for note in self.notes),
+        ]
+        return html_table(f"Scenario {self.name}", rows)
 
     def to_json(self) -> dict[str, Any]:
         """Return the scenario as plain JSON data, from which `from_spec` makes it again."""
@@ -614,8 +650,8 @@ def with_threats(
         return float(np.median(scale[has_radius] / radius[has_radius])) if has_radius.any() else default
 
     threats = scenario.threats
-    kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, KILL_SCALE_RATIO)
-    detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, DETECTION_SCALE_RATIO)
+    kill_ratio = scale_ratio(threats.kill_radius, threats.kill_scale, SCALE_RATIOS["kill"])
+    detection_ratio = scale_ratio(threats.detection_radius, threats.detection_scale, SCALE_RATIOS["detection"])
     tables = [*scenario.spec.threats, *preceding]
     for index, (east, north, kill, detection) in enumerate(added_threats):
         data: dict[str, Any] = {"name": f"pop-up {len(preceding) + index + 1}", "east_m": east, "north_m": north}
@@ -623,7 +659,8 @@ def with_threats(
             data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_ratio}
         if detection != 0.0:
             data |= {"detection_radius_m": detection, "detection_scale_m": detection * detection_ratio}
-        tables.append(checked_table(partial(ThreatTable, **data), source))
+        row = f"{source}.{index}" if len(added_threats) > 1 else source
+        tables.append(checked_table(partial(ThreatTable, **data), row))
     spec = scenario.spec.model_copy(update={"threats": tables})
     return replace(scenario, spec=spec, threats=make_threats(tables, source, scenario.origin, scenario.terrain))
 

@@ -54,7 +54,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
     try:
         return ScenarioFile.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(**first_fault(error, data, ScenarioFile).at(source)) from error
+        raise ScenarioError(**first_fault(error, data, ScenarioFile).at(source)) from None
 
 
 def checked_table(make_table: Callable[[], Table], source: str) -> Table:
@@ -62,7 +62,7 @@ def checked_table(make_table: Callable[[], Table], source: str) -> Table:
     try:
         return make_table()
     except ValidationError as error:
-        raise ScenarioError(**first_fault(error).at(source)) from error
+        raise ScenarioError(**first_fault(error).at(source)) from None
 
 
 def read_scenario_text(path: Path) -> str:

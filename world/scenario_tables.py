@@ -315,8 +315,15 @@ class EndTable(PointTable):
         return self
 
 
+# Scale of a threat whose scale is not stated, as a ratio of its kill or detection radius.
+SCALE_RATIOS = {"kill": 1.0 / 4.0, "detection": 1.0 / 3.0}
+
+
 class ThreatTable(PointTable):
-    """[[threats]]: missile only, radar only, or both; on the ground unless a height is given."""
+    """[[threats]]: missile only, radar only, or both; on the ground unless a height is given.
+
+    A scale that is not stated is a quarter of the kill radius, or a third of the detection radius.
+    """
 
     name: Name | None = None
     kill_radius_m: Radius | None = None
@@ -324,12 +331,24 @@ class ThreatTable(PointTable):
     detection_radius_m: Radius | None = None
     detection_scale_m: Radius | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_scales(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        values = dict(data)
+        for kind, ratio in SCALE_RATIOS.items():
+            radius = values.get(f"{kind}_radius_m")
+            if isinstance(radius, int | float) and radius > 0.0:
+                values.setdefault(f"{kind}_scale_m", ratio * radius)
+        return values
+
     @model_validator(mode="after")
     def _check_pairs(self) -> "ThreatTable":
         for kind in ("kill", "detection"):
             radius, scale = getattr(self, f"{kind}_radius_m"), getattr(self, f"{kind}_scale_m")
             if (radius is None) != (scale is None):
-                raise ValueError(f"{kind}_radius_m and {kind}_scale_m: give both or neither")
+                raise ValueError(f"{kind}_scale_m: needs {kind}_radius_m")
         if self.kill_radius_m is None and self.detection_radius_m is None:
             raise ValueError("kill_radius_m: missing; a threat has a missile, a radar, or both")
         return self

@@ -14,7 +14,7 @@ from logs.verdict.findings import (
     Finding,
     undecided_findings,
 )
-from logs.verdict.measures.mission_ends import missing_ends_text
+from logs.verdict.measures.mission_ends import missing_ends_text, unjudged_return_text
 from logs.verdict.places import DecidingParameter, LevelAnswer
 from logs.verdict.rule_words import RULE_WORDS, RuleWords
 from logs.verdict.tolerances import NOTABLE_HEIGHT_ERROR_M
@@ -207,6 +207,8 @@ def summary_lines(
         if finding.ok is None and RULE_WORDS[finding.rule].explains_unjudged:
             reasons.setdefault(finding.rule, finding.reason)
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
+    if reason := unjudged_return_text(setup):
+        lines.append(f"Not judged: {RULE_WORDS['return'].title} ({reason})")
     # These limits are the autopilot's, and do not limit the aircraft.
     lines += [
         f"PX4 would reject the mission: {finding.reason}"

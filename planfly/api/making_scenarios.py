@@ -8,13 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planfly.flight_options import load_scenario_with_options
+from planfly.runtime.stages import report_line
+from planner.search.algorithms import find_algorithm
 from world.errors import ArgumentError
-from world.scenario import DETECTION_SCALE_RATIO, KILL_SCALE_RATIO, Scenario, from_spec, with_threats
+from world.scenario import Scenario, from_spec
+from world.scenario_tables import SCALE_RATIOS
 
 # Tables of a position, which replace another position as a whole.
 _POSITIONS = ("start", "destination", "home")
 # Tables from which the terrain is made.
 _TERRAIN_TABLES = frozenset(("terrain", "area", "origin"))
+# Keys of the columns of an array of threats.
+_ARRAY_COLUMNS = ("east_m", "north_m", "kill_radius_m", "detection_radius_m")
 _THREATS_EXPECTED = (
     "expected a data frame or a mapping of columns named as the keys of [[threats]], a list of mappings with these"
     " keys, or an array (n, 4) of east, north, kill radius and detection radius, m"
@@ -49,16 +54,19 @@ def make_scenario(
     for name, values in tables.items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
         spec[name] = spec[name] | dict(values) if is_merged else values
-    rows = None if threats is None else _threat_rows(threats)
-    if rows is not None:
-        spec["threats"] = [] if isinstance(rows, np.ndarray) else rows
+    if threats is not None:
+        spec["threats"] = _threat_tables(threats)
     terrain = base_scenario.terrain if _TERRAIN_TABLES.isdisjoint(tables) else None
-    new_scenario = from_spec(spec, "make_scenario", ground=terrain, external=base_scenario.external)
-    return with_threats(new_scenario, rows.tolist(), "threats") if isinstance(rows, np.ndarray) else new_scenario
+    scenario = from_spec(spec, "make_scenario", ground=terrain, external=base_scenario.external)
+    find_algorithm(scenario.planner.algorithm, "make_scenario")
+    for note in scenario.notes:
+        if note not in base_scenario.notes:
+            report_line(f"{scenario.name}: {note}")
+    return scenario
 
 
-def _threat_rows(threats: Any) -> list[dict[str, Any]] | np.ndarray:
-    """Convert threats to tables of a scenario file, or to an array (n, 4).
+def _threat_tables(threats: Any) -> list[dict[str, Any]]:
+    """Convert threats to tables of a scenario file.
 
     Raises ArgumentError for values that are neither a data frame, columns, mappings nor an array (n, 4).
     """
@@ -72,9 +80,9 @@ def _threat_rows(threats: Any) -> list[dict[str, Any]] | np.ndarray:
             rows = [dict(row) for row in threats]
         else:
             array = np.asarray(threats, dtype=np.float64)
-            return (
-                array.reshape(-1, 4) if array.size == 0 or array.shape[1:] == (4,) else _raise_invalid_threats(threats)
-            )
+            if array.size and array.shape[1:] != (len(_ARRAY_COLUMNS),):
+                return _raise_invalid_threats(threats)
+            rows = [dict(zip(_ARRAY_COLUMNS, row, strict=True)) for row in array.tolist()]
         return [_threat_table(row) for row in rows]
     except ArgumentError:
         raise
@@ -88,17 +96,12 @@ def _raise_invalid_threats(threats: Any) -> Any:
 
 
 def _threat_table(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a threat as a table of a scenario file.
-
-    Missing values and radii of 0 are left out, and missing scales get their defaults.
-    """
+    """Return a threat as a table of a scenario file, without missing values and radii of 0."""
     values = {key: value for key, value in row.items() if value is not None and value == value}
-    for kind, ratio in (("kill", KILL_SCALE_RATIO), ("detection", DETECTION_SCALE_RATIO)):
+    for kind in SCALE_RATIOS:
         radius, scale = f"{kind}_radius_m", f"{kind}_scale_m"
         if values.get(radius) == 0.0:
             values = {key: value for key, value in values.items() if key not in (radius, scale)}
         elif isinstance(values.get(radius), str):
             raise ArgumentError.of_argument(f"threats: column {radius}", values[radius], "expected numbers, not text")
-        elif radius in values:
-            values.setdefault(scale, ratio * values[radius])
     return values

@@ -6,6 +6,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Unpack
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from flight.autopilots.catalog import load_autopilot
 from logs.verdict.conditions import Conditions, plan_conditions
 from planfly.arguments import check_arguments
@@ -14,15 +17,18 @@ from planfly.kernel_units.unit_kernels import PLANNING
 from planfly.runtime.first_start import with_warm_up
 from planfly.runtime.stages import stage
 from planfly.workflow.airframe import choose_seed, cruise_airspeed, find_airframe, load_airframe
-from planfly.workflow.make_plan import make_plan
+from planfly.workflow.make_plan import make_given_plan, make_plan
 from planfly.workflow.output_paths import file_target
-from planner.plan import Plan, plan_json, read_plan
+from planner.plan import GIVEN_WAYPOINTS, Plan, plan_json, read_plan
 from planner.search.explain_failure import explain_failure
 from planner.search.replan import check_same_mission
 from planner.search.search_state import StopCondition
-from world.errors import ScenarioError
+from world.arrays import Floats
+from world.compile_events import COMPILE_TIMER
+from world.errors import ArgumentError, ScenarioError
 from world.files import write_atomically
 from world.scenario import Scenario, embedded_scenarios, with_planner, with_threats
+from world.scenario_tables import MAP_EXTENT
 
 # ----------------------------------------------------------------------
 # Plan a path through a scenario.
@@ -36,6 +42,7 @@ Threat = tuple[float, float, float, float]
 def plan(
     scenario: Scenario | str | Path,
     *,
+    waypoints: ArrayLike | None = None,
     out: str | Path | None = None,
     overwrite: bool = True,
     **options: Unpack[PlanOptions],
@@ -43,6 +50,8 @@ def plan(
     """Plan a path across a scenario's terrain and around its threats, within the limits of its aircraft.
 
     scenario: an embedded name (`planfly.scenarios()` lists them), a TOML file's path, or a `Scenario`.
+    waypoints: a path of your own, (w, 3): east and north of the scenario's origin and altitude AMSL, m, from the
+    scenario's start to its destination.  Nothing is searched: the path is scored and certified as it stands.
     out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces an existing file.
 
@@ -62,10 +71,54 @@ def plan(
     <Plan tight: 22 waypoints, safe, ...>
     >>> path.waypoints.shape
     (22, 3)
+    >>> mine = path.waypoints + [[0.0, 0.0, 0.0], *[[0.0, 4.0, 0.0]] * 20, [0.0, 0.0, 0.0]]
+    >>> planfly.plan("tight", waypoints=mine)
+    <Plan tight: 22 waypoints, not feasible, ...>
     """
     check_arguments(seed=options["seed"], budget=options["budget"], seconds=options["seconds"])
     world = _with_budget(load_scenario_with_options(scenario, options), options["budget"])
-    return _search_and_write(world, scenario, None, options, out, overwrite)
+    if waypoints is None:
+        return _search_and_write(world, scenario, None, options, out, overwrite)
+    path, target = _check_waypoints(world, waypoints, options), _plan_target(world, scenario, options, out, overwrite)
+    return _write_plan(make_given_plan(world, load_airframe(world), choose_seed(world, options["seed"]), path), target)
+
+
+# Options of a search, which a path of one's own does not have.
+_SEARCH_OPTIONS = ("algorithm", "budget", "seconds", "stop")
+# Tolerance within which a path of one's own begins at the scenario's start and ends at its destination, m.
+_END_TOLERANCE_M = 1.0
+
+
+def _check_waypoints(scenario: Scenario, waypoints: ArrayLike, options: PlanOptions) -> Floats:
+    """Return waypoints as an array (w, 3), m.
+
+    Raises ArgumentError for another shape, for a value that is not finite or outside the map, naming its row and
+    column, for ends that are not those of the scenario, and for an option of a search.
+    """
+    for name, value in options.items():
+        if name in _SEARCH_OPTIONS and value is not None:
+            raise ArgumentError.of_argument(name, value, "not with waypoints, which are not searched")
+    expected = "expected an array (w, 3) of at least 2 rows: east, north and altitude AMSL, m"
+    try:
+        path = np.array(waypoints, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ArgumentError.of_argument("waypoints", type(waypoints).__name__, expected) from None
+    if path.ndim != 2 or path.shape[1] != 3 or len(path) < 2:
+        raise ArgumentError.of_argument("waypoints", path, expected, shown=f"of shape {path.shape}")
+    for row, point in enumerate(path):
+        for column, value in zip(("east", "north", "altitude"), point.tolist(), strict=True):
+            if not abs(value) <= MAP_EXTENT:
+                allowed = f"allowed -{MAP_EXTENT:.0f}..{MAP_EXTENT:.0f} m"
+                raise ArgumentError.of_argument(f"waypoints row {row}: {column}", value, allowed)
+        if scenario.terrain is not None and math.isnan(scenario.terrain.height(point[0], point[1])):
+            place = f"row {row}: east {point[0]:g} m, north {point[1]:g} m"
+            raise ArgumentError.of_argument("waypoints", point, "outside the terrain data", shown=place)
+    for row, name, end in ((0, "start", scenario.start), (len(path) - 1, "destination", scenario.destination)):
+        if (distance := math.dist(path[row], end)) > _END_TOLERANCE_M:
+            place = f"row {row}: {distance:.0f} m from the scenario's {name}"
+            allowed = f"expected ({end[0]:.1f}, {end[1]:.1f}, {end[2]:.1f}); planfly.make_scenario makes another {name}"
+            raise ArgumentError.of_argument("waypoints", path[row], allowed, shown=place)
+    return path
 
 
 @with_warm_up(*PLANNING)
@@ -135,10 +188,7 @@ def _search_and_write(
     source: the scenario as the caller named it; its file must not be overwritten.
     flown_plan_and_leg: the plan being flown and the leg to plan from; None for a new plan.
     """
-    seed, target = choose_seed(world, options["seed"]), None
-    if out is not None:
-        source_file = None if isinstance(source, Scenario) else Path(source)
-        target = file_target(out, world.name, seed, overwrite=overwrite, source=source_file)
+    seed, target = choose_seed(world, options["seed"]), _plan_target(world, source, options, out, overwrite)
     airframe, should_stop = load_airframe(world), stop_condition(options["seconds"], options["stop"])
     with stage(f"planning {world.name}", "planning") as advance:
         plan = make_plan(
@@ -150,6 +200,22 @@ def _search_and_write(
             stop=should_stop,
             flown_plan_and_leg=flown_plan_and_leg,
         )
+    return _write_plan(plan, target)
+
+
+def _plan_target(
+    world: Scenario, source: Scenario | str | Path, options: PlanOptions, out: str | Path | None, overwrite: bool
+) -> Path | None:
+    """Return the file for a plan of a scenario; None to write no file."""
+    if out is None:
+        return None
+    source_file = None if isinstance(source, Scenario) else Path(source)
+    seed = choose_seed(world, options["seed"])
+    return file_target(out, world.name, seed, overwrite=overwrite, source=source_file)
+
+
+def _write_plan(plan: Plan, target: Path | None) -> Plan:
+    """Write a plan if a file is named, and return it."""
     if target is not None:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(target, plan_json(plan))
@@ -159,14 +225,19 @@ def _search_and_write(
 def stop_condition(seconds: float | None, stop: Callable[[], bool] | None) -> StopCondition:
     """Return a function that states the reason to stop a search, or "" to continue.
 
-    The reason is "interrupted" as soon as `stop` returns True, and "budget" after a number of seconds.
+    The reason is "interrupted" as soon as `stop` returns True, and "budget" after a number of seconds, of which the
+    compilation of kernels takes none.
     """
-    deadline = None if seconds is None else time.monotonic() + seconds
+
+    def working_time() -> float:
+        return time.monotonic() - COMPILE_TIMER.seconds
+
+    start = working_time()
 
     def should_stop() -> str:
         if stop is not None and stop():
             return "interrupted"
-        return "budget" if deadline is not None and time.monotonic() >= deadline else ""
+        return "budget" if seconds is not None and working_time() - start >= seconds else ""
 
     return should_stop
 
@@ -187,6 +258,8 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
     """
     if plan.feasible:
         return ()
+    if plan.algorithm == GIVEN_WAYPOINTS and plan.certificate.problems:
+        return plan.certificate.problems
     return tuple(explain_failure(plan, load_airframe(plan.scenario).limits.with_margin()))
 
 

@@ -34,6 +34,8 @@ def limit_waypoint_orbits(
     airframe: Airframe,
     search: Callable[[Scenario], Plan] | None = None,
     search_limits: Limits | None = None,
+    *,
+    keeps_waypoints: bool = False,
 ) -> Plan:
     """Return a plan with so few waypoints that gusts rarely make the aircraft orbit at one of them.
 
@@ -44,6 +46,7 @@ def limit_waypoint_orbits(
 
     search: function that plans a scenario in the same way as the plan; None to search for no other path.
     search_limits: limits within which the plan was made; None for the limits of the aircraft.
+    keeps_waypoints: True to keep the waypoints of the plan, and to reject it if they are too many.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.search.plan_path import plan_path
@@ -66,7 +69,7 @@ def limit_waypoint_orbits(
             if has_usual_count or _is_accepted(plan, airframe)
             else _with_problem(plan, _corridor_problem(plan, airframe))
         )
-    shorter_plan = drop_waypoints(plan, limits if search_limits is None else search_limits)
+    shorter_plan = plan if keeps_waypoints else drop_waypoints(plan, limits if search_limits is None else search_limits)
     if _is_accepted(shorter_plan, airframe):
         return shorter_plan
     remaining_orbits, count = expected_orbits(shorter_plan, autopilot, limits), len(shorter_plan.waypoints) - 2

@@ -25,10 +25,8 @@ from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.imported_flights import ImportedFlight
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
-from planner.evaluation.certify import certify
-from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import make_problem
 from planner.plan import Certificate, Objectives, Plan, Violations, plan_json
+from planner.search.plan_path import certify_waypoints
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
 from world.errors import LogError, MissionError, PlanflyError
@@ -367,16 +365,12 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
     if (plan := _plan_with_ground_phases(context, mission)) is not None:
         return plan
     _check_plain_waypoints(mission)
-    return _scored_plan(context, np.array(route.waypoints)[route.items >= 0])
+    return _certified_plan(context, np.array(route.waypoints)[route.items >= 0])
 
 
-def _scored_plan(context: EditContext, waypoints: Floats) -> Plan:
-    """Return a plan with the scores and the certificate of its path.  waypoints: (w, 3), m."""
-    problem = make_problem(context.scenario, context.airframe.limits.with_margin())
-    certificate = certify(problem, waypoints)
-    counts, objectives = paper_scores(problem.certified, waypoints[None])
-    scores = Violations(*counts[0]), Objectives(*objectives[0])
-    return Plan(context.scenario, waypoints, *scores, certificate, context.seed, "edited", 0, np.zeros((0, 3)))
+def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:
+    """Return the plan of waypoints (w, 3), m, in the scenario of the page."""
+    return certify_waypoints(context.scenario, context.airframe.limits.with_margin(), waypoints, seed=context.seed)
 
 
 def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | None:
@@ -401,7 +395,7 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
         for procedure, ends in ((climb, slice(2)), (descent, slice(-2, None)))
     )
     if is_unchanged:
-        plan = replace(_scored_plan(context, waypoints), ways=opened_plan.ways)
+        plan = replace(_certified_plan(context, waypoints), ways=opened_plan.ways)
         ground_problems = [
             problem for problem in opened_plan.certificate.problems if problem.startswith(("climb-out: ", "landing: "))
         ]

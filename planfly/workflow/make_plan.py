@@ -12,10 +12,11 @@ from planfly.planning.gust_orbits import limit_waypoint_orbits
 from planfly.workflow.airframe import Airframe, with_departure_and_approach
 from planfly.workflow.open_flight import make_setup, mission_of_plan
 from planner.plan import Plan
-from planner.search.plan_path import plan_path
+from planner.search.plan_path import certify_waypoints, plan_path
 from planner.search.replan import replan
 from planner.search.search_state import StopCondition
 from planner.search.shared_budget import Search, SharedBudget
+from world.arrays import Floats
 from world.scenario import Scenario
 
 # Function called with the progress of a stage: amount done, total amount, and a remark.
@@ -86,11 +87,20 @@ def make_plan(
     return _add_ground_phases(plan, airframe, continues=continues)
 
 
-def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False) -> Plan:
-    """Apply to a plan the steps that `make_plan` takes after its search, without another search."""
-    return _add_ground_phases(
-        ensure_altitude_margin(limit_waypoint_orbits(plan, airframe), airframe), airframe, continues=continues
+def make_given_plan(scenario: Scenario, airframe: Airframe, seed: int, waypoints: Floats) -> Plan:
+    """Return the plan of given waypoints (w, 3), m, certified by all checks of `make_plan`, without a search."""
+    return finish_plan(
+        certify_waypoints(scenario, airframe.limits.with_margin(), waypoints, seed=seed), airframe, keeps_waypoints=True
     )
+
+
+def finish_plan(plan: Plan, airframe: Airframe, *, continues: bool = False, keeps_waypoints: bool = False) -> Plan:
+    """Apply to a plan the steps that `make_plan` takes after its search, without another search.
+
+    keeps_waypoints: see `limit_waypoint_orbits`.
+    """
+    limited_plan = limit_waypoint_orbits(plan, airframe, keeps_waypoints=keeps_waypoints)
+    return _add_ground_phases(ensure_altitude_margin(limited_plan, airframe), airframe, continues=continues)
 
 
 def _add_ground_phases(plan: Plan, airframe: Airframe, old_plan: Plan | None = None, *, continues: bool) -> Plan:

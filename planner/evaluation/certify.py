@@ -23,7 +23,7 @@ from planner.evaluation.certify_kernels import (
 from planner.evaluation.corners import fly_by_radii, settling_length
 from planner.evaluation.leg_constraints import MIN_CERTIFIED_LEG_M, slope_limits
 from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, ProblemArrays
-from planner.plan import Certificate
+from planner.plan import Certificate, path_digest
 from world.arrays import Floats
 from world.geometry import leg_runs, leg_slopes, turning_angles
 
@@ -48,7 +48,18 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     bounds = _bounds_margin(data, waypoints, problems)
     distance = kill_distance(data, waypoints)
     zones, headroom = _airspace_margins(problem, waypoints, problems)
-    return Certificate(turn, available_length, slope, clearance, bounds, distance, tuple(problems), zones, headroom)
+    return Certificate(
+        turn,
+        available_length,
+        slope,
+        clearance,
+        bounds,
+        distance,
+        tuple(problems),
+        zones,
+        headroom,
+        path_digest(waypoints),
+    )
 
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
@@ -148,7 +159,7 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
             min_margin = min(min_margin, margin + data.angle_margin)
             if margin < -_EPSILON:
                 faults.append(
-                    (margin, f"turn at waypoint {i}", _slope_fault_text(slope, climb, dive, " along its arc"))
+                    (margin, f"turn at waypoint {i}", _slope_fault_text(data, slope, climb, dive, " along its arc"))
                 )
                 break
     problems += _summarise_faults(faults)
@@ -164,15 +175,18 @@ def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
         margin = min(climb - slope, dive + slope)
         min_margin = min(min_margin, margin + data.angle_margin)
         if margin < -_EPSILON:
-            faults.append((margin, f"leg {i}", _slope_fault_text(slope, climb, dive)))
+            faults.append((margin, f"leg {i}", _slope_fault_text(data, slope, climb, dive)))
     problems += _summarise_faults(faults)
     return min_margin
 
 
-def _slope_fault_text(slope: float, climb: float, dive: float, place_text: str = "") -> str:
-    """Describe a slope (rad, positive up) beyond the climb or dive limit (rad)."""
-    verb, limit = ("climbs", climb) if slope > 0 else ("sinks", dive)
-    return f"{verb} {math.degrees(abs(slope)):.1f} deg{place_text}, allowed {math.degrees(limit):.1f} deg"
+def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: float, place_text: str = "") -> str:
+    """Describe a slope (rad, positive up) beyond the climb or dive limit (rad), and the margin of a plan's limit."""
+    verb, limit, stated, rate = (
+        ("climbs", climb, data.max_climb, "climb") if slope > 0 else ("sinks", dive, data.max_dive, "sink")
+    )
+    margins = f" with a plan's margins for gusts and the autopilot's {rate} rate" if math.isnan(stated) else ""
+    return f"{verb} {math.degrees(abs(slope)):.1f} deg{place_text}, allowed {math.degrees(limit):.1f} deg{margins}"
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:

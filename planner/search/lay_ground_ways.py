@@ -20,7 +20,7 @@ from aircraft.tracking import SPEED_RATIOS
 from planner.evaluation.certify import certify
 from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, make_problem
 from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
-from planner.plan import Certificate, Plan
+from planner.plan import GIVEN_WAYPOINTS, Certificate, Plan
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.pose_chains import (
     LAP_SIDE_RADII,
@@ -234,7 +234,8 @@ class _Site:
 def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
     """Make the data for departures and approaches: the problems of their certificates and the size of their turns."""
     scenario = plan.scenario
-    algorithm_limits = limits_for(find_algorithm(plan.algorithm, scenario.name), limits)
+    algorithm = scenario.planner.algorithm if plan.algorithm == GIVEN_WAYPOINTS else plan.algorithm
+    algorithm_limits = limits_for(find_algorithm(algorithm, scenario.name), limits)
     problem = make_problem(scenario, algorithm_limits)
     # An inclusion with a floor begins above the field.
     zones = tuple(zone for zone in scenario.zones if zone.kind == "exclusion" or zone.floor is None)

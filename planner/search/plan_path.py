@@ -11,11 +11,11 @@ import numpy as np
 
 from aircraft.path_limits import Limits
 from planner.airspace.zone_limits import is_limited
-from planner.evaluation.certify import kill_distance
+from planner.evaluation.certify import certify, kill_distance
 from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN_M, make_problem
-from planner.plan import Certificate, Objectives, Plan, Violations
+from planner.plan import GIVEN_WAYPOINTS, Certificate, Objectives, Plan, Violations
 from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.generations import may_try_again, path_generations, waypoint_generations
 from planner.search.infeasibility_proof import is_closed
@@ -130,6 +130,35 @@ def plan_path(
         evaluations=search.evaluations,
         history=np.array(search.history).reshape(-1, 3),
         ended=search.end_reason,
+    )
+
+
+def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, seed: int) -> Plan:
+    """Return the plan of given waypoints (w, 3), m, with scores and certificate, without a search.
+
+    The limits are those of the scenario's algorithm.
+
+    >>> from planfly.workflow.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> limits = load_airframe(scenario).limits
+    >>> plan = plan_path(scenario, limits, seed=1)
+    >>> certify_waypoints(scenario, limits, plan.waypoints, seed=1).certificate == plan.certificate
+    True
+    """
+    algorithm = find_algorithm(scenario.planner.algorithm, scenario.name)
+    problem = make_problem(scenario, limits_for(algorithm, limits))
+    violations, objectives = paper_scores(problem.certified, np.array(waypoints)[None])
+    return Plan(
+        scenario=scenario,
+        waypoints=waypoints,
+        violations=Violations(*violations[0]),
+        objectives=Objectives(*objectives[0]),
+        certificate=certify(problem, waypoints),
+        seed=seed,
+        algorithm=GIVEN_WAYPOINTS,
+        evaluations=0,
+        history=np.empty((0, 3)),
     )
 
 

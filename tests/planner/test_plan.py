@@ -12,7 +12,17 @@ import numpy as np
 import pytest
 
 from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
-from planner.plan import Certificate, Objective, Plan, Violation, parse_plan, plan_html, plan_json, read_plan
+from planner.plan import (
+    Certificate,
+    Objective,
+    Plan,
+    Violation,
+    parse_plan,
+    path_digest,
+    plan_html,
+    plan_json,
+    read_plan,
+)
 from tests.setups import small_scenario
 from world.errors import MissionError, PlanflyError, ScenarioError
 from world.scenario import load_scenario
@@ -119,6 +129,20 @@ def test_arrays_are_locked() -> None:
     for name in ("waypoints", "history"):
         with pytest.raises(ValueError, match="read-only"):
             getattr(plan, name)[0] = 1
+
+
+def test_waypoints_are_not_replaced_under_a_certificate_of_others() -> None:
+    plan = made()
+    certified = replace(plan, certificate=replace(CERTIFICATE, path_digest=path_digest(plan.waypoints[1:])))
+    moved = np.array([plan.waypoints[0], plan.waypoints[1] + 9.0, plan.waypoints[2]])
+    with pytest.raises(PlanflyError, match=r"certificate is for other waypoints; planfly\.plan\(scenario, waypoints="):
+        replace(certified, waypoints=moved)
+    assert replace(certified, waypoints=plan.waypoints.tolist(), seed=3).seed == 3
+    # As written and read, too: its certificate is that of the waypoints behind the flown leg.
+    read = parse_plan(plan_json(plan), "plan.json")
+    with pytest.raises(PlanflyError, match="certificate is for other waypoints"):
+        replace(read, waypoints=moved)
+    assert replace(read, waypoints=[[9.0, 9.0, 9.0], *plan.waypoints[1:]]).flown_legs == 1
 
 
 def test_scores_have_names_in_the_order_of_their_columns() -> None:

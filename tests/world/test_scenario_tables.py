@@ -10,7 +10,15 @@ import pytest
 from tests.world.made.made_scenario import SMALL, THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.scenario_file import check_scenario, parse_scenario
-from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, ScenarioFile, ZoneTable, check_no_line_break, in_range
+from world.scenario_tables import (
+    DEFAULT_AUTOPILOT,
+    FlightTable,
+    ScenarioFile,
+    ThreatTable,
+    ZoneTable,
+    check_no_line_break,
+    in_range,
+)
 
 
 def test_a_range_holds_its_ends_unless_it_says_otherwise() -> None:
@@ -213,11 +221,10 @@ CASES: dict[str, tuple[str, str, str]] = {
     "two positions": ("east_m = -4000", "east_m = -4000\nlat_deg = 46\nlon_deg = 8", "start: position: give"),
     "latitude": ("", "[origin]\nlat_deg = 91\nlon_deg = 8", "origin.lat_deg: 91: allowed -89..89"),
     "missing longitude": ("", "[origin]\nlat_deg = 46", "origin.lon_deg: Field required"),
-    "radius without scale": ("", THREAT.replace("kill_scale_m = 200", ""), "kill_radius_m and kill_scale_m: give both"),
     "scale without radius": (
         "",
         THREAT.replace("kill_radius_m = 800", ""),
-        "kill_radius_m and kill_scale_m: give both",
+        "kill_scale_m: needs kill_radius_m",
     ),
     "a threat without either": ("", THREAT.split("kill_radius")[0], "threats.0: kill_radius_m: missing"),
     "a radius of zero": ("", THREAT.replace("800", "0"), "threats.0.kill_radius_m: 0: allowed above 0..200000"),
@@ -301,3 +308,12 @@ def test_every_number_has_a_range() -> None:
         )
     )
     tried(full.model_dump(mode="json", exclude_none=True))
+
+
+def test_a_threat_without_scales_has_a_quarter_and_a_third_of_its_radii() -> None:
+    table = ThreatTable(east_m=0.0, north_m=0.0, kill_radius_m=1200.0, detection_radius_m=2400.0)
+    assert (table.kill_scale_m, table.detection_scale_m) == (300.0, 800.0)
+    stated = ThreatTable(east_m=0.0, north_m=0.0, kill_radius_m=1200.0, kill_scale_m=100.0)
+    assert (stated.kill_scale_m, stated.detection_scale_m) == (100.0, None)
+    with pytest.raises(ValueError, match="kill_scale_m: needs kill_radius_m"):
+        ThreatTable(east_m=0.0, north_m=0.0, kill_scale_m=100.0, detection_radius_m=9.0)

@@ -5,31 +5,70 @@ import math
 from flight.autopilots.parts import PX4_DEFAULT_LIMITS, FeasibilityLimits
 from flight.mission.items import LANDINGS, TAKEOFFS, Command, Mission
 from flight.simulation.setup import FlightSetup
-
-# Distance within which a mission ends at the destination of its scenario, m.
-_AT_DESTINATION_M = 1.0
+from logs.verdict.tolerances import FINAL_WAYPOINT_TOLERANCE_M
 
 
 def returns_after_last_item(setup: FlightSetup) -> bool:
+    """Return True if ArduPlane's own return to launch after the mission's last item is judged.
+
+    A mission that ends at the destination of its scenario is judged up to there.
+    """
+    return _begins_return(setup) and not _ends_at_destination(setup)
+
+
+def _begins_return(setup: FlightSetup) -> bool:
     """Return True if ArduPlane returns to launch by itself after the mission's last item.
 
     It does (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return, a landing, a
-    loiter without end or a jump without end.  A mission that ends at the destination of its scenario is judged up to
-    there.
+    loiter without end or a jump without end.
     """
-    route, mission, scenario = setup.route, setup.mission, setup.scenario
+    route, mission = setup.route, setup.mission
     ends_in_flight = route.rtl_start < 0 and route.endless_jump < 0 and mission.home is not None
     if setup.source is not None or setup.autopilot.checks.dialect != "ardupilot" or not ends_in_flight:
         return False
-    last_seq = next((seq for seq in reversed(route.items.tolist()) if seq >= 0), -1)
+    last_seq = _last_seq(setup)
     last_item = next((item for item in mission.items if item.seq == last_seq), None)
     if last_item is None or last_item.command in LANDINGS | {Command.NAV_LOITER_UNLIM}:
         return False
     # The route of the airborne part of a flight ends before the landing.
-    if any(item.command in LANDINGS and item.seq > last_seq for item in mission.items):
-        return False
-    last_position = route.waypoints[route.items.tolist().index(last_seq)]
-    return scenario.external or math.dist(last_position, scenario.destination) > _AT_DESTINATION_M
+    return not any(item.command in LANDINGS and item.seq > last_seq for item in mission.items)
+
+
+def _last_seq(setup: FlightSetup) -> int:
+    """Return the number of the last item on the route; -1 without one."""
+    return next((seq for seq in reversed(setup.route.items.tolist()) if seq >= 0), -1)
+
+
+def _distance_to_destination(setup: FlightSetup) -> float:
+    """Return the distance from the end of a mission to the destination of its scenario, m."""
+    route = setup.route
+    return math.dist(route.waypoints[route.items.tolist().index(_last_seq(setup))], setup.scenario.destination)
+
+
+def _ends_at_destination(setup: FlightSetup) -> bool:
+    """Return True if a mission ends at the destination of its scenario.
+
+    The tolerance is that within which a flight reaches its last waypoint.
+    """
+    return not setup.scenario.external and _distance_to_destination(setup) <= FINAL_WAYPOINT_TOLERANCE_M
+
+
+def unjudged_return_text(setup: FlightSetup) -> str:
+    """Explain why a return after the last item is not judged; "" if there is none, or if it is judged."""
+    if not _begins_return(setup) or not _ends_at_destination(setup):
+        return ""
+    return f"the mission ends at the scenario's destination; {setup.autopilot.title} then returns to launch"
+
+
+def judged_return_text(setup: FlightSetup) -> str:
+    """Explain why a return after the last item is judged, and how to end a mission without one."""
+    remedy = "a landing or NAV_LOITER_UNLIM at the end prevents it"
+    if setup.scenario.external:
+        return f"{setup.autopilot.title} returns by itself after the last item; {remedy}"
+    return (
+        f"the mission ends {_distance_to_destination(setup):.1f} m from the scenario's destination, more than"
+        f" {FINAL_WAYPOINT_TOLERANCE_M:.0f} m, so the return after it is judged; {remedy}"
+    )
 
 
 # What each value of MIS_TKO_LAND_REQ requires.

@@ -23,7 +23,8 @@ def completion_findings(
     plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
-        faults.append(message("the plan is not feasible"))
+        problem = next(iter(plan.certificate.problems), "it violates constraints at its sampled points")
+        faults.append(message("the plan is not feasible", f": {problem}"))
     if end_reason != "completed":
         faults.append(message(f"the flight ended early: {end_reason}", _ending_place_text(requirements, aligned)))
     if not log_complete:

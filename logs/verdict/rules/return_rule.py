@@ -18,7 +18,7 @@ from flight.mission.itinerary import ENDLESS_LOITER_TIME_S
 from flight.mission.return_path import RTL_NOT_CONTINUED_TEXT
 from flight.simulation.tick import RTL_ARRIVAL_ALTITUDE_TOLERANCE_M, RTL_ARRIVAL_LOITER_RADII, RTL_ARRIVAL_RADIUS_M
 from logs.verdict.findings import UNKNOWN_RETURN, Finding, Message, make_finding, message
-from logs.verdict.measures.mission_ends import returns_after_last_item
+from logs.verdict.measures.mission_ends import judged_return_text, returns_after_last_item
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -112,6 +112,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
             text = f": {measured_text(simulated, world.limit, setup.scenario)}"
             is_without_terrain = simulated.kind == "unknown" and setup.scenario.terrain is None
             ok = simulated.safe or is_without_terrain or (None if simulated.kind in UNJUDGED else False)
+            text += "" if ok else f"; {judged_return_text(setup)}"
         check = UNKNOWN_RETURN if ok is None else ""
     fault = message(brief, text)
     return [

@@ -15,6 +15,7 @@ from flight.simulation.track import Track, control_limits, saturated_rows
 from logs.verdict.measures.flown_phases import ground_phase_rows
 from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
+from planner.plan import GIVEN_WAYPOINTS
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
 from world.scenario import lat_lon_of_points
@@ -222,6 +223,8 @@ def flight_facts(setup: FlightSetup, end_reason: str) -> Facts:
     if setup.plan is not None:
         plan = setup.plan
         plan_text = f"{plan.algorithm}, seed {plan.seed}, {plan.evaluations} paths tried"
+        if plan.algorithm == GIVEN_WAYPOINTS:
+            plan_text = "given waypoints, not searched"
         facts.append(("Plan", f"{plan_text}; {_plan_status(plan.feasible, plan.safe)}"))
     if end_reason:
         facts.append(("Flight ended", end_reason))

@@ -72,6 +72,12 @@ def test_other_tables_are_changed_key_by_key_and_positions_as_a_whole() -> None:
         ({"threats": [{**ROWS[0], "colour": "red"}]}, "colour"),
         ({"wind": {"speed_mps": 400.0}}, "wind.speed_mps: 400"),
         ({"winds": {"speed_mps": 4.0}}, "winds"),
+        ({"wind": {"speed": 4.0}}, "wind.speed: unknown key: did you mean 'speed_mps'"),
+        (
+            {"threats": [[900.0, 90.0, 60.0, 0.0], [9.0, 9.0, -60.0, 0.0]]},
+            r"threats.1.kill_radius_m: -60.0: [^(]*$",
+        ),
+        ({"planner": {"algorithm": "umda2"}}, "planner.algorithm: 'umda2': unknown; .*did you mean 'umda'"),
     ],
 )
 def test_values_that_no_scenario_may_have_are_refused_in_a_line(changes: dict[str, Any], said: str) -> None:
@@ -106,3 +112,28 @@ def test_a_threats_column_of_text_is_named_with_its_value() -> None:
     columns = {"east_m": [900.0], "north_m": [90.0], "kill_radius_m": ["900"]}
     with pytest.raises(planfly.PlanflyError, match=r"column kill_radius_m 900: expected numbers, not text"):
         planfly.make_scenario("tight", threats=columns)
+
+
+def test_a_threat_of_an_array_has_its_number_as_its_name() -> None:
+    # Its start is 0 m from the first and 2,600 m from the second.
+    scenario = planfly.make_scenario("tight", threats=[[2600.0, 900.0, 60.0, 0.0], [0.0, 0.0, 90.0, 0.0]])
+    assert scenario.threats.names == ("threat 1", "threat 2")
+    with pytest.raises(planfly.PlanflyError, match="inside the kill radius of threat 2"):
+        planfly.plan(scenario)
+
+
+def test_a_radius_that_is_perhaps_in_km_is_noted(caplog: pytest.LogCaptureFixture) -> None:
+    scenario = planfly.make_scenario("tight", threats=[[900.0, 90.0, 0.9, 2.0], [900.0, 90.0, 10.0, 0.0]])
+    note = "the kill radius of threat 1 is 0.9 m (and 1 more): radii are in metres, not kilometres"
+    assert scenario.notes == (note,)
+    assert caplog.messages == [f"tight: {note}"]
+    assert load_scenario("tight").notes == ()
+
+
+def test_a_notebook_shows_a_scenario_as_a_line_or_a_table() -> None:
+    scenario = planfly.make_scenario("tight", name="a<b")
+    # From 0 to 2,600 m east, with the 28 posts of its file.
+    assert repr(scenario) == "<Scenario a<b: 2.6 km, 28 threats, 0 zones>"
+    table = scenario._repr_html_()
+    assert "a&lt;b" in table
+    assert "<td>destination</td><td>east 2600 m, north 0 m, 75 m AMSL</td>" in table

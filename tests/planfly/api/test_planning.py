@@ -9,6 +9,7 @@ import pytest
 
 import planfly
 from aircraft.catalog import aircraft_names, load_aircraft
+from planfly.api.planning import stop_condition
 from planfly.cli import main
 from planfly.flight_options import FlightOptions, apply_options, load_scenario_with_options
 from planfly.workflow.airframe import load_airframe
@@ -16,6 +17,7 @@ from planner.plan import plan_json, read_plan
 from planner.search.plan_path import plan_path
 from tests.planfly.conftest import FIELD
 from tests.setups import small_scenario
+from world.compile_events import COMPILE_TIMER
 from world.errors import ScenarioError
 from world.scenario import embedded_names, load_scenario, with_wind
 
@@ -105,6 +107,84 @@ def test_options_change_the_scenario_that_is_planned_in() -> None:
     assert (scenario.wind.turbulence, scenario.flight.airspeed_mps, made.seed) == ("light", 28.0, 3)
     asked = with_wind(small_scenario(), 6.0, np.radians(90.0), "light")
     assert asked.wind == scenario.wind
+
+
+def test_waypoints_of_ones_own_are_certified_as_they_stand(path: planfly.Plan, tmp_path: Path) -> None:
+    again = planfly.plan(path.scenario, waypoints=path.waypoints.tolist(), out=tmp_path / "mine.json")
+    assert again.certificate == path.certificate
+    assert (again.violations, again.objectives) == (path.violations, path.objectives)
+    assert (again.algorithm, again.evaluations, planfly.what_blocks(again)) == ("given", 0, ())
+    assert plan_json(read_plan(tmp_path / "mine.json")) == plan_json(again)
+    # 10 m in the ground, and nothing is moved out of it.
+    low, terrain = np.array(path.waypoints), path.scenario.terrain
+    assert terrain is not None
+    low[3, 2] = terrain.height(low[3, 0], low[3, 1]) - 10.0
+    mine = planfly.plan(path.scenario, waypoints=low)
+    assert mine.waypoints.tolist() == low.tolist()
+    assert not mine.feasible
+    assert mine.certificate.clearance <= -10.0 - path.scenario.limits.min_clearance_m
+    assert any("above ground at its lowest" in line for line in planfly.what_blocks(mine))
+
+
+def test_a_plan_of_given_waypoints_has_departure_and_landing_and_flies() -> None:
+    """As every plan of this scenario, whose flights begin and end on the ground."""
+    searched = planfly.plan("jacksboro", seed=1)
+    given = planfly.plan("jacksboro", waypoints=searched.waypoints, seed=1)
+    assert given.ways is not None
+    assert given.ways.climb is not None
+    assert given.ways.descent is not None
+    assert given.certificate == searched.certificate
+    assert given.safe
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda points: points[:, :2], r"of shape \(\d+, 2\): expected an array \(w, 3\)"),
+        (lambda points: points[:1], r"of shape \(1, 3\): expected an array \(w, 3\) of at least 2 rows"),
+        (lambda points: "west", r"waypoints str: expected an array"),
+        (lambda points: _with(points, 2, 1, np.nan), r"waypoints row 2: north nan: allowed -500000\.\.500000 m"),
+        (lambda points: _with(points, 4, 2, np.inf), r"waypoints row 4: altitude inf: allowed"),
+        (lambda points: _with(points, 3, 0, 4e5), r"waypoints row 3: east 400000 m, .*: outside the terrain data"),
+        (lambda points: _with(points, 0, 2, points[0, 2] + 2), r"row 0: 2 m from the scenario's start: expected \("),
+        (lambda points: points[:-1], r"m from the scenario's destination: expected .*planfly\.make_scenario"),
+    ],
+)
+def test_waypoints_that_are_no_path_of_the_scenario_are_refused_by_row(
+    path: planfly.Plan, change: Any, said: str
+) -> None:
+    with pytest.raises(planfly.ArgumentError, match=said) as refused:
+        planfly.plan(path.scenario, waypoints=change(np.array(path.waypoints)))
+    assert "\n" not in str(refused.value)
+
+
+def _with(points: Any, row: int, column: int, value: float) -> Any:
+    points[row, column] = value
+    return points
+
+
+def test_given_waypoints_are_not_searched(path: planfly.Plan) -> None:
+    with pytest.raises(planfly.ArgumentError, match="algorithm fda: not with waypoints, which are not searched"):
+        planfly.plan(path.scenario, waypoints=path.waypoints, algorithm="fda")
+
+
+def test_compiling_takes_nothing_of_a_budget_in_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [100.0]
+    monkeypatch.setattr("planfly.api.planning.time.monotonic", lambda: now[0])
+    should_stop = stop_condition(20.0, None)
+    # 25 s later, of which 24 s were spent compiling, 1 s of the 20 s is over.
+    now[0] += 25.0
+    monkeypatch.setattr(COMPILE_TIMER, "seconds", COMPILE_TIMER.seconds + 24.0)
+    assert should_stop() == ""
+    now[0] += 18.9
+    assert should_stop() == ""
+    now[0] += 0.2
+    assert should_stop() == "budget"
+
+
+def test_a_number_given_as_text_is_refused_in_a_line() -> None:
+    with pytest.raises(planfly.ArgumentError, match=r"^seconds '5': expected a number of seconds"):
+        planfly.plan("tight", seconds="5")  # type: ignore[arg-type]
 
 
 def test_a_budget_in_evaluations_and_one_in_seconds_end_it() -> None:

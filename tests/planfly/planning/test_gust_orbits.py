@@ -15,7 +15,7 @@ from planfly.workflow.airframe import Airframe, load_airframe
 from planfly.workflow.make_plan import make_plan
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from tests.setups import spec_around
+from tests.setups import spec_around, with_path
 from world.scenario import Scenario, from_spec
 
 SEED = 3
@@ -134,7 +134,7 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
     scenario = scenario_of("moderate", zones=[wide])
     found = plan_path(scenario, airframe_of_x8.limits.with_margin(), seed=SEED)
     assert found.safe
-    corner = replace(found, waypoints=np.array([scenario.start, [4000.0, aside, 150.0], scenario.destination]))
+    corner = with_path(found, [scenario.start, [4000.0, aside, 150.0], scenario.destination])
     assert expected_orbits(corner, airframe_of_x8.autopilot, airframe_of_x8.limits) <= MAX_EXPECTED_ORBITS
     assert limit_waypoint_orbits(found, airframe_of_x8, lambda _: corner).feasible is taken
     # One that was found with so few waypoints, too.
@@ -150,7 +150,7 @@ def test_fewer_and_sharper_corners_stay_in_the_corridor(aside: float, taken: boo
 def plan_of(airframe: Airframe, waypoints: np.ndarray) -> Plan:
     scenario = scenario_of("moderate")
     found = plan_path(scenario, airframe.limits.with_margin(), seed=SEED)
-    return replace(found, waypoints=waypoints)
+    return with_path(found, waypoints)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ from planner.evaluation.problem import CERTIFIED_BUFFER_M, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.explain_failure import closed_bands, explain_failure, max_altitude, separating_zones, violated_zones
 from planner.search.plan_path import plan_path
+from tests.setups import with_path
 from world.scenario import Scenario
 
 FLAT = {"kind": "flat", "amsl_m": 0}
@@ -177,5 +178,5 @@ def test_of_a_path_that_fails_by_its_autopilot_alone_nothing_is_said(small: Smal
     assert plan.safe
     assert not circles.safe
     assert explain_failure(circles, make_limits(scenario)) == []
-    stray = replace(circles, waypoints=plan.waypoints - [0.0, 0.0, 200.0])
+    stray = with_path(circles, plan.waypoints - [0.0, 0.0, 200.0])
     assert explain_failure(stray, make_limits(scenario)) != []

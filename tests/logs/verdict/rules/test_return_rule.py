@@ -1,5 +1,6 @@
 """A return to launch in the verdict: where it goes, and what holds it and what does not."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -243,12 +244,37 @@ def test_the_return_after_the_last_item_counts_as_an_items(
         assert ok is not False or "the return after the last item hits the ground" in verdict.headline
 
 
-def test_a_mission_that_ends_at_its_scenarios_destination_is_judged_up_to_there() -> None:
+@pytest.mark.parametrize(
+    ("east", "above", "judged"),
+    [(0.0, 0.0, False), (0.0, 1.0, False), (6.0, -8.0, False), (6.0, 9.0, True), (0.0, 30.0, True)],
+)
+def test_a_mission_that_ends_within_10_m_of_its_scenarios_destination_is_judged_up_to_there(
+    east: float, above: float, judged: bool
+) -> None:
+    # sqrt(6^2 + 8^2) is 10 m, as FINAL_WAYPOINT_TOLERANCE_M, and sqrt(6^2 + 9^2) 10.8 m.
     setup = behind_a_hill(*BEHIND_THE_HILL)
-    there = replace(setup.scenario, external=False, destination=setup.route.waypoints[-1])
-    elsewhere = replace(there, destination=setup.route.waypoints[-1] + 2.0)
-    assert not [item for item in judge_geometry(setup.in_scenario(there)).findings if item.rule == "return"]
-    assert of(judge_geometry(setup.in_scenario(elsewhere)), "return").ok is False
+    destination = setup.route.waypoints[-1] - np.array([east, 0.0, above])
+    scenario = replace(setup.scenario, external=False, destination=destination)
+    verdict = judge_geometry(setup.in_scenario(scenario))
+    found = [item for item in verdict.findings if item.rule == "return"]
+    unjudged = [line for line in verdict.lines if line.startswith("Not judged: return")]
+    if judged:
+        distance = f"{math.hypot(east, above):.1f} m from the scenario's destination, more than 10 m"
+        assert [item.ok for item in found] == [False]
+        assert distance in found[0].reason
+        assert found[0].reason.endswith("a landing or NAV_LOITER_UNLIM at the end prevents it")
+        assert not unjudged
+    else:
+        assert not found
+        ends = "the mission ends at the scenario's destination; ArduPlane then returns to launch"
+        assert unjudged == [f"Not judged: return ({ends})"]
+
+
+@pytest.mark.parametrize("last", [UNLIMITED, RTL])
+def test_a_mission_without_a_return_of_arduplanes_own_says_nothing_of_it(last: str) -> None:
+    setup = behind_a_hill(BEHIND_THE_HILL[0], last, RTL_ALTITUDE=600.0)
+    scenario = replace(setup.scenario, external=False, destination=setup.route.waypoints[-1])
+    assert not [line for line in judge_geometry(setup.in_scenario(scenario)).lines if "Not judged: return" in line]
 
 
 def test_the_return_after_the_last_item_needs_its_energy() -> None:
