@@ -43,7 +43,8 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
         place = finding.place
         if finding.rule == rule and place.kind in ("leg", "waypoint") and place.index is not None:
             planned_value, flown_value, limit_value = (
-                math.nan if value is None else value for value in (finding.planned, finding.flown, finding.limit)
+                math.nan if value is None else value
+                for value in (finding.planned, finding.flown, finding.effective_limit)
             )
             place_rows.append(PlaceValue(place.index, planned_value, flown_value, limit_value, finding.ok))
     return sorted(place_rows, key=lambda value: value.number)
