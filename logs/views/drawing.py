@@ -85,6 +85,10 @@ _JPEG_QUALITY = 80
 _MARKERS = {"circle": "o", "triangle": "^", "star": "*", "cross": "x"}
 # Largest number of waypoints or legs that an axis numbers.
 _MAX_TICKS = 45
+# Characters of a line of a panel's title beside its axis, if two such lines are enough.
+_PANEL_TITLE_WIDTH = 16
+# Lines of a panel's title that fit left of the tick labels.
+_MAX_PANEL_TITLE_LINES = 2
 
 
 @contextmanager
@@ -320,15 +324,12 @@ def _draw_panel(axes: Any, chart: Chart, panel: Panel, *, has_leg_numbers: bool)
 
 
 def _title_lines(panel: Panel) -> list[str]:
-    """Wrap a panel's title and unit to short lines."""
-    wrapped = textwrap.wrap(panel.title.replace(" +", "\N{NO-BREAK SPACE}+"), 13)
-    lines = [line.replace("\N{NO-BREAK SPACE}", " ") for line in wrapped]
-    if not panel.unit:
-        return lines
-    unit = f"({panel.unit})"
-    if len(lines) > 1 and len(f"{lines[-1]} {unit}") <= 13:
-        return [*lines[:-1], f"{lines[-1]} {unit}"]
-    return [*lines, unit]
+    """Wrap a panel's title and unit to at most two lines; a third is cut off at the left edge of the picture."""
+    title = panel.title.replace(" +", "\N{NO-BREAK SPACE}+")
+    text = f"{title} ({panel.unit})" if panel.unit else title
+    wrappings = (textwrap.wrap(text, width) for width in range(_PANEL_TITLE_WIDTH, len(text) + _PANEL_TITLE_WIDTH))
+    lines = next(lines for lines in wrappings if len(lines) <= _MAX_PANEL_TITLE_LINES)
+    return [line.replace("\N{NO-BREAK SPACE}", " ") for line in lines]
 
 
 def _draw_marks(axes: Any, marks: Sequence[tuple[float, str]], *, has_leg_numbers: bool) -> None:

@@ -93,3 +93,15 @@ def test_nothing_is_ringed_where_nothing_fails() -> None:
             not len(line.get_xdata()) for line in axes.lines if line.get_markeredgecolor() == theme.colour("fail")
         )
     assert draw_chart(turn_chart("nothing", Verdict((), True, True, ("flyable",), "flown"))).axes == []
+
+
+def test_panel_titles_are_inside_the_picture() -> None:
+    """The longest one, "lowest height above ground (m)", was cut off at the left edge."""
+    clearance = Finding("clearance", Place("leg", 0), 70.0, 70.0, 60.0, "scenario", 0.1, 1.0, "m", "fit", True, "")
+    figure = draw_chart(turn_chart("a flight", Verdict((clearance,), True, True, ("flyable",), "flown")))
+    figure.canvas.draw()
+    (axes,) = figure.axes
+    extent = axes.yaxis.label.get_window_extent()
+    assert "above ground" in axes.get_ylabel()
+    assert extent.x0 > 0.0
+    assert extent.x1 < axes.get_window_extent().x0
