@@ -80,8 +80,8 @@ def test_without_terrain_the_height_above_it_is_left_out() -> None:
     bare = make_setup(terrain={"kind": "none"}, threats=[])
     flight = replace(FIRST, setup=bare)
     panels = draw_chart(make_two_flights_chart((flight, replace(flight, name="second.mcap")))).axes
-    titles = [axes.get_ylabel().split("\n")[0] for axes in panels]
-    assert titles == ["altitude", "airspeed", "bank, right +", "cross-track,", "throttle"]
+    titles = [axes.get_ylabel().replace("\n", " ").split(" (")[0] for axes in panels]
+    assert titles == ["altitude", "airspeed", "bank, right +", "cross-track, right +", "throttle"]
 
 
 def test_a_small_cross_track_fills_its_panel() -> None:

@@ -32,7 +32,7 @@ def test_a_peak_of_one_row_is_still_drawn_and_inside_the_panel() -> None:
     assert axes.get_ylim()[0] < -12.0
     assert axes.get_ylim()[1] > 12.0
     assert axes.get_xlim() == (0.0, 100.0)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("distance (km)", "bank\n(°)")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("distance (km)", "bank (°)")
 
 
 def test_a_quiet_series_is_not_blown_up() -> None:
