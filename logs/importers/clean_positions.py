@@ -1,4 +1,4 @@
-"""Put a log's positions in order: drop and count doubled, late and impossible rows; add no rows.
+"""Put a log's positions in order: remove and count duplicate, late and impossible rows, and add no rows.
 
 First the clock is made steady, then rows are sorted, then positions that no aircraft can have reached are removed.
 """
@@ -16,17 +16,17 @@ from world.arrays import Flags, Floats, Ints
 # ----------------------------------------------------------------------
 # The clock: permanent jumps back are removed, and late rows are sorted.
 
-# Largest lag behind the latest time of a row out of order, s; a clock that stays behind by more has jumped.
+# Largest lag of a row out of order behind the latest time, s; a clock that stays behind by more has jumped.
 MAX_CLOCK_LAG_S = 1.0
-# Number of successive rows for which a clock that jumped is behind.
+# Number of successive late rows that show that the clock jumped.
 MIN_LATE_ROWS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class SteadyClock:
-    """Times on a steady clock.
+    """Times on a clock without jumps back.
 
-    time: (n,) s, shifted after each jump.
+    time: times shifted after each jump, s, (n,).
     jumps: times on the steady clock at which the clock went back permanently, s.
     """
 
@@ -35,35 +35,38 @@ class SteadyClock:
 
 
 def remove_clock_jumps(time: Floats, usual: float = 0.1) -> SteadyClock:
-    """Remove jumps back from the times (n,) of a log's rows in the order of the file.
+    """Remove jumps back from the times (s, (n,)) of a log's rows in the order of the file.
 
-    A clock that goes back and stays there has been reset: later rows are shifted to follow ``usual`` s after the row
-    before.  A single row out of order keeps its time.
+    A clock that goes back and stays back has been reset: the first row after the reset is moved to ``usual`` s after
+    the latest row before it, and all later rows are shifted with it.  A single row out of order keeps its time.
 
     >>> remove_clock_jumps(np.array([10.0, 11.0, *range(2, 14)]), usual=1.0).time.tolist()
     [10.0, 11.0, 12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0, 19.0, 20.0, 21.0, 22.0, 23.0]
     >>> float(remove_clock_jumps(np.array([10.0, 11.0, 5.0, *range(12, 24)])).time[2])
     5.0
     """
-    moved = np.array(time, dtype=np.float64)
+    shifted = np.array(time, dtype=np.float64)
     jumps: list[float] = []
     begin = 0
-    while begin < moved.size:
-        latest = np.maximum.accumulate(moved[begin:])
-        behind = np.flatnonzero(moved[begin:] < latest - MAX_CLOCK_LAG_S)
-        jump = _first_late_row(behind, moved[begin:], latest)
+    while begin < shifted.size:
+        latest = np.maximum.accumulate(shifted[begin:])
+        late_rows = np.flatnonzero(shifted[begin:] < latest - MAX_CLOCK_LAG_S)
+        jump = _first_late_row(late_rows, shifted[begin:], latest)
         if jump < 0:
             break
         start_row = begin + jump
         jumps.append(float(latest[jump - 1]))
-        moved[start_row:] += latest[jump - 1] + usual - moved[start_row]
+        shifted[start_row:] += latest[jump - 1] + usual - shifted[start_row]
         begin = start_row
-    return SteadyClock(moved, tuple(jumps))
+    return SteadyClock(shifted, tuple(jumps))
 
 
-def _first_late_row(behind: Ints, time: Floats, latest: Floats) -> int:
-    """Return the first row after which enough rows (or all to the end) are late to show a jump; -1 if there is none."""
-    for k in behind.tolist():
+def _first_late_row(late_rows: Ints, time: Floats, latest: Floats) -> int:
+    """Return the first late row from which enough rows, or all rows to the end, are late to show a jump; -1 if none.
+
+    latest: latest time up to each row, s.
+    """
+    for k in late_rows.tolist():
         end_row = min(k + MIN_LATE_ROWS, time.size)
         if end_row - k >= min(MIN_LATE_ROWS, 2) and (time[k:end_row] < latest[k - 1] - MAX_CLOCK_LAG_S).all():
             return int(k)
@@ -77,18 +80,18 @@ def _first_late_row(behind: Ints, time: Floats, latest: Floats) -> int:
 MAX_STEP_S = 1.0
 # Longest pause as a ratio to the median step, if that is longer.
 MAX_STEP_RATIO = 1.5
-# Speed, m/s, that is added to `GLITCH_SPEED_RATIO` times the usual speed: a position that is reached and left at a
-# higher speed is a glitch. GPS receivers jump by kilometres, and no aircraft gains this speed between two rows.
+# Speed that is added to `GLITCH_SPEED_RATIO` times the usual speed, m/s: a position that is reached and left at a
+# higher speed is a glitch.  GPS receivers jump by kilometers, and no aircraft gains this speed between two rows.
 GLITCH_SPEED_MPS = 60.0
-# Factor on the usual speed in that test.
+# Factor of the usual speed in the test for glitches.
 GLITCH_SPEED_RATIO = 3.0
 # Greatest number of successive rows of a glitch; more rows are a new position.
 MAX_GLITCH_ROWS = 20
-# A pause longer than this without a corresponding distance is a jump of the clock, s.
+# A pause longer than this without a corresponding distance is a clock jump, s.
 MIN_CLOCK_JUMP_S = 5.0
-# Distance in usual steps that an aircraft travels at most in a jump of the clock.
+# Largest distance that an aircraft travels during a clock jump, in usual steps.
 MAX_JUMP_STEPS = 6.0
-# Least usual speed for that test, m/s: an aircraft that stands on the ground shows no jump of the clock.
+# Minimum usual speed in the test for clock jumps, m/s: positions of an aircraft at rest show no clock jump.
 MIN_MOVING_SPEED_MPS = 5.0
 # Length of a degree of latitude, m, on a sphere of the mean radius of WGS 84.
 DEGREE_LENGTH_M = math.radians(1.0) * 6_371_008.8
@@ -102,10 +105,12 @@ _MAX_ALTITUDE_M = 50_000.0
 class CleanPositions:
     """Positions of the vehicle, in order of time.
 
-    time: (n,) s, increasing.  lat, lon: (n,) degrees.  up: (n,) m, NaN if not in the log.
+    time: increasing times, s, (n,).
+    lat, lon: latitude and longitude, deg, (n,).
+    up: altitude, m, (n,); NaN if not in the log.
     faults: numbers of corrected faults.
-    gaps: pauses.
-    shifts: for each removed jump of the log's clock, the time from which it is shifted back, and by how many seconds.
+    gaps: pauses between rows.
+    shifts: for each removed clock jump, the time from which the log's clock is shifted back, s, and the shift, s.
     """
 
     time: Floats
@@ -117,17 +122,17 @@ class CleanPositions:
     shifts: tuple[tuple[float, float], ...] = ()
 
     def to_steady_clock(self, time: Floats) -> Floats:
-        """Convert times of the log's clock to the clock without jumps."""
-        moved = np.array(time, dtype=np.float64)
-        for start, seconds in self.shifts:
-            moved[np.asarray(time) >= start] -= seconds
-        return moved
+        """Convert times of the log's clock to the clock without jumps, s."""
+        shifted = np.array(time, dtype=np.float64)
+        for start, shift in self.shifts:
+            shifted[np.asarray(time) >= start] -= shift
+        return shifted
 
 
 def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) -> CleanPositions:
     """Clean and sort rows of latitude, longitude and altitude.
 
-    earlier_jumps: jumps of the clock that the reader has removed already.
+    earlier_jumps: times of clock jumps that the reader has removed already, s.
 
     >>> rows = np.array([[46.0, 8.0, 500.0], [46.0002, 8.0, 500.0], [46.0002, 8.0, 500.0], [47.0, 8.0, 500.0]])
     >>> more = np.array([[46.0004 + 0.0002 * k, 8.0, 500.0] for k in range(4)])
@@ -141,37 +146,40 @@ def clean_positions(series: LogSeries, earlier_jumps: tuple[float, ...] = ()) ->
     unusable = int(is_usable.size - is_usable.sum())
     time, values = time[is_usable], values[is_usable]
     order = np.argsort(time, kind="stable")
-    # Rows that came after a row of a later time.
+    # Count the rows that follow a row with a later time.
     unordered = int((time < np.maximum.accumulate(time)).sum()) if time.size else 0
     time, values = time[order], values[order]
-    fresh = np.concatenate([[True], np.diff(time) > 0.0]) if time.size else np.zeros(0, bool)
-    doubled = int(fresh.size - fresh.sum())
-    time, values = time[fresh], values[fresh]
-    out = _glitch_rows(time, values)
-    time, values = time[~out], values[~out]
+    is_new = np.concatenate([[True], np.diff(time) > 0.0]) if time.size else np.zeros(0, bool)
+    duplicates = int(is_new.size - is_new.sum())
+    time, values = time[is_new], values[is_new]
+    is_glitch = _glitch_rows(time, values)
+    time, values = time[~is_glitch], values[~is_glitch]
     is_near = _is_in_main_group(time)
     time, shifts = _without_jumps(time[is_near], values[is_near])
     is_in_range = time < MAX_TIME_S
     time, values = time[is_in_range], values[is_near][is_in_range]
     unusable += is_near.size - time.size
     jumps = tuple(sorted((*earlier_jumps, *(start for start, _ in shifts))))
-    faults = RowFaults(doubled, unordered, unusable, int(out.sum()), jumps)
+    faults = RowFaults(duplicates, unordered, unusable, int(is_glitch.sum()), jumps)
     lat, lon, up = values.T if len(values) else np.zeros((3, 0))
     return CleanPositions(time, lat.copy(), lon.copy(), up.copy(), faults, find_gaps(time), shifts)
 
 
 def find_gaps(time: Floats) -> tuple[Gap, ...]:
-    """Return the pauses between rows (n,) s."""
+    """Return the gaps between rows: pauses longer than `MAX_STEP_S` and than `MAX_STEP_RATIO` median steps.
+
+    time: increasing times of the rows, s, (n,).
+    """
     if time.size < 2:
         return ()
     steps = np.diff(time)
     max_step = max(MAX_STEP_S, MAX_STEP_RATIO * float(np.median(steps)))
-    # The tolerance covers rounding: a second between rows is no gap.
+    # The tolerance covers rounding: exactly a second between rows is not a gap.
     return tuple(Gap(float(time[k]), float(time[k + 1])) for k in np.flatnonzero(steps > max_step + 1e-6))
 
 
 def metres_between(lat: Floats, lon: Floats) -> Floats:
-    """Return distances between successive positions (n,), m: (n - 1,), also across the 180th meridian."""
+    """Return the distances between n successive positions, m, (n - 1,), also across the 180th meridian."""
     north = np.diff(lat) * DEGREE_LENGTH_M
     east = (np.diff(lon) + 180.0) % 360.0 - 180.0
     return np.hypot(north, east * DEGREE_LENGTH_M * np.cos(np.radians(0.5 * (lat[1:] + lat[:-1]))))
@@ -181,18 +189,18 @@ def _usable_rows(time: Floats, values: Floats) -> Flags:
     """Return a mask of rows with a valid time, position and altitude."""
     lat, lon, up = values.T
     with np.errstate(invalid="ignore"):
-        placed = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
+        has_position = (np.abs(lat) <= 90.0) & (np.abs(lon) <= 180.0) & ((lat != 0.0) | (lon != 0.0))
         # A row without altitude is unusable, unless no row has one.
         has_valid_altitude = ~np.isfinite(up) | ((up > _MIN_ALTITUDE_M) & (up < _MAX_ALTITUDE_M))
         is_known = np.isfinite(up) if np.isfinite(up).any() else np.ones(up.size, bool)
-        return np.asarray((time >= 0.0) & (time < 1e9) & placed & has_valid_altitude & is_known)
+        return np.asarray((time >= 0.0) & (time < 1e9) & has_position & has_valid_altitude & is_known)
 
 
 def _glitch_rows(time: Floats, values: Floats) -> Flags:
-    """Return a mask of glitches: rows that no vehicle can have reached from the row before, and left again."""
-    out = np.zeros(time.size, bool)
+    """Return a mask of the glitches, (n,): rows that no vehicle can have reached from the row before and left again."""
+    is_glitch = np.zeros(time.size, bool)
     if time.size < 5:
-        return out
+        return is_glitch
     lat, lon, up = values.T
     steps = np.diff(time)
     speed = metres_between(lat, lon) / np.maximum(steps, 1e-3)
@@ -201,42 +209,48 @@ def _glitch_rows(time: Floats, values: Floats) -> Flags:
     leaps = np.flatnonzero((speed > max_speed) | (np.nan_to_num(rise) > max_speed))
     k = 0
     while k < leaps.size:
-        # Away with one leap and back with a later one.
+        # A glitch goes away with one leap and comes back with a later one.
         begin = int(leaps[k])
         for back in leaps[k + 1 :].tolist():
             if back - begin > MAX_GLITCH_ROWS:
                 break
             if _is_reachable(time, values, begin, back + 1, max_speed):
-                out[begin + 1 : back + 1] = True
+                is_glitch[begin + 1 : back + 1] = True
                 k = int(np.searchsorted(leaps, back))
                 break
         else:
             if begin == 0:
-                out[0] = True
+                is_glitch[0] = True
             elif begin == time.size - 2:
-                out[-1] = True
+                is_glitch[-1] = True
         k += 1
-    return out
+    return is_glitch
 
 
 def _is_reachable(time: Floats, values: Floats, first: int, second: int, max_speed: float) -> bool:
-    """Return True if a vehicle can get from one row to another at this speed, m/s, over ground and vertically."""
+    """Return True if a vehicle can get from one row to another at `max_speed` (m/s), horizontally and vertically."""
     pair = [first, second]
     distance = float(metres_between(values[pair, 0], values[pair, 1])[0])
     rise = abs(float(values[second, 2] - values[first, 2]))
-    seconds = float(time[second] - time[first])
-    return max(distance, 0.0 if math.isnan(rise) else rise) <= max_speed * seconds
+    duration = float(time[second] - time[first])
+    return max(distance, 0.0 if math.isnan(rise) else rise) <= max_speed * duration
 
 
 def _is_in_main_group(time: Floats) -> Flags:
-    """Return a mask of rows (n,), from their sorted times, without small groups far away in time from all others."""
-    parts = np.cumsum(np.concatenate([[0], np.diff(time) > MAX_TIME_S])) if time.size else np.zeros(0, np.int64)
-    counts = np.bincount(parts)
-    return np.asarray((counts >= min(MIN_LATE_ROWS, int(counts.max(initial=0))))[parts])
+    """Return a mask that leaves out small groups of rows whose times are far from all others, (n,).
+
+    time: sorted times, s, (n,).
+    """
+    groups = np.cumsum(np.concatenate([[0], np.diff(time) > MAX_TIME_S])) if time.size else np.zeros(0, np.int64)
+    counts = np.bincount(groups)
+    return np.asarray((counts >= min(MIN_LATE_ROWS, int(counts.max(initial=0))))[groups])
 
 
 def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[float, float], ...]]:
-    """Remove forward jumps of the clock: pauses in which a moving vehicle moved no more than in a usual step."""
+    """Remove forward clock jumps: pauses in which a moving vehicle moved no further than in a few usual steps.
+
+    Returns the shifted times, s, and the shifts as in `CleanPositions.shifts`.
+    """
     shifts: list[tuple[float, float]] = []
     if time.size < 20:
         return time, ()
@@ -245,13 +259,13 @@ def _without_jumps(time: Floats, values: Floats) -> tuple[Floats, tuple[tuple[fl
     usual = float(np.median(steps))
     for k in np.flatnonzero(steps > max(MIN_CLOCK_JUMP_S, 2.0 * MAX_JUMP_STEPS * usual)).tolist():
         around = slice(max(0, k - 5), k + 6)
-        ordinary = steps[around] <= MAX_JUMP_STEPS * usual
-        if ordinary.sum() < 4:
+        is_ordinary = steps[around] <= MAX_JUMP_STEPS * usual
+        if is_ordinary.sum() < 4:
             continue
-        speed = float((distances[around][ordinary] / steps[around][ordinary]).min())
+        speed = float((distances[around][is_ordinary] / steps[around][is_ordinary]).min())
         if speed > MIN_MOVING_SPEED_MPS and distances[k] <= speed * MAX_JUMP_STEPS * usual:
             shifts.append((float(time[k + 1]), float(steps[k] - usual)))
-    moved = time.copy()
-    for start, seconds in shifts:
-        moved[time >= start] -= seconds
-    return moved, tuple(shifts)
+    shifted = time.copy()
+    for start, shift in shifts:
+        shifted[time >= start] -= shift
+    return shifted, tuple(shifts)

@@ -38,7 +38,10 @@ _INSTANCES = ("I", "C", "Inst", "Instance")
 
 
 def read_motion(path: Path) -> MotionLog:
-    """Read a log's motion.  Raises LogError, in one line, for a file that cannot be read or that is no such log."""
+    """Read the motion of an aircraft from a log of any supported format.
+
+    Raises LogError for a file that cannot be read, or that is not a log of inertial sensors and servo outputs.
+    """
     try:
         if not path.is_file():
             raise LogError(f"{path}: no such file; expected a log (.BIN, .tlog, .ulg or a table of columns)", file=path)
@@ -74,12 +77,13 @@ def read_motion(path: Path) -> MotionLog:
 
 
 class _Dataflash:
-    """One dataflash log."""
+    """Reader of the motion in one ArduPilot dataflash log."""
 
     def __init__(self, index: Dataflash, source: str, digest: str) -> None:
         self._index, self._source, self._digest = index, source, digest
 
     def read(self) -> MotionLog:
+        """Return the motion of the aircraft."""
         events = self._index.messages("MSG")
         texts = events.texts("Message") if events.has("Message") else []
         program, vehicle = program_and_vehicle(texts, self._index.messages("VER"))
@@ -105,7 +109,7 @@ class _Dataflash:
         )
 
     def _messages(self, name: str) -> Messages:
-        """Return the series of the first instance if there are several."""
+        """Return the messages of a name; of several sensors or estimators only the first."""
         messages = self._index.messages(name)
         for column in _INSTANCES:
             if name in ("IMU", "XKF1", "XKF2", "NKF1", "NKF2", "ARSP", "BAT") and messages.has(column):
@@ -114,27 +118,33 @@ class _Dataflash:
         return messages
 
     def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> Samples:
+        """Return the columns of the first choice of message and columns that the log has, times `scale`.
+
+        There are no rows if the log has none of them.  Missing outputs of RCOU are 0.
+        """
         for name, columns in choices:
             messages = self._messages(name)
             # Logs of older releases have fewer outputs.
-            held_columns = [column for column in columns if messages.has("TimeUS", column)]
-            if not held_columns or (name != "RCOU" and len(held_columns) < len(columns)):
+            present_columns = [column for column in columns if messages.has("TimeUS", column)]
+            if not present_columns or (name != "RCOU" and len(present_columns) < len(columns)):
                 continue
             values = np.zeros((len(messages), len(columns)))
             for k, column in enumerate(columns):
-                if column in held_columns:
+                if column in present_columns:
                     values[:, k] = messages.column(column)
             return sort_samples(messages.column("TimeUS") * 1e-6, values * scale)
         return Samples(np.zeros(0), np.zeros((0, 1)))
 
     def _airspeed(self) -> Samples:
+        """Return the measured airspeed, m/s, (n, 1), without rows of a sensor that was not in use."""
         messages = self._messages("ARSP")
         if not messages.has("TimeUS", "Airspeed"):
             return Samples(np.zeros(0), np.zeros((0, 1)))
-        used = messages.column("U") > 0 if messages.has("U") else np.ones(len(messages), np.bool_)
-        return sort_samples(messages.column("TimeUS")[used] * 1e-6, messages.column("Airspeed")[used, np.newaxis])
+        is_used = messages.column("U") > 0 if messages.has("U") else np.ones(len(messages), np.bool_)
+        return sort_samples(messages.column("TimeUS")[is_used] * 1e-6, messages.column("Airspeed")[is_used, np.newaxis])
 
     def _modes(self) -> list[tuple[float, int]]:
+        """Return the time (s) and the number of each mode change; [] for logs with modes by name."""
         messages = self._messages("MODE")
         column = "ModeNum" if messages.has("ModeNum") else "Mode"
         if not messages.has("TimeUS", column) or messages.rows.dtype[column].kind == "S":
@@ -144,6 +154,7 @@ class _Dataflash:
         )
 
     def _parameters(self) -> dict[str, float]:
+        """Return the last finite value of each parameter."""
         messages = self._messages("PARM")
         if not messages.has("Name", "Value"):
             return {}
@@ -151,6 +162,7 @@ class _Dataflash:
         return {name: value for name, value in values if math.isfinite(value)}
 
     def _home(self, velocity: Samples) -> tuple[float, float, float] | None:
+        """Return latitude, longitude (deg) and altitude (m) of home: as logged, or else the first position at rest."""
         home = logged_home(self._index.messages("ORGN"))
         if home is not None:
             return home.lat_deg, home.lon_deg, home.alt

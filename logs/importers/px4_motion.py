@@ -1,8 +1,8 @@
-"""Motion of an aircraft from a PX4 log (`.ulg`), as `motion_log` reads it from ArduPilot logs.
+"""Read the motion of an aircraft from a PX4 log (`.ulg`), as `motion_log` does from ArduPilot logs.
 
-All topics share one clock.  Surface deflections are taken from `actuator_servos`, with the airframe of the control
-allocation (CA_*), or from `actuator_controls_0` of releases before 1.14.  Names follow PX4's message and parameter
-references.
+All topics share one clock.  Surface deflections are taken from `actuator_servos` and the parameters of the control
+allocation (CA_*), or from `actuator_controls_0` in logs of releases before 1.14.  Names follow PX4's message and
+parameter references.
 """
 
 from collections.abc import Iterable, Mapping
@@ -77,9 +77,11 @@ _PARAMETERS: Mapping[str, tuple[str, float]] = {
 
 
 def read_px4_motion(path: Path, digest: str) -> MotionLog:
-    """Read the motion of a log; digest: SHA-256 of its bytes.
+    """Read the motion of an aircraft from a PX4 log.
 
-    Raises LogError, in one line, for a file that cannot be read, and for surfaces that cannot be modelled.
+    digest: SHA-256 of the file's bytes.
+
+    Raises LogError for a file that cannot be read, and for control surfaces that cannot be modelled.
     """
     topics = open_topics(path, _TOPICS)
     with np.errstate(all="ignore"):
@@ -119,29 +121,34 @@ def read_px4_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _samples(topics: Topics, topic: str, *choices: tuple[str, ...]) -> Samples:
-    """Return the first choice of fields that a topic has, sorted by time; no rows if it has none."""
+    """Return the fields of a topic, sorted by time: the first of several choices that the topic has.
+
+    There are no rows if the topic has none of them.
+    """
     table = topics.table(topic, *choices)
     return NO_SAMPLES if table is None else sort_samples(table.time, table.values)
 
 
 def _inertial(topics: Topics) -> Samples:
-    """Return specific force and angular rates, (n, 6), from the sensors or from two filtered topics."""
+    """Return specific force (m/s²) and angular rates (rad/s), (n, 6), from the sensors or from two filtered topics."""
     force, rates = tuple(f"accelerometer_m_s2[{k}]" for k in range(3)), tuple(f"gyro_rad[{k}]" for k in range(3))
     samples = _samples(topics, "sensor_combined", force + rates)
     if len(samples.time):
         return samples
-    three = tuple(f"xyz[{k}]" for k in range(3))
-    forces, turning = (_samples(topics, name, three) for name in ("vehicle_acceleration", "vehicle_angular_velocity"))
-    if len(forces.time) < 2 or len(turning.time) < 2:
+    axes = tuple(f"xyz[{k}]" for k in range(3))
+    forces, angular_rates = (
+        _samples(topics, name, axes) for name in ("vehicle_acceleration", "vehicle_angular_velocity")
+    )
+    if len(forces.time) < 2 or len(angular_rates.time) < 2:
         return NO_SAMPLES
-    inside = (forces.time >= turning.time[0]) & (forces.time <= turning.time[-1])
-    time = forces.time[inside]
-    rate_columns = [np.interp(time, turning.time, column) for column in turning.values.T]
-    return Samples(time, np.column_stack([forces.values[inside], *rate_columns]))
+    has_rates = (forces.time >= angular_rates.time[0]) & (forces.time <= angular_rates.time[-1])
+    time = forces.time[has_rates]
+    rate_columns = [np.interp(time, angular_rates.time, column) for column in angular_rates.values.T]
+    return Samples(time, np.column_stack([forces.values[has_rates], *rate_columns]))
 
 
 def _wind(topics: Topics) -> Samples:
-    """Return the wind vector, north and east, in the direction of the air's motion."""
+    """Return the wind velocity to north and east, m/s, (n, 2), from the first topic that has rows."""
     for topic in WIND_TOPICS:
         wind = _samples(topics, topic, ("windspeed_north", "windspeed_east"))
         if len(wind.time):
@@ -150,69 +157,74 @@ def _wind(topics: Topics) -> Samples:
 
 
 def _airspeed(topics: Topics) -> tuple[Samples, Samples]:
-    """Return measured calibrated airspeed, and the ratio of true to calibrated airspeed."""
-    true = "true_airspeed_m_s"
+    """Return the measured calibrated airspeed, m/s, and the ratio of true to calibrated airspeed.
+
+    Rows whose airspeed is not from a sensor are left out.
+    """
     # Calibrated since 1.12, equivalent until then: equal at these speeds.
-    choices = [(speed, true) for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
+    choices = [(speed, "true_airspeed_m_s") for speed in ("calibrated_airspeed_m_s", "equivalent_airspeed_m_s")]
     validated = topics.table("airspeed_validated", *choices)
     if validated is None:
         return NO_SAMPLES, NO_SAMPLES
-    # From 1 on sensors; 0 and below, and 4 (synthetic), are no measurements.
+    # 1 to 3 are sensors; 0 and below, and 4 (synthetic), are not measurements.
     for name in ("airspeed_source", "selected_airspeed_index"):
-        chosen = topics.table("airspeed_validated", *((*columns, name) for columns in choices))
-        if chosen is not None:
-            number = chosen.values[:, 2]
-            measured = (number >= 1.0) & (number <= 3.0)
+        with_source = topics.table("airspeed_validated", *((*columns, name) for columns in choices))
+        if with_source is not None:
+            sensor_number = with_source.values[:, 2]
+            is_measured = (sensor_number >= 1.0) & (sensor_number <= 3.0)
             break
     else:
-        measured = np.ones(len(validated.time), np.bool_)
-    time, values = validated.time[measured], validated.values[measured]
-    moving = values[:, 0] > 1.0
-    ratio = values[moving, 1:] / values[moving, :1]
-    return sort_samples(time, values[:, :1]), sort_samples(time[moving], ratio)
+        is_measured = np.ones(len(validated.time), np.bool_)
+    time, values = validated.time[is_measured], validated.values[is_measured]
+    is_moving = values[:, 0] > 1.0
+    ratio = values[is_moving, 1:] / values[is_moving, :1]
+    return sort_samples(time, values[:, :1]), sort_samples(time[is_moving], ratio)
 
 
 def _hover_periods(topics: Topics) -> Iterable[tuple[float, float]]:
-    """Yield the periods (s) in which a VTOL was not a plane, or in transition."""
+    """Yield the start and end (s) of each period in which a VTOL was not a plane, or was in transition."""
     kinds = topics.table("vehicle_status", ("vehicle_type", "in_transition_mode"), ("vehicle_type",))
     if kinds is None:
         return
-    plane = kinds.values[:, 0] == _FIXED_WING
+    is_plane = kinds.values[:, 0] == _FIXED_WING
     if kinds.values.shape[1] > 1:
-        plane &= kinds.values[:, 1] == 0.0
+        is_plane &= kinds.values[:, 1] == 0.0
     end_times = np.append(kinds.time[1:], np.inf)
-    for begin, end, flying in zip(kinds.time.tolist(), end_times.tolist(), plane.tolist(), strict=True):
-        if not flying:
-            yield begin, end
+    for start, end, flies_as_plane in zip(kinds.time.tolist(), end_times.tolist(), is_plane.tolist(), strict=True):
+        if not flies_as_plane:
+            yield start, end
 
 
 def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples, bool]:
     """Return pitch, roll and yaw as fractions of travel, and throttle, (n, 4), and True if there are elevons.
 
-    A surface is positive up or to the right.  Its torque scales (CA_SV_CSn_TRQ_*) give the axes that it moves; an axis
-    is the mean of its surfaces, weighted by these scales.  Raises LogError for surfaces that cannot be modelled.
+    The deflection of a surface is positive up or to the right.  The torque scales of a surface (CA_SV_CSn_TRQ_*) state
+    its effect on each axis; the deflection of an axis is the mean of the surfaces, weighted by these scales.  Raises
+    LogError for surfaces that cannot be modelled.
     """
     servos, motors = _actuators(topics, "actuator_servos", _SERVOS), _actuators(topics, "actuator_motors", _MOTORS)
     # An unused servo has NaN.
-    is_known = np.isfinite(servos.values).any(axis=1) & _armed_times(topics, servos.time)
+    is_known = np.isfinite(servos.values).any(axis=1) & _is_armed(topics, servos.time)
     servos = Samples(servos.time[is_known], servos.values[is_known])
     if len(servos.time) < 2 or len(motors.time) < 2:
-        # Roll, pitch, yaw and throttle before the mixer.
-        old = _samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
-        return (Samples(old.time, old.values[:, [1, 0, 2, 3]]) if len(old.time) else NO_SAMPLES), False
+        # Roll, pitch, yaw and throttle before the mixer, in logs of old releases.
+        mixer_inputs = _samples(topics, "actuator_controls_0", tuple(f"control[{k}]" for k in range(4)))
+        if not len(mixer_inputs.time):
+            return NO_SAMPLES, False
+        return Samples(mixer_inputs.time, mixer_inputs.values[:, [1, 0, 2, 3]]), False
     airframe = int(parameters.get("CA_AIRFRAME", _WING))
     if airframe not in (_WING, _STANDARD_VTOL):
         raise _refusal(topics, "CA_AIRFRAME", airframe, f"{_AIRFRAMES.get(airframe, 'unknown')}: expected a plane")
     scales = np.zeros((3, _SERVOS))
-    elevons = False
+    has_elevons = False
     for k in range(int(np.clip(parameters.get("CA_SV_CS_COUNT", 0.0), 0.0, _SERVOS))):
         kind = int(parameters.get(f"CA_SV_CS{k}_TYPE", 0.0))
-        used = servos.values[np.isfinite(servos.values[:, k]), k]
-        moves = len(used) > 0 and float(np.ptp(used)) > _FLAP_MOVE_TOLERANCE
+        deflections = servos.values[np.isfinite(servos.values[:, k]), k]
+        moves = len(deflections) > 0 and float(np.ptp(deflections)) > _FLAP_MOVE_TOLERANCE
         if kind in _MODELLED:
             _check_flaperon(topics, parameters, k)
             scales[:, k] = [parameters.get(f"CA_SV_CS{k}_TRQ_{axis}", 0.0) for axis in _AXES]
-            elevons = elevons or kind in _ELEVONS
+            has_elevons = has_elevons or kind in _ELEVONS
             servos.values[:, k] -= parameters.get(f"CA_SV_CS{k}_TRIM", 0.0)
         elif kind in _MIXED:
             raise _refusal(topics, f"CA_SV_CS{k}_TYPE", kind, f"{_MIXED[kind]}: its mix is not modelled")
@@ -224,16 +236,16 @@ def _controls(topics: Topics, parameters: Mapping[str, float]) -> tuple[Samples,
             allowed = "expected CA_SV_CSn_TYPE with CA_SV_CSn_TRQ_P and CA_SV_CSn_TRQ_R"
             raise LogError(f"{topics.source}: no surface controls the {axis}; {allowed}", file=topics.source)
     sums = np.abs(scales).sum(axis=1, keepdims=True)
-    shares = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
+    axis_deflections = np.nan_to_num(servos.values) @ (scales / np.where(sums > 0.0, sums, 1.0)).T
     # A motor below 2 % of its thrust is stopped, which is NaN (PX4's control allocator).
-    pushing = np.nan_to_num(motors.values[:, _forward_motors(topics, airframe, parameters, motors)])
-    throttle = np.clip(pushing.mean(axis=1), 0.0, 1.0) if pushing.size else np.zeros(len(motors.time))
+    thrusts = np.nan_to_num(motors.values[:, _forward_motors(topics, airframe, parameters, motors)])
+    throttle = np.clip(thrusts.mean(axis=1), 0.0, 1.0) if thrusts.size else np.zeros(len(motors.time))
     rows = np.clip(np.searchsorted(motors.time, servos.time, side="right") - 1, 0, len(motors.time) - 1)
-    return Samples(servos.time, np.column_stack([shares, throttle[rows]])), elevons
+    return Samples(servos.time, np.column_stack([axis_deflections, throttle[rows]])), has_elevons
 
 
 def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, float], motors: Samples) -> list[int]:
-    """Return the motors that push forward.  Raises LogError for a VTOL without one."""
+    """Return the indices of the motors that push forward.  Raises LogError for a VTOL without such a motor."""
     count = int(np.clip(parameters.get("CA_ROTOR_COUNT", 0.0), 0.0, _MOTORS))
     if airframe == _STANDARD_VTOL:
         # The axis of a rotor is up by default.
@@ -250,7 +262,7 @@ def _forward_motors(topics: Topics, airframe: int, parameters: Mapping[str, floa
 
 
 def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: int) -> None:
-    """Raise LogError for a surface that flaps or spoilers move as well, if they are moved."""
+    """Raise LogError if a surface is also deflected as a flap or a spoiler during the flight."""
     for name, (title, topic) in _ALSO_MOVE.items():
         deflection_ratio = parameters.get(f"CA_SV_CS{surface}_{name}", 0.0)
         setpoints = _samples(topics, topic, ("normalized_setpoint",)).values
@@ -260,16 +272,17 @@ def _check_flaperon(topics: Topics, parameters: Mapping[str, float], surface: in
 
 
 def _actuators(topics: Topics, topic: str, size: int) -> Samples:
-    """Return (n, size) of one topic, sorted by time; NaN for unused or stopped actuators."""
+    """Return the outputs of a topic's actuators, (n, size), sorted by time; NaN for unused or stopped actuators."""
     table = topics.table(topic, tuple(f"control[{k}]" for k in range(size)))
     if table is None:
         return Samples(np.zeros(0), np.zeros((0, size)))
-    steps = sort_samples(table.time, np.arange(len(table.time), dtype=np.float64)[:, np.newaxis])
-    return Samples(steps.time, table.values[steps.values[:, 0].astype(np.intp)])
+    # `sort_samples` leaves out rows with NaN: sort the row numbers instead of the values.
+    row_numbers = sort_samples(table.time, np.arange(len(table.time), dtype=np.float64)[:, np.newaxis])
+    return Samples(row_numbers.time, table.values[row_numbers.values[:, 0].astype(np.intp)])
 
 
-def _armed_times(topics: Topics, time: Floats) -> Flags:
-    """Return True for each time at which the vehicle was armed, (n,); also True if the log does not tell."""
+def _is_armed(topics: Topics, time: Floats) -> Flags:
+    """Return for each time whether the vehicle was armed, (n,); all True if the log does not say."""
     states = _samples(topics, "vehicle_status", ("arming_state",))
     if not len(states.time):
         return np.ones(len(time), np.bool_)
@@ -278,4 +291,5 @@ def _armed_times(topics: Topics, time: Floats) -> Flags:
 
 
 def _refusal(topics: Topics, field: str, value: float, message: str) -> LogError:
+    """Return the error for a parameter of surfaces that cannot be modelled.  message: clause after "NAME VALUE is"."""
     return LogError(f"{topics.source}: {field} {value:g} is {message}", file=topics.source, field=field, value=value)

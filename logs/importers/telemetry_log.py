@@ -1,4 +1,4 @@
-"""Telemetry logs (`.tlog`) of ground stations: messages of ArduPlane or PX4, and sent missions.
+"""Read telemetry logs (`.tlog`) of ground stations: messages of ArduPlane or PX4, and sent missions.
 
 The packets are found and decoded first, then sorted by the sending system, then read as a `RawLog`.  The clock is the
 vehicle's, `time_boot_ms`; messages without it are placed by their time of reception.
@@ -43,9 +43,9 @@ from world.arrays import Floats
 from world.errors import LogError
 
 # ----------------------------------------------------------------------
-# The messages of a telemetry log (`.tlog`): each a time of eight bytes, and a MAVLink packet as it was received.
+# Records of a telemetry log (`.tlog`): each is a time of eight bytes, and a MAVLink packet as it was received.
 #
-# MAVLink 1 packets begin with 0xFE, those of MAVLink 2 with 0xFD (mavlink.io, "Packet Serialization"); pymavlink
+# MAVLink 1 packets begin with 0xFE, MAVLink 2 packets with 0xFD (mavlink.io, "Packet Serialization"); pymavlink
 # decodes them and checks their checksums.  The time is in microseconds since 1970, big-endian (QGroundControl,
 # MAVProxy).
 
@@ -69,10 +69,14 @@ _LATEST_US = 4_102_444_800_000_000
 
 @dataclass
 class TelemetryReader:
-    """Decoder of the wanted messages of a log, with a count of the unreadable ones.
+    """Decoder of the wanted messages of a log, with counts of the damage.
 
-    wanted: message numbers.
+    data: bytes of the log.
+    wanted: message numbers to decode.
     release_memory: called regularly, to release the memory of the bytes that were read.
+    places, size: number of unreadable places, and their total size in bytes.
+    cut: True if the log ends within a record.
+    unreadable: number of wanted messages that could not be decoded.
     """
 
     data: memoryview
@@ -85,24 +89,24 @@ class TelemetryReader:
     _decoder: Any = field(default_factory=lambda: dialect.MAVLink(None))
 
     def messages(self) -> Iterator[tuple[float, Any]]:
-        """Yield time of reception (s since 1970) and message, in the order of the file."""
-        position, end, reading, piece = 0, len(self.data), True, PIECE_BYTES
+        """Yield the time of reception (s since 1970) and the message of each record, in the order of the file."""
+        position, end, is_in_record, piece_end = 0, len(self.data), True, PIECE_BYTES
         while position + _STAMP.size + _V1_FRAME <= end:
-            if position >= piece:
+            if position >= piece_end:
                 self.release_memory()
-                piece = position + PIECE_BYTES
-            length = self._length(position)
+                piece_end = position + PIECE_BYTES
+            length = self._record_length(position)
             if length == 0:
-                self.places += reading
+                self.places += is_in_record
                 self.size += 1
                 position += 1
-                reading = False
+                is_in_record = False
                 continue
             if position + length > end:
                 self.cut = True
                 break
-            reading = True
-            if self._number(position) in self.wanted:
+            is_in_record = True
+            if self._message_number(position) in self.wanted:
                 stamp = _STAMP.unpack_from(self.data, position)[0] * 1e-6
                 message = self._decode(bytes(self.data[position + _STAMP.size : position + length]))
                 if message is None:
@@ -115,27 +119,29 @@ class TelemetryReader:
         """Return the damage found so far."""
         return Damage(self.places, self.size, self.cut, self.unreadable)
 
-    def _length(self, position: int) -> int:
-        """Return the length of the record at a place, its time included, bytes; 0 if none begins there."""
+    def _record_length(self, position: int) -> int:
+        """Return the length of the record at a position, including its time, bytes; 0 if no record begins there."""
         stamp = _STAMP.unpack_from(self.data, position)[0]
         if not _EARLIEST_US <= stamp <= _LATEST_US:
             return 0
         packet = position + _STAMP.size
-        magic, payload = self.data[packet], self.data[packet + 1]
+        magic, payload_size = self.data[packet], self.data[packet + 1]
         if magic == _V1:
-            return _STAMP.size + _V1_FRAME + payload
+            return _STAMP.size + _V1_FRAME + payload_size
         if magic == _V2:
-            signature = _SIGNATURE if self.data[packet + 2] & _SIGNED else 0
-            return _STAMP.size + _V2_FRAME + payload + signature
+            signature_size = _SIGNATURE if self.data[packet + 2] & _SIGNED else 0
+            return _STAMP.size + _V2_FRAME + payload_size + signature_size
         return 0
 
-    def _number(self, position: int) -> int:
+    def _message_number(self, position: int) -> int:
+        """Return the message number of the packet in the record at a position."""
         packet = position + _STAMP.size
         if self.data[packet] == _V1:
             return self.data[packet + 5]
         return self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
 
     def _decode(self, packet: bytes) -> Any:
+        """Return the message in a packet, or None if it cannot be decoded."""
         try:
             return self._decoder.decode(bytearray(packet))
         except Exception:  # of any kind: the library raises errors of struct, its own and plain ones
@@ -146,7 +152,7 @@ class TelemetryReader:
 # Messages of one system in a telemetry log: frequent numeric messages are kept as rows, so that a long log stays small.
 
 
-# Fields that are kept of the messages that come many times a second.
+# Fields that are kept of messages that are sent many times a second.
 NUMBERS = {
     "GLOBAL_POSITION_INT": ("lat", "lon", "alt", "vx", "vy", "vz"),
     "ATTITUDE": ("roll", "pitch", "yaw"),
@@ -161,14 +167,16 @@ NUMBERS = {
 }
 # Values of a battery's fields that mark them as not measured (MAVLink, common.xml).
 NOT_MEASURED = {"voltage_battery": 65535.0, "current_battery": -1.0, "energy_consumed": -1.0}
-# Greatest number of kept messages of each other kind.
+# Largest number of messages that are kept of each other kind.
 _MAX_MESSAGES = 200_000
 
 
 class BootClock(NamedTuple):
     """Clock of the vehicle.
 
-    offset: its time 0, s since 1970.  jumps: when the vehicle was switched on again, s.  time: (n,) s, of each message.
+    offset: time of reception that corresponds to the clock's time 0, s since 1970.
+    jumps: times at which the vehicle was switched on again, s.
+    time: time of each message on this clock, s, (n,).
     """
 
     offset: float
@@ -189,7 +197,7 @@ class SystemMessages:
         return len(self._stamps)
 
     def add(self, stamp: float, message: Any) -> None:
-        """Add a message, received at ``stamp`` (s since 1970)."""
+        """Add a message that was received at ``stamp`` (s since 1970)."""
         name, number = message.get_type(), len(self._stamps)
         boot = getattr(message, "time_boot_ms", None)
         self._stamps.append(stamp)
@@ -205,18 +213,18 @@ class SystemMessages:
         rows.extend(float(getattr(message, field)) for field in fields)
 
     def table(self, name: str) -> Floats:
-        """Return rows (n, 1 + fields) of a kind in `NUMBERS`: number among all messages, and fields."""
+        """Return the messages of a kind in `NUMBERS` as rows, (n, 1 + fields): message number, then the fields."""
         rows = self._rows.get(name)
         return np.array(rows if rows is not None else [], dtype=np.float64).reshape(-1, 1 + len(NUMBERS[name]))
 
     def named(self, name: str) -> list[tuple[int, Any]]:
-        """Return number and message of each message of another kind."""
+        """Return the messages of a kind that is not in `NUMBERS`, each with its number among all messages."""
         return self._named.get(name, [])
 
     def boot_times(self) -> BootClock:
-        """Return the clock of the vehicle, and the time of each message on it.
+        """Return the clock of the vehicle, with the time of each message.
 
-        A message without its own time gets the time of the message before it, plus the difference of their receptions.
+        A message without its own time gets the time of the message before it, plus the time between their receptions.
         """
         stamps, time = np.array(self._stamps), np.array(self._boots)
         known_rows = np.flatnonzero(np.isfinite(time))
@@ -226,9 +234,11 @@ class SystemMessages:
         offset = float(stamps[known_rows[0]] - time[known_rows[0]])
         steady = remove_clock_jumps(time[known_rows])
         time[known_rows] = steady.time
-        before = known_rows[np.clip(np.searchsorted(known_rows, np.arange(time.size), side="right") - 1, 0, None)]
-        unknown = ~np.isfinite(time)
-        time[unknown] = time[before[unknown]] + (stamps - stamps[before])[unknown]
+        known_rows_before = known_rows[
+            np.clip(np.searchsorted(known_rows, np.arange(time.size), side="right") - 1, 0, None)
+        ]
+        is_unknown = ~np.isfinite(time)
+        time[is_unknown] = time[known_rows_before[is_unknown]] + (stamps - stamps[known_rows_before])[is_unknown]
         return BootClock(offset, steady.jumps, time)
 
 
@@ -237,7 +247,7 @@ _KEPT_MESSAGES = ("HEARTBEAT", "PARAM_VALUE", "STATUSTEXT", "HOME_POSITION")
 _MISSION_MESSAGES = ("MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT")
 _WANTED_MESSAGES = frozenset((*_KEPT_MESSAGES, *_MISSION_MESSAGES, *NUMBERS))
 _NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if kind.msgname in _WANTED_MESSAGES)
-# Greatest number of items that are kept: far more than a station sends.
+# Largest number of mission items that are kept: far more than a station sends.
 _MAX_ITEMS = 200_000
 # Vehicle kinds by MAV_TYPE; a type that is not listed is unknown.
 _TYPES: dict[int, VehicleKind] = {
@@ -273,7 +283,7 @@ _MISSION_TYPE = 0
 
 
 def read_telemetry(path: Path) -> RawLog:
-    """Read a log.  Raises LogError for one without GLOBAL_POSITION_INT or GPS_RAW_INT."""
+    """Read a telemetry log.  Raises LogError for a log without positions or without a vehicle."""
     messages, damage = vehicle_messages(path)
     return messages.log(damage)
 
@@ -303,24 +313,28 @@ def vehicle_messages(path: Path) -> tuple["VehicleMessages", Damage]:
 
 
 def _is_vehicle(message: Any) -> bool:
+    """Return True if a HEARTBEAT message was sent by the autopilot of a vehicle."""
     return message.type not in _NO_VEHICLES and message.autopilot not in _NOT_AUTOPILOTS
 
 
 class VehicleMessages:
     """Messages of one vehicle, by name, on its own clock."""
 
-    def __init__(self, own: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
-        self._source, self._found = source, own
-        clock = own.boot_times()
+    def __init__(self, messages: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
+        """Take the vehicle's messages, and the messages on missions with their times of reception, s since 1970."""
+        self._source, self._found = source, messages
+        clock = messages.boot_times()
         self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
         # Missions are sent to the vehicle: their messages come from the station.
         self._items = [(stamp - self._offset, message) for stamp, message in items]
-        self._own = {name: [(float(self._times[k]), one) for k, one in own.named(name)] for name in _KEPT_MESSAGES}
+        self._own = {
+            name: [(float(self._times[k]), message) for k, message in messages.named(name)] for name in _KEPT_MESSAGES
+        }
 
     def log(self, damage: Damage) -> RawLog:
-        """Return everything that a verdict needs.  Raises LogError for a log without positions."""
-        series = {name: found for name, found in self._series() if found is not None}
-        beats = [one for _, one in self._own.get("HEARTBEAT", []) if _is_vehicle(one)]
+        """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
+        series = {name: log_series for name, log_series in self._series() if log_series is not None}
+        heartbeats = [message for _, message in self._own.get("HEARTBEAT", []) if _is_vehicle(message)]
         if "position" not in series:
             raise LogError(
                 f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: nothing says where it flew",
@@ -329,22 +343,22 @@ class VehicleMessages:
         return RawLog(
             source=self._source,
             format=FORMAT,
-            program=self._program(beats[0]),
-            vehicle=_TYPES.get(beats[0].type, "unknown"),
+            program=self._program(heartbeats[0]),
+            vehicle=_TYPES.get(heartbeats[0].type, "unknown"),
             series=series,
             heights=tuple(self._heights()),
             datum="amsl",
             modes=tuple(self._modes()),
             missions=tuple(self._missions()),
             parameters=self._parameters(),
-            events=tuple((time, _text(one.text)) for time, one in self._own.get("STATUSTEXT", [])),
+            events=tuple((time, _text(message.text)) for time, message in self._own.get("STATUSTEXT", [])),
             utc_start=self._offset,
             clock_jumps=self.jumps,
             damage=damage,
         )
 
     def table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        """Return columns of a message as sent, on the vehicle's clock; None without such messages."""
+        """Return columns of a message in the units as sent, on the vehicle's clock; None without such messages."""
         rows = self._found.table(name)
         if not len(rows):
             return None
@@ -352,16 +366,21 @@ class VehicleMessages:
         return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, column_numbers])
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        place = self.table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
-        if place is not None:
-            is_known = (place.values[:, :2] != 0.0).any(axis=1)
-            place = LogSeries(place.source, place.time[is_known], place.values[is_known]) if is_known.any() else None
-        if place is not None:
-            scaled = place.values * np.array([1e-7, 1e-7, 1e-3, 0.01, 0.01, -0.01])
-            # To the nearest 1e-7 degrees, which is what was sent.
+        """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
+        positions = self.table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
+        if positions is not None:
+            is_known = (positions.values[:, :2] != 0.0).any(axis=1)
+            positions = (
+                LogSeries(positions.source, positions.time[is_known], positions.values[is_known])
+                if is_known.any()
+                else None
+            )
+        if positions is not None:
+            scaled = positions.values * np.array([1e-7, 1e-7, 1e-3, 0.01, 0.01, -0.01])
+            # Round to 1e-7 degrees, the resolution of the message.
             scaled[:, :2] = np.round(scaled[:, :2], 7)
-            yield "position", LogSeries(place.source, place.time, scaled[:, :3])
-            yield "velocity", LogSeries(place.source, place.time, scaled[:, 3:])
+            yield "position", LogSeries(positions.source, positions.time, scaled[:, :3])
+            yield "velocity", LogSeries(positions.source, positions.time, scaled[:, 3:])
         else:
             yield "position", self._gps_place()
         yield "attitude", self.table("ATTITUDE", ("roll", "pitch", "yaw"))
@@ -381,22 +400,24 @@ class VehicleMessages:
         table = self.table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
         if table is None:
             return None
-        fixed = table.values[:, 3] >= 3
-        if not fixed.any():
+        has_fix = table.values[:, 3] >= 3
+        if not has_fix.any():
             return None
-        scaled = np.round(table.values[fixed, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
-        return LogSeries("GPS_RAW_INT", table.time[fixed], scaled)
+        scaled = np.round(table.values[has_fix, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
+        return LogSeries("GPS_RAW_INT", table.time[has_fix], scaled)
 
     def _wind(self) -> LogSeries | None:
-        own = self.table("WIND", ("direction", "speed"))
-        if own is not None and np.any(own.values[:, 1]):
-            # The direction is where the wind comes from.
-            course, speed = np.radians(own.values[:, 0]), own.values[:, 1]
-            return LogSeries("WIND", own.time, np.stack([-speed * np.sin(course), -speed * np.cos(course)], axis=1))
-        covered = self.table("WIND_COV", ("wind_y", "wind_x"))
-        return covered if covered is not None and np.any(covered.values) else None
+        """Return the wind's velocity to east and north, m/s, (n, 2); None if no wind was sent or all of it is 0."""
+        wind = self.table("WIND", ("direction", "speed"))
+        if wind is not None and np.any(wind.values[:, 1]):
+            # The direction is the direction from which the wind blows.
+            course, speed = np.radians(wind.values[:, 0]), wind.values[:, 1]
+            return LogSeries("WIND", wind.time, np.stack([-speed * np.sin(course), -speed * np.cos(course)], axis=1))
+        wind = self.table("WIND_COV", ("wind_y", "wind_x"))
+        return wind if wind is not None and np.any(wind.values) else None
 
     def _battery(self) -> LogSeries | None:
+        """Return the battery's current, A, and the energy used, Wh, (n, 2); None if neither was measured."""
         table = self._measured("BATTERY_STATUS", ("current_battery", "energy_consumed"))
         if table is not None and np.any(table.values[:, 1] > 0.0):
             current = np.maximum(table.values[:, 0] * 0.01, 0.0)
@@ -412,14 +433,15 @@ class VehicleMessages:
         return LogSeries(table.source, table.time, table.values * np.array([1e-3, 0.01]))
 
     def _measured(self, name: str, columns: tuple[str, ...]) -> LogSeries | None:
-        """Return columns of a battery's message, without the rows in which one is marked as not measured."""
+        """Return columns of a battery message, without rows that have a value marked as not measured."""
         table = self.table(name, columns)
         if table is None:
             return None
-        measured = np.all([table.values[:, k] != NOT_MEASURED[column] for k, column in enumerate(columns)], axis=0)
-        return LogSeries(name, table.time[measured], table.values[measured]) if measured.any() else None
+        is_measured = np.all([table.values[:, k] != NOT_MEASURED[column] for k, column in enumerate(columns)], axis=0)
+        return LogSeries(name, table.time[is_measured], table.values[is_measured]) if is_measured.any() else None
 
     def _heights(self) -> Iterable[HeightSource]:
+        """Yield the altitudes that the log has in addition to the altitude of the position."""
         gps = self._gps_place()
         if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
@@ -428,17 +450,18 @@ class VehicleMessages:
             yield HeightSource("VFR_HUD.alt", "amsl", hud)
 
     def _modes(self) -> Iterable[ModeChange]:
-        last: tuple[str, bool] | None = None
-        for time, beat in self._own.get("HEARTBEAT", []):
-            if not _is_vehicle(beat):
+        """Yield the changes of the vehicle's mode, the first mode included."""
+        last_mode: tuple[str, bool] | None = None
+        for time, heartbeat in self._own.get("HEARTBEAT", []):
+            if not _is_vehicle(heartbeat):
                 continue
-            mode = px4_mode(beat.custom_mode) if beat.autopilot == _PX4 else plane_mode(beat.custom_mode)
-            if mode != last:
+            mode = px4_mode(heartbeat.custom_mode) if heartbeat.autopilot == _PX4 else plane_mode(heartbeat.custom_mode)
+            if mode != last_mode:
                 yield ModeChange(time, *mode)
-                last = mode
+                last_mode = mode
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Yield missions from items as uploaded, or as downloaded by a station."""
+        """Yield the missions whose items a station uploaded or downloaded."""
         rows: list[LoggedItem] = []
         total, begins_mission = 0, False
         for time, message in self._items:
@@ -451,31 +474,35 @@ class VehicleMessages:
                 rows.append(LoggedItem(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT"), begins_mission))
                 begins_mission = False
         for logged in combine_items(rows):
-            readable = (_px4_mission if self.is_px4 else logged_mission)(logged, self._source, "mission items")
-            if readable is not None:
-                yield replace(readable, mission=self._with_home(readable.mission))
+            mission = (_px4_mission if self.is_px4 else logged_mission)(logged, self._source, "mission items")
+            if mission is not None:
+                yield replace(mission, mission=self._with_home(mission.mission))
 
     def _with_home(self, mission: Mission) -> Mission:
-        """Replace home by the vehicle's home, as an uploaded mission has only the station's assumption."""
-        heard = [message for _, message in self._own["HOME_POSITION"] if message.latitude or message.longitude]
-        if not heard:
+        """Return a mission with the home that the vehicle last reported; unchanged if it reported none.
+
+        The home of an uploaded mission is only the station's assumption.
+        """
+        reports = [message for _, message in self._own["HOME_POSITION"] if message.latitude or message.longitude]
+        if not reports:
             return mission
-        home = heard[-1]
-        place = Home(home.latitude * 1e-7, home.longitude * 1e-7, home.altitude * 1e-3)
-        return Mission(place, mission.items, warnings=mission.warnings, source=mission.source)
+        report = reports[-1]
+        home = Home(report.latitude * 1e-7, report.longitude * 1e-7, report.altitude * 1e-3)
+        return Mission(home, mission.items, warnings=mission.warnings, source=mission.source)
 
     def mode_numbers(self) -> Iterator[tuple[float, int]]:
-        """Yield time and number of the mode of each heartbeat."""
-        for time, beat in self._own.get("HEARTBEAT", []):
-            if _is_vehicle(beat):
-                yield time, int(beat.custom_mode)
+        """Yield the time and the mode number of each heartbeat of the vehicle."""
+        for time, heartbeat in self._own.get("HEARTBEAT", []):
+            if _is_vehicle(heartbeat):
+                yield time, int(heartbeat.custom_mode)
 
     @property
     def is_px4(self) -> bool:
         """True if PX4 flew."""
-        return any(beat.autopilot == _PX4 for _, beat in self._own["HEARTBEAT"] if _is_vehicle(beat))
+        return any(heartbeat.autopilot == _PX4 for _, heartbeat in self._own["HEARTBEAT"] if _is_vehicle(heartbeat))
 
     def _parameters(self) -> dict[str, float]:
+        """Return the last value of each parameter that the vehicle sent."""
         values: dict[str, float] = {}
         for _, message in self._own.get("PARAM_VALUE", []):
             name = _text(message.param_id)
@@ -483,20 +510,23 @@ class VehicleMessages:
                 values[name] = float(message.param_value)
         return values
 
-    def _program(self, beat: Any) -> str:
+    def _program(self, heartbeat: Any) -> str:
+        """Return ArduPilot's start message with its version, or the autopilot's name; "" if unknown."""
         for _, message in self._own.get("STATUSTEXT", []):
             text = _text(message.text)
             if "Ardu" in text and " V" in text:
                 return text
-        return _NAMES.get(beat.autopilot, "")
+        return _NAMES.get(heartbeat.autopilot, "")
 
 
 def _text(value: str | bytes) -> str:
+    """Return a text field up to its first zero byte, without surrounding spaces."""
     text = value.decode("latin-1") if isinstance(value, bytes) else value
     return text.partition("\0")[0].strip()
 
 
 def _item(message: Any, *, scaled: bool) -> MissionItem:
+    """Return the item of a mission message.  scaled: True if its coordinates are integers of 1e-7 degrees."""
     command, frame = int(message.command), int(message.frame)
     lat, lon = (message.x * 1e-7, message.y * 1e-7) if scaled else (float(message.x), float(message.y))
     params = (float(message.param1), float(message.param2), float(message.param3), float(message.param4))
@@ -506,7 +536,7 @@ def _item(message: Any, *, scaled: bool) -> MissionItem:
 
 
 def _px4_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
-    """Make a mission of PX4 items, which are counted from 0 and contain no home."""
+    """Make a mission of PX4 items, which are numbered from 0 and contain no home; None if it cannot be used."""
     mission = Mission(None, px4_items(logged.items), source=f"{source}: {origin}")
     end = max(logged.total, mission.items[-1].seq)
     return without_gaps(LoggedMission(logged.time, mission, origin), logged.total, end)

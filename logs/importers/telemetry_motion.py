@@ -1,4 +1,4 @@
-"""Motion of an aircraft from a telemetry log (`.tlog`), as `motion_log` reads it from ArduPilot's logs."""
+"""Read the motion of an aircraft from a telemetry log (`.tlog`), as `motion_log` does from ArduPilot's own logs."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from world.errors import LogError
 
 # RAW_IMU of ArduPilot is in thousandths of this, m/s^2, and of rad/s.
 _STANDARD_GRAVITY_MPS2 = 9.80665
-# Period after which a count of microseconds in 32 bits starts at 0 again, s.
+# Period after which a 32-bit count of microseconds starts at 0 again, s.
 _WRAP_S = 2.0**32 * 1e-6
 # Largest difference between a message's own time and the time that its neighbours give it, s.
 _MAX_CLOCK_DIFFERENCE_S = 2.0
@@ -21,9 +21,11 @@ NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
 
 
 def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
-    """Read the motion of a log of ArduPlane; digest: SHA-256 of its bytes.
+    """Read the motion of an aircraft from a telemetry log of ArduPlane.
 
-    Raises LogError, in one line, for a log without a vehicle, and for PX4, whose outputs do not state what they move.
+    digest: SHA-256 of the file's bytes.
+
+    Raises LogError for a log without a vehicle, and for PX4, whose telemetry does not state what its outputs move.
     """
     messages, damage = vehicle_messages(path)
     if messages.is_px4:
@@ -59,26 +61,30 @@ def read_telemetry_motion(path: Path, digest: str) -> MotionLog:
 
 
 def _reordered(series: LogSeries | None, columns: list[int], factors: list[float] | None = None) -> Samples:
+    """Return columns of a series in the given order, times their factors; no rows without a series."""
     if series is None:
         return NO_SAMPLES
     return sort_samples(series.time, series.values[:, columns] * np.array([1.0] if factors is None else factors))
 
 
 def _own_times(time: Floats, microseconds: Floats) -> Floats:
-    """Return the times at which messages were made instead of received, s.
+    """Return the times at which messages were made, instead of the times of their reception, s, (n,).
 
-    time: (n,) s on the vehicle's clock, by their reception.  microseconds: (n,) since the vehicle was switched on; they
-    may start at 0 again after 32 bits.
+    time: times of reception on the vehicle's clock, s, (n,).
+    microseconds: times in the messages since the vehicle was switched on, us, (n,); the count may wrap after 32 bits.
+
+    The time of reception remains if both times differ too much.
 
     >>> _own_times(np.array([4300.0, 4300.3]), np.array([5.1e6, 5.2e6])).round(3).tolist()
     [4300.067, 4300.167]
     """
-    own = microseconds * 1e-6
-    own = own + _WRAP_S * np.round((time - own) / _WRAP_S)
-    return np.asarray(np.where(np.abs(own - time) < _MAX_CLOCK_DIFFERENCE_S, own, time))
+    own_time = microseconds * 1e-6
+    own_time = own_time + _WRAP_S * np.round((time - own_time) / _WRAP_S)
+    return np.asarray(np.where(np.abs(own_time - time) < _MAX_CLOCK_DIFFERENCE_S, own_time, time))
 
 
 def _inertial(messages: VehicleMessages) -> Samples:
+    """Return specific force (m/s²) and angular rates (rad/s), (n, 6); no rows if the log lacks them."""
     table = messages.table("RAW_IMU", ("time_usec", "xacc", "yacc", "zacc", "xgyro", "ygyro", "zgyro"))
     if table is None:
         return NO_SAMPLES
@@ -87,9 +93,11 @@ def _inertial(messages: VehicleMessages) -> Samples:
 
 
 def _outputs(messages: VehicleMessages) -> Samples:
+    """Return the servo outputs of the first port, us, (n, OUTPUTS); no rows if the log lacks them."""
     names = tuple(f"servo{k}_raw" for k in range(1, OUTPUTS + 1))
     table = messages.table("SERVO_OUTPUT_RAW", ("time_usec", "port", *names))
     if table is None:
         return Samples(np.zeros(0), np.zeros((0, OUTPUTS)))
-    first = table.values[:, 1] == 0.0
-    return sort_samples(_own_times(table.time[first], table.values[first, 0]), table.values[first, 2:])
+    is_first_port = table.values[:, 1] == 0.0
+    times = _own_times(table.time[is_first_port], table.values[is_first_port, 0])
+    return sort_samples(times, table.values[is_first_port, 2:])

@@ -1,4 +1,4 @@
-"""Track files: GPX, IGC flight recorders and KML, as flights without attitude or controls.
+"""Read track files (GPX, IGC flight recorders and KML) as flights without attitude or controls.
 
 GPX is read by gpxpy.  aerofiles 1.5 reads IGC in 3.7 times the time and raises KeyError for a file without a date;
 fastkml 1.4 reads KML in 8 times the time, a track with one damaged coordinate raises TypeError, and one with a damaged
@@ -28,7 +28,7 @@ from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, RawLo
 from world.errors import LogError
 
 # ----------------------------------------------------------------------
-# Text of a track file: of a readable size, and without the traps of XML.
+# Text of a track file, with checks of its size and of dangerous XML.
 
 # Largest track file; a track of a day at ten points a second takes less.
 MAX_BYTES = 256 * 2**20
@@ -37,10 +37,12 @@ _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 
 
 def track_text(path: Path, *, xml: bool) -> str:
-    """Return the text of a file, with bytes that are not UTF-8 replaced.
+    """Return the text of a track file; bytes that are not UTF-8 are replaced.
 
-    Of a zipped file (`.kmz`) the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, and for
+    In a zipped file (`.kmz`) the first `.kml` is read.  Raises LogError for a file of more than `MAX_BYTES`, and for
     XML with a document type.
+
+    xml: True for a file in XML.
     """
     size = path.stat().st_size
     if size > MAX_BYTES:
@@ -54,6 +56,7 @@ def track_text(path: Path, *, xml: bool) -> str:
 
 
 def _read_bytes(path: Path) -> bytes:
+    """Return the bytes of a file, or of the first `.kml` in an archive.  Raises LogError for an unreadable archive."""
     if not zipfile.is_zipfile(path):
         return path.read_bytes()
     try:
@@ -63,12 +66,12 @@ def _read_bytes(path: Path) -> bytes:
             if entry is None:
                 raise LogError(f"{path}: a zipped file without a .kml in it", file=path)
             with archive.open(entry) as file:
-                # The size that it claims may be wrong.
+                # The archive may state a wrong size.
                 data = file.read(MAX_BYTES + 1)
     # bzip2 raises OSError for bytes that it cannot unpack.
     except (zipfile.BadZipFile, zlib.error, lzma.LZMAError, RuntimeError, EOFError, OSError) as error:
-        why = " ".join(str(error).split())[:120]
-        raise LogError(f"{path}: an unreadable zipped file: {why}", file=path) from error
+        cause = " ".join(str(error).split())[:120]
+        raise LogError(f"{path}: an unreadable zipped file: {cause}", file=path) from error
     if len(data) > MAX_BYTES:
         message = f"{path}: more than {MAX_BYTES:,} bytes unpacked: at most this many are read of a track"
         raise LogError(message, file=path)
@@ -76,8 +79,8 @@ def _read_bytes(path: Path) -> bytes:
 
 
 def _earliest(stamps: NDArray[np.float64]) -> float:
-    """Return the earliest time of a track (n,) s, without damaged times far from the median."""
-    # Take a time of the track itself: the mean of two may be near neither.
+    """Return the earliest of a track's times, s, without damaged times far from the median.  stamps: s, (n,)."""
+    # Take a time of the track as the median: the mean of two times may be near neither.
     middle = np.sort(stamps)[stamps.size // 2]
     return float(stamps[np.abs(stamps - middle) < MAX_TIME_S].min())
 
@@ -89,7 +92,7 @@ GPX = "GPX track"
 
 
 def read_gpx(path: Path) -> RawLog:
-    """Read a track.  Raises LogError for one without points that have times."""
+    """Read a GPX track.  Raises LogError for a track with fewer than two points that have a time."""
     text = track_text(path, xml=True)
     try:
         gpx = gpxpy.parse(text)
@@ -123,6 +126,7 @@ def read_gpx(path: Path) -> RawLog:
 
 
 def _routes(gpx: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
+    """Return the routes of a GPX file with at least two points as missions."""
     missions = []
     for route in gpx.routes:
         heights = all(point.elevation is not None for point in route.points)
@@ -164,7 +168,10 @@ _DATUMS: dict[str, VerticalDatum] = {"ELL": "ellipsoid", "GEO": "amsl"}
 
 
 def read_igc(path: Path) -> RawLog:
-    """Read a track.  Raises LogError for one with fewer than two fixes."""
+    """Read the track of an IGC flight recorder.  Raises LogError for a file with fewer than two fixes.
+
+    The altitude is the GNSS altitude if most fixes have one, otherwise the pressure altitude.
+    """
     lines = re.split(r"\r\n|\n|\r", track_text(path, xml=False))
     rows, unreadable = _fixes(lines)
     if len(rows) < 2:
@@ -172,19 +179,19 @@ def read_igc(path: Path) -> RawLog:
     table = np.array(rows)
     time = _unwrap_midnight(table[:, 0])
     gnss, pressure = table[:, 4], table[:, 3]
-    use_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
-    up, source = (gnss, "B record, GNSS altitude") if use_gnss else (pressure, "B record, pressure altitude")
+    has_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
+    up, source = (gnss, "B record, GNSS altitude") if has_gnss else (pressure, "B record, pressure altitude")
     midnight = _midnight(lines)
     start = float(time.min())
-    other = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
+    pressure_heights = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
     return RawLog(
         source=str(path),
         format=IGC,
         program=_recorder(lines),
         vehicle="unknown",
         series={"position": LogSeries(source, time - start, np.column_stack([table[:, 1:3], up]))},
-        heights=(other,) if use_gnss else (),
-        datum=_datum(lines) if use_gnss else "pressure",
+        heights=(pressure_heights,) if has_gnss else (),
+        datum=_datum(lines) if has_gnss else "pressure",
         missions=_task(lines, str(path)),
         clock="start",
         utc_start=midnight + start,
@@ -193,12 +200,16 @@ def read_igc(path: Path) -> RawLog:
 
 
 def _degrees(degrees: str, minutes: str, thousandths: str, side: str) -> float:
+    """Return a latitude or longitude in degrees, negative to the south and west.  side: N, S, E or W."""
     value = int(degrees) + (int(minutes) + int(thousandths) / 1000.0) / 60.0
     return -value if side in "SW" else value
 
 
 def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, float]], int]:
-    """Return second of the day, latitude, longitude and both altitudes of each fix, and unreadable fixes."""
+    """Return the readable fixes, and the number of unreadable ones.
+
+    A fix is the second of the day, latitude and longitude (deg), and pressure and GNSS altitude (m; NaN if missing).
+    """
     rows, unreadable = [], 0
     for line in lines:
         if not line.startswith("B"):
@@ -215,14 +226,14 @@ def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, flo
 
 
 def _unwrap_midnight(time: np.ndarray) -> np.ndarray:
-    """Return seconds that increase over midnight."""
+    """Return seconds of the day as times that increase over midnight, s."""
     steps = np.diff(time)
     days = np.cumsum(np.where(steps < -_HALF_DAY_S, 1.0, np.where(steps > _HALF_DAY_S, -1.0, 0.0)))
     return time + np.concatenate([[0.0], days]) * _DAY_S
 
 
 def _midnight(lines: list[str]) -> float:
-    """Return the beginning of the day, s since 1970; NaN if the file states none."""
+    """Return the beginning of the flight's day, s since 1970; NaN if the file states no valid date."""
     for line in lines:
         match = _DATE.match(line)
         if match:
@@ -233,6 +244,7 @@ def _midnight(lines: list[str]) -> float:
 
 
 def _datum(lines: list[str]) -> VerticalDatum:
+    """Return the datum of the GNSS altitude."""
     for line in lines:
         if line.startswith("HFALG") or line.startswith("HOALG"):
             return next((datum for word, datum in _DATUMS.items() if word in line[5:]), "unstated")
@@ -241,12 +253,13 @@ def _datum(lines: list[str]) -> VerticalDatum:
 
 
 def _recorder(lines: list[str]) -> str:
+    """Return the type of the flight recorder, or "" if the file does not state it."""
     recorder_line = next((line for line in lines if line.startswith("HFFTY")), "")
     return recorder_line.partition(":")[2].strip()
 
 
 def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
-    """Return the declared task; take-off and landing places at its ends are left out if they are 0."""
+    """Return the declared task as a mission, without take-off and landing; () for fewer than two turn points."""
     points = []
     for line in lines:
         match = _TASK_POINT.match(line)
@@ -254,7 +267,7 @@ def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
             lat, lon = _degrees(*match.groups()[:4]), _degrees(*match.groups()[4:])
             if (lat, lon) != (0.0, 0.0):
                 points.append((lat, lon))
-    # Take-off and landing are places of the glider on the ground, not part of the task.
+    # The first and the last point are the take-off and the landing on the ground, not turn points of the task.
     turn_points = points[1:-1] if len(points) > 3 else points
     items = tuple(
         MissionItem(
@@ -274,13 +287,13 @@ def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
 
 
 # ----------------------------------------------------------------------
-# KML tracks: `gx:Track` with times (Google's extension of OGC 12-007); a line without times is no flight.
+# KML tracks: `gx:Track` with times (Google's extension of OGC 12-007); a line without times is not a flight.
 
 KML = "KML track"
 
 
 def read_kml(path: Path) -> RawLog:
-    """Read the tracks of a file as one.  Raises LogError for one without places that have times."""
+    """Read all tracks of a KML file as one.  Raises LogError for a file with fewer than two positions with a time."""
     try:
         root = ElementTree.fromstring(track_text(path, xml=True))
     except (ElementTree.ParseError, ValueError) as error:
@@ -290,8 +303,8 @@ def read_kml(path: Path) -> RawLog:
         if _name(track) != "Track":
             continue
         mode = next((str(child.text).strip() for child in track if _name(child) == "altitudeMode"), mode)
-        pairs, alone = _pairs(track, path)
-        unreadable += alone
+        pairs, unpaired_count = _pairs(track, path)
+        unreadable += unpaired_count
         for when, coord in pairs:
             row = _row(when, coord)
             if row is None:
@@ -301,7 +314,9 @@ def read_kml(path: Path) -> RawLog:
     if len(rows) < 2:
         lines = sum(_name(element) == "LineString" for element in root.iter())
         reason = f"; its {lines} lines have no times" if lines else ""
-        raise LogError(f"{path}: {len(rows)} positions with a time (gx:Track); expected at least 2{reason}", file=path)
+        raise LogError(
+            f"{path}: only {len(rows)} position(s) with a time (gx:Track); expected at least 2{reason}", file=path
+        )
     table = np.array(rows)
     start = _earliest(table[:, 0])
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
@@ -325,29 +340,33 @@ def _name(element: ElementTree.Element) -> str:
 
 
 def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
-    """Return pairs of time and position, and the number of unpaired elements.
+    """Return pairs of a time and a position as texts, and the number of unpaired elements.
 
-    Either all times come before all positions, or each time comes before its position.  Raises LogError if
-    they cannot be paired.
+    Either all times come before all positions, or each time comes before its position.  Raises LogError if the numbers
+    of times and positions differ in the first case.
     """
-    marks = [(_name(child), child.text or "") for child in track if _name(child) in ("when", "coord")]
-    whens = [text for name, text in marks if name == "when"]
-    coords = [text for name, text in marks if name == "coord"]
-    last_when = max((k for k, (name, _) in enumerate(marks) if name == "when"), default=-1)
-    if all(name == "when" for name, _ in marks[: last_when + 1]):
-        if len(whens) != len(coords):
+    elements = [(_name(child), child.text or "") for child in track if _name(child) in ("when", "coord")]
+    times = [text for name, text in elements if name == "when"]
+    positions = [text for name, text in elements if name == "coord"]
+    last_time = max((k for k, (name, _) in enumerate(elements) if name == "when"), default=-1)
+    if all(name == "when" for name, _ in elements[: last_time + 1]):
+        if len(times) != len(positions):
             raise LogError(
-                f"{path}: a track of {len(whens)} times (when) and {len(coords)} positions (gx:coord): expected"
+                f"{path}: a track of {len(times)} times (when) and {len(positions)} positions (gx:coord): expected"
                 " equal numbers",
                 file=path,
             )
-        return list(zip(whens, coords, strict=True)), 0
-    pairs = [(one, other) for (name, one), (kind, other) in pairwise(marks) if (name, kind) == ("when", "coord")]
-    return pairs, len(marks) - 2 * len(pairs)
+        return list(zip(times, positions, strict=True)), 0
+    pairs = [
+        (text, next_text)
+        for (name, text), (next_name, next_text) in pairwise(elements)
+        if (name, next_name) == ("when", "coord")
+    ]
+    return pairs, len(elements) - 2 * len(pairs)
 
 
 def _row(when: str, coord: str) -> tuple[float, float, float, float] | None:
-    """Return time since 1970 (s), latitude, longitude and altitude; None for an invalid row."""
+    """Return time since 1970 (s), latitude and longitude (deg) and altitude (m; NaN if missing); None if invalid."""
     parts = coord.replace(",", " ").split()
     try:
         time = datetime.fromisoformat(when.strip().replace("Z", "+00:00"))

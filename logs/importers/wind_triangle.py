@@ -11,17 +11,19 @@ _WINDOW_S = 60.0
 _STEP_S = 1.0
 # Airspeed below which the aircraft does not fly, m/s.
 _MIN_AIRSPEED_MPS = 5.0
-# Minimum fraction of a window in flight.
+# Minimum fraction of a window during which the aircraft flies.
 _MIN_FRACTION = 0.5
 
 
 def estimate_wind(velocity: Samples, attitude: Samples, airspeed: Samples) -> Samples:
-    """Return the wind, north and east, in the direction of the air's motion: ground velocity less air velocity.
+    """Return the wind velocity to north and east, m/s, (k, 2): the ground velocity minus the air velocity.
 
-    The nose is assumed to point into the air flow, so a sideslip or an error of the heading of 3 degrees at 17 m/s is
-    0.9 m/s of wind on straight flight, and averages out on circles.
+    The nose is assumed to point into the air flow.  A sideslip or a heading error of 3 degrees at 17 m/s therefore
+    appears as 0.9 m/s of wind in straight flight, and averages out on circles.
 
-    velocity: (n, 3) north, east, down.  attitude: (n, 3).  airspeed: (n, 1) true, m/s.
+    velocity: ground velocity to north, east and down, m/s, (n, 3).
+    attitude: roll, pitch and yaw, rad, (n, 3).
+    airspeed: true airspeed, m/s, (n, 1).
 
     >>> time, yaw = np.arange(0.0, 120.0, 0.1), 0.1 * np.arange(0.0, 120.0, 0.1)
     >>> ground = np.column_stack([17.0 * np.cos(yaw) + 3.0, 17.0 * np.sin(yaw) - 2.0, 0.0 * yaw])
@@ -35,16 +37,17 @@ def estimate_wind(velocity: Samples, attitude: Samples, airspeed: Samples) -> Sa
     time = velocity.time
     yaw = np.interp(time, attitude.time, np.unwrap(attitude.values[:, 2]))
     speed = np.interp(time, airspeed.time, airspeed.values[:, 0], left=0.0, right=0.0)
-    # The horizontal part of the airspeed: the vertical part equals the ground velocity's, as air moves horizontally.
-    level = np.sqrt(np.maximum(0.0, np.square(speed) - np.square(velocity.values[:, 2])))
-    flying = speed > _MIN_AIRSPEED_MPS
-    rows = velocity.values[:, :2] - level[:, np.newaxis] * np.column_stack([np.cos(yaw), np.sin(yaw)])
+    # Horizontal part of the airspeed.  The vertical part equals the vertical ground velocity, because air moves
+    # horizontally.
+    horizontal_speed = np.sqrt(np.maximum(0.0, np.square(speed) - np.square(velocity.values[:, 2])))
+    is_flying = speed > _MIN_AIRSPEED_MPS
+    winds = velocity.values[:, :2] - horizontal_speed[:, np.newaxis] * np.column_stack([np.cos(yaw), np.sin(yaw)])
     sums = np.vstack(
-        [np.zeros(3), np.cumsum(np.column_stack([rows, np.ones(len(time))]) * flying[:, np.newaxis], axis=0)]
+        [np.zeros(3), np.cumsum(np.column_stack([winds, np.ones(len(time))]) * is_flying[:, np.newaxis], axis=0)]
     )
     centers = np.arange(time[0], time[-1], _STEP_S)
-    begin, end = (np.searchsorted(time, centers + side * 0.5 * _WINDOW_S) for side in (-1.0, 1.0))
-    totals = sums[end] - sums[begin]
-    full = totals[:, 2] > _MIN_FRACTION * _WINDOW_S * len(time) / max(1e-9, float(time[-1] - time[0]))
-    values: Floats = totals[full, :2] / totals[full, 2:]
-    return Samples(centers[full], values)
+    start_rows, end_rows = (np.searchsorted(time, centers + side * 0.5 * _WINDOW_S) for side in (-1.0, 1.0))
+    totals = sums[end_rows] - sums[start_rows]
+    is_sufficient = totals[:, 2] > _MIN_FRACTION * _WINDOW_S * len(time) / max(1e-9, float(time[-1] - time[0]))
+    values: Floats = totals[is_sufficient, :2] / totals[is_sufficient, 2:]
+    return Samples(centers[is_sufficient], values)

@@ -66,7 +66,11 @@ class Conditions(DocumentConfig):
 
 
 def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
-    """Return the conditions of a plan made in a scenario.  aircraft: its name or folder.  airspeed: m/s."""
+    """Return the conditions of a plan made in a scenario.
+
+    aircraft: name or folder of the aircraft.
+    airspeed: cruise airspeed, m/s.
+    """
     flight_table, wind, terrain = scenario.flight, scenario.wind, scenario.terrain
     mass = None
     # The aircraft of a log may not be on this machine.
@@ -92,7 +96,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
 
 
 def _autopilot_source(flight_table: FlightTable) -> str:
-    """Return a clause with the file that chose a non-default autopilot; "" if no file chose it."""
+    """Return a clause that names the file from which the autopilot was taken; "" if it was named or is the default."""
     if flight_table.autopilot_from is None or flight_table.steering.autopilot == DEFAULT_AUTOPILOT:
         return ""
     return f"; taken from {flight_table.autopilot_from}, because no autopilot was named"
@@ -127,22 +131,25 @@ def judging_conditions(setup: FlightSetup) -> Conditions:
 
 
 def condition_lines(conditions: Conditions) -> list[str]:
-    """Return lines on the aircraft and its speed, and on weather, navigation and ground."""
+    """Return a line on the aircraft and its airspeed, and a line on wind, turbulence, navigation, terrain and zones."""
     return [_aircraft_line(conditions), _world_line(conditions)]
 
 
 def autopilot_line(conditions: Conditions, *, is_flown: bool) -> str:
-    """Return a line on the autopilot.  is_flown: True if it flew; False if only a mission is judged."""
+    """Return a line of text that names the autopilot.
+
+    is_flown: True if the autopilot flew, False if only a mission is judged.
+    """
     return f"{'Flown by' if is_flown else 'Autopilot'}: {conditions.autopilot}"
 
 
 def flown_lines(conditions: Conditions) -> list[str]:
-    """Return all lines on a flight: aircraft, weather and world, and autopilot."""
+    """Return the lines on a flight's aircraft, its conditions and the autopilot that flew."""
     return [*condition_lines(conditions), autopilot_line(conditions, is_flown=True)]
 
 
 def _aircraft_line(conditions: Conditions) -> str:
-    """Describe the aircraft and its airspeed, and say if no aircraft was named."""
+    """Return the line on the aircraft and its airspeed, which says if no aircraft was named."""
     speed = (
         f"{conditions.airspeed_mps:.3g} m/s {conditions.airspeed_kind} airspeed"
         f" ({_AIRSPEED_SOURCE_TEXTS[conditions.airspeed_source]})"
@@ -157,7 +164,7 @@ def _aircraft_line(conditions: Conditions) -> str:
 
 
 def _world_line(conditions: Conditions) -> str:
-    """Describe wind, turbulence, navigation, terrain and the number of zones."""
+    """Return the line on wind, turbulence, navigation, terrain and the number of zones."""
     wind_text = "no wind"
     if conditions.wind_mps is None:
         wind_text = "wind from each direction"
@@ -182,18 +189,17 @@ def _world_line(conditions: Conditions) -> str:
     return f"Conditions: {wind_text}{turbulence_text}{navigation_text}; {terrain_text}{zones_text}"
 
 
-# Legs are side by side if their courses are parallel or opposite within this angle, and at least half of the shorter
-# leg is alongside the longer.
+# Largest angle between the lines of two legs that lie side by side.
 _PARALLEL_ANGLE_RAD = math.radians(15.0)
-# Legs closer to each other than this are one line, m.
+# Legs closer to each other than this are the same line, m.
 _SAME_LINE_DISTANCE_M = 1.0
 
 
 def corridor_line(setup: FlightSetup) -> str:
-    """Describe the width and origin of a corridor that the scenario does not state.
+    """Return a line on the width and origin of the corridor if the scenario does not state it, otherwise "".
 
-    Warn if the corridor is wider than the gap between legs, because a flight within it may then never have been on its
-    lines.  Return "" if the corridor is stated, or if a survey's cross-track errors are judged line by line.
+    The line warns if the corridor is wider than the distance between legs, because a flight within the corridor may
+    then never have been on the legs' lines.  Return "" also for a survey, whose photo lines are judged one by one.
     """
     half_width, radius = setup.corridor, setup.autopilot.turns.acceptance_radius or 0.0
     if setup.scenario.limits.corridor_m is not None or judged_surveys(setup):
@@ -202,20 +208,21 @@ def corridor_line(setup: FlightSetup) -> str:
     if CORRIDOR_RADII * radius >= half_width:
         origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
     line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
-    gap = min_leg_spacing(setup.route.waypoints)
-    if gap is None or gap[0] >= half_width:
+    closest_legs = min_leg_spacing(setup.route.waypoints)
+    if closest_legs is None or closest_legs[0] >= half_width:
         return line
-    metres, leg = gap
+    spacing, leg = closest_legs
     return (
-        f"{line}; it is wider than the {metres:.0f} m between legs {leg} and {leg + 2}; staying within it does not show"
-        " that the lines were flown"
+        f"{line}; the corridor is wider than the {spacing:.0f} m between legs {leg} and {leg + 2}, so a flight within"
+        " the corridor may not have followed the lines"
     )
 
 
 def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     """Return the minimum distance between a leg and the leg after the next, m, and the first leg's number.
 
-    Only legs that are side by side are compared; return None if there are none.
+    Only legs that lie side by side are compared: their courses are parallel or opposite within `_PARALLEL_ANGLE_RAD`,
+    and at least half of the shorter leg lies next to the longer leg.  Return None if there are no such legs.
 
     waypoints: east, north and up, m, (w, 3).
 
@@ -225,7 +232,7 @@ def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
     >>> min_leg_spacing(lines[:3]) is None
     True
     """
-    gaps: list[tuple[float, int]] = []
+    spacings: list[tuple[float, int]] = []
     for k in range(len(waypoints) - 3):
         (start, end), (other_start, other_end) = waypoints[k : k + 2, :2], waypoints[k + 2 : k + 4, :2]
         leg_vector, other_vector = end - start, other_end - other_start
@@ -238,6 +245,6 @@ def min_leg_spacing(waypoints: NDArray[np.float64]) -> tuple[float, int] | None:
         overlap = sorted((float((other_start - start) @ direction), float((other_end - start) @ direction)))
         if min(leg_length, overlap[1]) - max(0.0, overlap[0]) >= 0.5 * min(leg_length, other_length):
             offset = 0.5 * (other_start + other_end) - start
-            gaps.append((abs(float(direction[0] * offset[1] - direction[1] * offset[0])), k))
+            spacings.append((abs(float(direction[0] * offset[1] - direction[1] * offset[0])), k))
     # A line that is flown twice is not a survey.
-    return min((gap for gap in gaps if gap[0] >= _SAME_LINE_DISTANCE_M), default=None)
+    return min((pair for pair in spacings if pair[0] >= _SAME_LINE_DISTANCE_M), default=None)

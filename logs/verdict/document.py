@@ -122,13 +122,13 @@ class VerdictDocument(DocumentConfig):
 
 
 def finding_document(finding: Finding) -> FindingDocument:
-    """Return a finding with the texts of its place and its suggestions."""
+    """Return the document of a finding, with the texts of its place, its passing values and its suggestions."""
     data = {field.name: getattr(finding, field.name) for field in fields(finding)}
     return FindingDocument(**data, where=finding.where, passes=finding.limit_text, suggestion=finding.suggestion)
 
 
 def level_document(level: LevelAnswer) -> LevelDocument:
-    """Return a level's answer with the texts of its disagreements."""
+    """Return the document of a level's answer, with the texts of its disagreements."""
     return LevelDocument(
         name=level.name,
         flyable=level.flyable,
@@ -140,13 +140,13 @@ def level_document(level: LevelAnswer) -> LevelDocument:
 
 
 def deciding_document(deciding: DecidingParameter) -> DecidingDocument:
-    """Return the deciding parameter with its text."""
+    """Return the document of the deciding parameter, with its text."""
     data = {field.name: getattr(deciding, field.name) for field in fields(deciding)}
     return DecidingDocument(**data, text=deciding_text(deciding))
 
 
 def parameters_document(parameters: Parameters) -> ParametersDocument:
-    """Return each parameter's value and origin, and the names in the file that have no effect."""
+    """Return the document of the parameters: each value and its origin, and names in the file without an effect."""
     return ParametersDocument(
         file=parameters.source,
         values=tuple(ParameterDocument(**value._asdict()) for value in parameters.values),

@@ -1,4 +1,4 @@
-"""The findings of a verdict as data."""
+"""Define the findings of a verdict as data."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -8,12 +8,12 @@ from logs.verdict.places import Place, Suggestion
 from logs.verdict.wording import compared_texts, place_text, quantity_text, suggestions_text
 from world.json_schema import DocumentConfig
 
-# Checks of unjudged findings that leave the verdict undecided.
+# Values of `Finding.check` for unjudged findings that leave the verdict undecided.
 # The aircraft is not known well enough.
 UNKNOWN_AIRCRAFT = "unknown aircraft"
 # Only a flight shows the flown path.
 UNKNOWN_PATH = "unknown way"
-# The path from the ground or to it may not be free.
+# The path from the ground or to the ground may not be clear of obstacles.
 GROUND_PATH = "ground way"
 # An item that changes the flight path is not flown as the autopilot would fly it, or parameters contradict one another.
 NOT_FLOWN = "not flown"
@@ -36,22 +36,22 @@ class Fact(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """Result of one rule at one place: the planned value, the flown value, and the limit.
+    """Result of one rule at one place.
 
     rule: a name of `logs.verdict.rule_words.RULE_WORDS`.
     place: place of the finding.
     planned, flown, limit, tolerance, margin: in `unit`, None if there is no such number.
-    margin: distance inside the limit (negative: beyond), without the tolerance.
+    margin: distance inside the limit without the tolerance; negative beyond the limit.
     limit_source: "scenario", "aircraft", or another source of the limit.
     method: how the numbers were obtained.
-    ok: None if it was not judged.
-    reason: the reason for a person to read; everything that a program needs is in other fields.
-    suggestions: for a failed finding, the smallest changes of the plan with which it passes, the least change first.
+    ok: True if the finding passes, False if it fails, None if it was not judged.
+    reason: the reason for a person to read; all data for programs are in other fields.
+    suggestions: for a failed finding, changes of the plan with which it passes, the smallest change first.
     brief: the reason in a few words, for a headline.
     placed: True if the reason begins with the place.
     check: name of the check, for a rule with several checks; `UNKNOWN_AIRCRAFT`, `UNKNOWN_PATH`, `NOT_FLOWN`,
         `GROUND_PATH` or `UNKNOWN_RETURN` if the finding is undecided for that reason; "" otherwise.
-    facts: other measured numbers, which are not faults.
+    facts: other measured numbers, which are not judged.
     at_least: True if values of at least the limit pass, False if values of at most the limit pass.
     """
 
@@ -95,7 +95,7 @@ class Finding:
 
     @property
     def value(self) -> float | None:
-        """The value compared with the limit: the flown value, or the planned value if the margin is its margin."""
+        """Value that was compared with the limit: of the flown and the planned value, the one that fits the margin."""
         if self.flown is None or self.planned is None or self.limit is None or self.margin is None:
             return self.planned if self.flown is None else self.flown
         errors = {value: abs(abs(value - self.limit) - abs(self.margin)) for value in (self.flown, self.planned)}
@@ -111,7 +111,7 @@ class Finding:
         return self.compared_texts()[1]
 
     def compared_texts(self) -> tuple[str, str]:
-        """Return texts of the value and of the passing values, with enough digits that a failing value differs."""
+        """Return texts of the value and of the passing values, with enough digits to tell a failing value from them."""
         value, limit = self.value, self.effective_limit
         if value is None or limit is None:
             texts = ["" if number is None else quantity_text(number, self.unit) for number in (value, limit)]
@@ -126,7 +126,7 @@ class Finding:
 
     @property
     def suggestion(self) -> str:
-        """Text of the suggestions, "" if there are none."""
+        """Text of the suggestions; "" without suggestions."""
         return suggestions_text(self.suggestions)
 
 
@@ -143,7 +143,9 @@ class Message:
 
 
 def message(brief: str, rest: str = "", *, placed: bool = False) -> Message:
-    """Make a message from its brief first part and the rest.
+    """Make a message from its brief first part and the rest of the text.
+
+    placed: True if the message begins with the finding's place.
 
     >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
     'overshoots its arc by 8 m (at most 5 m)'
@@ -164,8 +166,8 @@ def undecided_findings(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 def closest_to_limit(findings: Iterable[Finding]) -> Finding | None:
     """Return the failed finding furthest beyond its limit, or else the finding closest to its limit.
 
-    A finding that fails by other evidence than its number has no margin; it comes after failed findings with a margin.
-    Return None if no finding failed or was judged by a number.
+    A failed finding without a margin comes after failed findings with a margin.  Return None if no finding failed and
+    none that passed has a margin.
 
     >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
     >>> failed = make_finding("slope", Place("leg", 2), ok=False, reason="too slow", margin=5.0)
@@ -201,13 +203,13 @@ def make_finding(
     facts: Sequence[Fact] = (),
     at_least: bool = False,
 ) -> Finding:
-    """Make a finding with numbers rounded to 1e-6, and None for non-finite numbers.
+    """Make a finding with numbers rounded to 1e-6; non-finite numbers become None.
 
     faults: faults with which the reason begins.
     facts: further measured numbers; non-finite numbers are omitted.
     at_least: True if values of at least the limit pass.
-    A finding that fails by other evidence while its number is within the limit and its tolerance has no margin: the
-    reason says what failed.
+    A failed finding whose number is within the limit and the tolerance gets no margin, because it fails for another
+    reason.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
     True
@@ -257,8 +259,8 @@ def badness(finding: Finding) -> tuple[int, float]:
 def finding_reason(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
     """Return the reason of a finding: its faults, followed by its facts in brackets; or only its facts.
 
-    >>> finding_reason([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
-    'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'
+    >>> finding_reason([message("overshoots its arc by 8 m")], ["turns 62.0°", "radius 76 m"])
+    'overshoots its arc by 8 m (turns 62.0°; radius 76 m)'
     """
     facts_text = "; ".join(facts)
     if not faults:

@@ -17,17 +17,17 @@ def _with_place(noun: str, finding: Finding, text: str) -> str:
 
 
 def name_reason(noun: str, finding: Finding) -> str:
-    """Name the place and the reason in brief."""
+    """Phrase a finding by its place and its brief reason."""
     return _with_place(noun, finding, shorten_statement(finding.brief))
 
 
 def name_event(noun: str, finding: Finding) -> str:
-    """Name the brief reason of an event that ends the flight, without its place."""
+    """Phrase an event that ends the flight by its brief reason, without a place."""
     return f"{noun} ({shorten_statement(finding.brief)})"
 
 
 def name_shortfall(noun: str, finding: Finding) -> str:
-    """Compare the flown value, or else the planned value, with a minimum."""
+    """Phrase a finding as a comparison of its value with a minimum; if the value is not below it, give the reason."""
     value, limit = finding.value, finding.effective_limit
     if value is None or limit is None or value >= limit:
         return name_reason(noun, finding)
@@ -35,7 +35,10 @@ def name_shortfall(noun: str, finding: Finding) -> str:
 
 
 def name_excess(noun: str, finding: Finding) -> str:
-    """Compare the worse of planned and flown value with the limit; if both are within it, name the reason."""
+    """Phrase a finding as a comparison of its worse value, planned or flown, with the limit.
+
+    If both values are within the limit, give the reason.
+    """
     values = [value for value in (finding.flown, finding.planned) if value is not None]
     worst_value = max(values, key=abs, default=None)
     limit = finding.effective_limit
@@ -46,7 +49,7 @@ def name_excess(noun: str, finding: Finding) -> str:
 
 
 def name_circle(noun: str, finding: Finding) -> str:
-    """Compare the radius of a circle that is too small with the minimum radius."""
+    """Phrase a finding on a circle that is too small as a comparison of its radius with the minimum radius."""
     limit = finding.effective_limit
     if finding.planned is None or limit is None or finding.planned >= limit:
         return name_excess(noun, finding)
@@ -54,7 +57,7 @@ def name_circle(noun: str, finding: Finding) -> str:
 
 
 def name_zone(noun: str, finding: Finding) -> str:
-    """Name a violated zone, and the depth inside an exclusion zone or outside an inclusion zone."""
+    """Phrase the violation of a zone by its depth inside an exclusion zone or outside an inclusion zone."""
     if not finding.place.name:
         return name_excess(noun, finding)
     depth = max(finding.flown or 0.0, finding.planned or 0.0)
@@ -63,19 +66,19 @@ def name_zone(noun: str, finding: Finding) -> str:
 
 
 def name_missile(_noun: str, finding: Finding) -> str:
-    """Name the missile and the time inside its range; a missile without a name is "threat 3 (missile)"."""
+    """Phrase the entry into a missile's sphere by the time inside; a missile without a name is "threat 3 (missile)"."""
     place = place_text(finding.place)
     name = f"threat {place}" if finding.place.name else place
     return f"{name} ({max(finding.flown or 0.0, finding.planned or 0.0):.1f} s inside its range)"
 
 
 def name_photo_line(noun: str, finding: Finding) -> str:
-    """Compare a photo line's usable fraction, or the overlap of its photos, with the required minimum."""
+    """Phrase a finding as a comparison of a photo line's usable fraction, or of the overlap, with the minimum."""
     return name_shortfall(finding.check or noun, finding)
 
 
 def name_missed_waypoint(_noun: str, finding: Finding) -> str:
-    """Name a missed waypoint and the distance at which it was passed."""
+    """Phrase a missed waypoint by the distance at which the aircraft passed it, if it passed the waypoint."""
     if finding.flown is not None and finding.brief != finding.reason:
         return f"{place_text(finding.place)} {finding.brief}"
     limit = finding.effective_limit

@@ -1,4 +1,4 @@
-"""Judge whether a flight shows that its plan is flyable, with every number computed again from the track.
+"""Judge whether a flight shows that its plan is flyable; every number is computed again from the track.
 
 Data that guidance recorded about itself (leg, cross-track, height error, clearance) and any recorded verdict are not
 read.
@@ -44,11 +44,14 @@ def judge_flight(
     """Judge a flown track at the level "flown".
 
     Any track is judged, however short or damaged; missing data makes the verdict incomplete.  A track without rows is a
-    flight that never began, so its route is judged at the level "geometric".
+    flight that never began, so its route is judged at the level "geometric".  An imported flight is judged by
+    `logs.verdict.imported.judge_imported_flight.judge_imported_flight`.
 
-    end_reason: "completed", or the reason why the flight ended early.  log_complete: True if the record has its end.
+    end_reason: "completed", or the reason why the flight ended early.
+    log_complete: True if the log is not cut off.
     envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for only the evidence.
-    reference: results of reference flights.  requirements: the setup's route requirements if already known.
+    reference: results of reference flights.
+    requirements: the setup's route requirements if already known.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -99,10 +102,10 @@ def _level_answers(
     flyable: bool,
     reference: ReferenceFlights | None,
 ) -> tuple[LevelAnswer, ...]:
-    """Return the answers of all levels: geometry, the airframe's reference flight, and the flight itself.
+    """Return the answers of the judged levels: geometry, the airframe's reference flight, and the flight itself.
 
-    The first two include their disagreements with the flight.  Without the envelope, only the flight's own answer is
-    returned.
+    The first two answers include their disagreements with the flight.  The answer of the airframe is missing without
+    its reference flight; if the envelope is not applied, only the flight's own answer is returned.
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
@@ -123,7 +126,7 @@ def _level_answers(
             (finding.rule, finding.place): (finding.rule, finding.place) not in failed for finding in flight_findings
         }
         disagreements = _disagreements("airframe", passes_by_place, flight_findings)
-        # An airframe that is not flyable although nothing failed was left undecided.
+        # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
         is_undecided = not airframe.flyable and not airframe.failed
         levels.append(
             LevelAnswer("airframe", airframe.flyable, airframe.headline, disagreements, undecided=is_undecided)
@@ -140,11 +143,15 @@ def _level_answers(
 def _disagreements(
     level: str, outcomes: Mapping[tuple[str, Place], bool | None], flight_findings: tuple[Finding, ...]
 ) -> tuple[Disagreement, ...]:
-    """Return the disagreements between a level and the flight, in the order of the level's findings."""
+    """Return the findings that a level and the flight judge differently, in the order of the level's findings.
+
+    level: name of the level.
+    outcomes: by rule and place, True if the level's finding passes, None if it is not judged.
+    """
     flight_outcomes = {(finding.rule, finding.place): finding.ok for finding in flight_findings}
     disagreements = []
-    for (rule, place), passes_there in outcomes.items():
-        passes_here = flight_outcomes.get((rule, place))
-        if passes_there is not None and passes_here is not None and passes_there != passes_here:
-            disagreements.append(Disagreement(rule, place, level, passes_there, passes_here))
+    for (rule, place), passes_at_level in outcomes.items():
+        passes_in_flight = flight_outcomes.get((rule, place))
+        if passes_at_level is not None and passes_in_flight is not None and passes_at_level != passes_in_flight:
+            disagreements.append(Disagreement(rule, place, level, passes_at_level, passes_in_flight))
     return tuple(disagreements)

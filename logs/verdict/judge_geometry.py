@@ -1,4 +1,4 @@
-"""Judge without a flight: a route, a flight that never began, or a plan that was not feasible."""
+"""Judge without a flight: a route by its geometry, a flight that never began, or a plan that is not feasible."""
 
 import math
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
 def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
     """Return the findings on mission items that fail or leave the verdict undecided.
 
-    planfly wrote the items of a plan itself, so for a plan only PX4's requirements are checked.
+    The items of a plan were written by planfly, so they are judged only if PX4 is to fly them.
     """
     items_are_judged = setup.plan is None or setup.autopilot.checks.dialect == "px4"
     findings = mission_findings(setup) if items_are_judged else []
@@ -49,23 +49,23 @@ def blocking_item_findings(setup: FlightSetup) -> list[Finding]:
 def geometric_findings(
     requirements: RouteRequirements, flight_findings: Sequence[Finding] | None = None
 ) -> tuple[Finding, ...]:
-    """Return findings on a route's geometry, judged by the aircraft's envelope.
+    """Return the findings on a route's geometry, compared with the aircraft's envelope.
 
-    flight_findings: findings on the route's flight, from which the findings of rules with `Rule.is_same_for_plan` are
-        copied.
+    flight_findings: findings on a flight of the route, from which the findings of rules with `Rule.is_same_for_plan`
+        are copied; None to run these rules.
     """
     return _run_rules(requirements, None, (), geometric=True, flight_findings=flight_findings)
 
 
 def place_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
-    """Return the findings of `geometric_findings` on legs, corners, threats and zones, not on the route as a whole."""
+    """Return only those geometric findings that judge legs, corners, threats and zones, not the route as a whole."""
     return _run_rules(requirements, None, (), geometric=True, includes_whole_flight=False)
 
 
 def track_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[Finding, ...]:
-    """Return the findings on a flown track, checked against its route and the aircraft's envelope.
+    """Return the findings on a flown track, compared with its route and the aircraft's envelope.
 
-    Whether the flight was completed, and how it ended, is not checked here; see `flown_findings`.
+    The end of the flight is not judged here; see `flown_findings`.
     """
     return (*blocking_item_findings(requirements.setup), *_run_rules(requirements, aligned, (), geometric=False))
 
@@ -76,7 +76,7 @@ def flown_findings(
     """Return findings on the track of a flight and on how the flight ended.
 
     end_reason: "completed", or the reason why the flight ended early.
-    log_complete: True if the record has its end.
+    log_complete: True if the log is not cut off.
     """
     end_judges = [rule.judge_end for rule in RULES.values() if rule.judge_end is not None]
     end_findings = tuple(
@@ -97,10 +97,11 @@ def _run_rules(
     includes_whole_flight: bool = True,
     flight_findings: Sequence[Finding] | None = None,
 ) -> tuple[Finding, ...]:
-    """Run all rules and return their findings, followed by `end_findings`, merged.
+    """Run all rules, add `end_findings`, let the rules merge findings, and return the result.
 
     end_findings: findings on how the flight ended.
-    includes_whole_flight: True to include rules that judge the flight as a whole.
+    includes_whole_flight: True to include rules that judge the flight as a whole, and to reduce the findings to the
+        worst of each stop.
     flight_findings: as in `geometric_findings`.
     """
 
@@ -125,15 +126,15 @@ def _run_rules(
     return findings
 
 
-# Rules that judge where the aircraft is, and so depend on the side to which it turns at a course reversal.
-_RULES_OF_PLACE = ("clearance", "threat", "fence")
+# Rules that judge the aircraft's position, which depends on the side to which it turns at a course reversal.
+_POSITION_RULES = ("clearance", "threat", "fence")
 
 
 def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Finding]) -> list[Finding]:
-    """Return undecided findings at places that fail only if a course reversal is turned to one of its two sides.
+    """Return undecided findings at places that fail only if the aircraft turns to one side at a course reversal.
 
-    A flight shows only one side, which depends on the navigation error of that flight: of 12 ArduPlane flights through
-    a turn of 180 degrees, 4 turned left.
+    A flight shows only one side, which depends on its navigation error: of 12 ArduPlane flights through a turn of 180
+    degrees, 4 turned left.  Return [] for an imported flight, and for a route without a course reversal.
     """
     setup = requirements.setup
     corners = reversals(setup.route)
@@ -142,7 +143,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
     failures_by_side = [
         {
             (finding.rule, finding.place): finding
-            for name in _RULES_OF_PLACE
+            for name in _POSITION_RULES
             if (judge := RULES[name].judge) is not None
             for finding in judge(side_requirements, None, geometric=True)
             if finding.ok is False
@@ -163,7 +164,7 @@ def _other_side_findings(requirements: RouteRequirements, findings: Sequence[Fin
 
 
 def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Keep only each rule's worst finding on the corners of a stop, and its worst finding on the legs to the stop.
+    """Return only each rule's worst finding on the corners of a stop, and its worst finding on the legs to the stop.
 
     A stop is a waypoint or a loiter of the mission; a loiter is flown as several corners and legs.
 
@@ -187,9 +188,9 @@ def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
-    """Add ``suggestions`` to failed or undecided findings that a change of the plan could fix.
+    """Return the findings, with ``suggestions`` added to failed or undecided findings that a change could fix.
 
-    Findings on the legs of a return to launch get no suggestions, because the autopilot chooses its path.
+    Findings on the legs of a return to launch get no suggestions, because the autopilot chooses the path of a return.
     """
     results, first_leg = [], requirements.setup.route.rtl_start
     last_leg = min(requirements.legs, requirements.setup.route.rtl_end)
@@ -206,9 +207,9 @@ def with_suggestions(
 def with_passing_suggestions(
     findings: tuple[Finding, ...], trials: Sequence[TriedSuggestions] | None
 ) -> tuple[Finding, ...]:
-    """Drop suggestions of failed findings that did not pass their trials.
+    """Return the findings; failed findings keep only suggestions that passed a trial.
 
-    trials: suggestions that passed; None to keep all suggestions.
+    trials: suggestions that passed their trials; None to keep all suggestions.
 
     >>> from logs.verdict.places import Change, Place
     >>> higher = ((Change("height", Place("leg", 2), None, 12.0, "m"),),)
@@ -289,7 +290,7 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
     """Judge a flight without rows by its route's geometry; the verdict is never complete.
 
     end_reason: reason why nothing was flown.
-    log_complete: True if the record has its end.
+    log_complete: True if the log is not cut off.
 
     >>> from logs.recording.example_log import example_log
     >>> verdict = judge_unflown(route_requirements(example_log().setup), "not started: no progress against the wind")
@@ -373,7 +374,7 @@ def _infeasible_finding(plan: Plan) -> Finding:
 
 
 def _plan_lines(findings: list[Finding], plan: Plan, conditions: Conditions | None) -> tuple[str, ...]:
-    """Write the summary lines of a run without a feasible plan."""
+    """Return the summary lines of a run without a feasible plan, the headline first."""
     failed = [finding for finding in findings if finding.ok is False and finding.rule != "completion"]
     headline_text, further_lines = headline(findings, False), []
     if failed:

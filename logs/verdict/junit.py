@@ -1,4 +1,4 @@
-"""Write a verdict as JUnit XML for continuous integration, with a case for each finding and for the answer."""
+"""Write verdicts as JUnit XML for continuous integration, with a test case for each finding and for the answer."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -10,11 +10,12 @@ from logs.verdict.rule_words import rule_word
 
 
 def junit_text(verdicts: Mapping[str, Presentation]) -> str:
-    """Return the text of the file, with a test suite for each verdict.
+    """Return the text of a JUnit file with a test suite for each verdict.
 
-    verdicts: by name of the judged plan or flight.  A finding that fails is a failure, and one that was not judged
-    is skipped.  The case ``verdict`` fails if the answer is not "flyable", even if nothing failed but a part was not
-    judged.
+    verdicts: verdicts by name of the judged plan or flight.
+
+    A failed finding is a failure, and an unjudged finding is skipped.  The test case ``verdict`` fails if the answer is
+    not "flyable", also if nothing failed but a part was not judged.
 
     `logs.verdict.verdict.Verdict.to_junit` writes one verdict.
     """
@@ -39,9 +40,10 @@ def junit_text(verdicts: Mapping[str, Presentation]) -> str:
 
 
 def junit_error_text(name: str, message: str) -> str:
-    """Write the text of the file for a plan or a flight that could not be judged: one case, an error.
+    """Return the text of a JUnit file for a plan or a flight that could not be judged: one test case, an error.
 
-    name: name of the plan or flight.  message: the reason in one line.
+    name: name of the plan or flight.
+    message: reason in one line.
     """
     root = ElementTree.Element("testsuites")
     suite = ElementTree.SubElement(
@@ -53,7 +55,7 @@ def junit_error_text(name: str, message: str) -> str:
 
 
 def _document_text(root: ElementTree.Element) -> str:
-    """Return the XML text of a document, indented."""
+    """Return the indented XML text of a document."""
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -67,7 +69,7 @@ def _answer_case(verdict: Presentation) -> ElementTree.Element:
 
 
 def _finding_cases(findings: tuple[Finding, ...]) -> list[ElementTree.Element]:
-    """Make a test case for each finding: failed, skipped if it was not judged, or passed."""
+    """Make a test case with a unique name for each finding: failed, skipped if it was not judged, or passed."""
     counts: Counter[tuple[str, str]] = Counter()
     cases = []
     for finding in findings:

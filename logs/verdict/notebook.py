@@ -1,4 +1,4 @@
-"""A verdict as a small table for a notebook."""
+"""Show a verdict as a small table in a notebook."""
 
 from logs.verdict.presentation import Presentation
 from world.html_table import html_table

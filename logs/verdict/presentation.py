@@ -1,7 +1,7 @@
-"""Present a verdict in the order in which it is shown: by rule, failed findings first, and undecided findings.
+"""Define a verdict in the order in which it is shown: findings by rule, failed findings first, undecided findings.
 
 Terminal, report page, notebook, studio and JUnit read a `Presentation`, which `logs.verdict.verdict.Verdict.present`
-makes.  It holds data; `logs.verdict.wording` makes words of places and suggestions.
+makes.  A presentation holds data; `logs.verdict.wording` phrases places and suggestions.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ from logs.verdict.rule_words import RULE_WORDS, RuleWords
 
 @dataclass(frozen=True, slots=True)
 class RuleFindings:
-    """The findings of one rule, in the verdict's order."""
+    """Findings of one rule, in the verdict's order."""
 
     words: RuleWords
     findings: tuple[Finding, ...]
@@ -39,17 +39,19 @@ class RuleFindings:
 
     @property
     def count_text(self) -> str:
-        """Text with the number of findings that pass out of those that were judged."""
+        """Text such as "3 of 4 ok": the number of findings that pass, and the number that were judged."""
         return f"{self.judged - len(self.failed)} of {self.judged} ok" if self.judged else "not judged"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Presentation:
-    """A verdict as it is shown to readers.
+    """Verdict as it is shown to readers.
 
-    headline: the answer in a line.  details: the other lines of the summary.
+    headline: the answer in one line.
+    details: the other lines of the summary.
     state: "ok", "open" (nothing failed, and a part was not judged) or "fail".
-    findings: in the verdict's order.  rules: the findings by rule, in the order of `RULE_WORDS`.
+    findings: all findings, in the verdict's order.
+    rules: the findings by rule, in the order of `RULE_WORDS`.
     zones: number of airspace zones that apply to the verdict.
     """
 
@@ -62,7 +64,7 @@ class Presentation:
 
     @property
     def failed_rules(self) -> tuple[RuleFindings, ...]:
-        """The rules with failed findings, in the order of the headline."""
+        """The rules with failed findings, the most urgent first, as in the headline."""
         failed = [rule for rule in self.rules if rule.failed]
         return tuple(sorted(failed, key=lambda rule: -rule.words.urgency))
 
@@ -72,7 +74,9 @@ class Presentation:
         return undecided_findings(self.findings)
 
     def worth_listing(self, max_open: int) -> list[tuple[int, Finding]]:
-        """List failed and undecided findings, then each rule's closest finding to its limit, each with its number.
+        """Return the findings to show in a short list, each with its index in `findings`.
+
+        These are failed and undecided findings, then for each rule the passed finding closest to its limit.
 
         max_open: maximum number of failed and undecided findings.
         """

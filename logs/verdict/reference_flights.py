@@ -1,6 +1,7 @@
-"""Write and read the answers of reference flights as text, an attachment of a recorded flight's log.
+"""Write and read the answers of reference flights as an attachment of a flight's log.
 
-A log's verdict is computed again from its rows.  Reference flights are not in those rows, so their answers are stored.
+The verdict on a log is computed again from the log's rows.  Reference flights are not in those rows, so their answers
+are stored.
 """
 
 import json
@@ -22,7 +23,7 @@ REFERENCE_SCHEMA: Final = "planfly.beside/1"
 
 @dataclass(frozen=True, slots=True)
 class _ReferenceFile(DocumentConfig):
-    """Content of the attachment."""
+    """Content of the attachment in JSON."""
 
     airframe: AirframeAnswer | None
     deciding: DecidingParameter | None
@@ -37,7 +38,7 @@ def _file_reader() -> TypeAdapter[_ReferenceFile]:
 
 
 def reference_flights_json(reference: ReferenceFlights) -> str:
-    """Write the answers as text.
+    """Return the answers of reference flights as the JSON text of the attachment.
 
     >>> reference = ReferenceFlights(AirframeAnswer(True, "flyable"))
     >>> parse_reference_flights(reference_flights_json(reference), "a.mcap") == reference
@@ -47,7 +48,11 @@ def reference_flights_json(reference: ReferenceFlights) -> str:
 
 
 def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
-    """Read the answers from a text.  Raises LogError, in one line, for an invalid text; source names it.
+    """Read the answers of reference flights from the JSON text of the attachment.
+
+    source: name of the log for messages.
+
+    Raises LogError for an invalid text and for an unknown rule.
 
     >>> parse_reference_flights('{"schema": "planfly.beside/1", "airframe": null, "deciding": null}', "a.mcap")
     ReferenceFlights(airframe=None, deciding=None, tried=None)

@@ -28,15 +28,15 @@ class Judge(Protocol):
         """Return the rule's findings, in the order of the route."""
 
 
-# Judges only a mission's items, for any autopilot.
+# Function that judges only a mission's items, for any autopilot.
 ItemsJudge = Callable[[FlightSetup], list[Finding]]
-# Judges how a flight ended and whether its record is complete.
+# Function that judges how a flight ended (reason for its end) and whether its log is complete.
 EndJudge = Callable[[RouteRequirements, AlignedTrack | None, str, bool], list[Finding]]
-# Judges all stretches of an imported flight together, and whether planfly's own log of the flight is complete.
+# Function that judges all stretches of an imported flight together, and whether planfly's own log is complete.
 ImportedEndJudge = Callable[[FlightSetup, Sequence[FlownLegs], bool], Finding]
-# Replaces findings of other rules with the rule's own, after all rules have judged.
+# Function that replaces findings of other rules with findings of its own rule, after all rules have judged.
 Merge = Callable[[RouteRequirements, AlignedTrack | None, Sequence[Finding]], tuple[Finding, ...]]
-# Suggests changes that would make a failed finding pass, the smallest change first.
+# Function that suggests changes that would make a failed finding pass, the smallest change first.
 Suggest = Callable[[RouteRequirements, AlignedTrack | None, Finding], tuple[Suggestion, ...]]
 
 
@@ -45,11 +45,11 @@ class LogNeeds:
     """Data that an imported log needs for a rule to judge it, in addition to times and positions.
 
     quantities: quantities without which the rule is not judged.
-    needs_planned_heights: the plan states altitudes.
-    needs_aircraft: the aircraft is known, unless the scenario sets the limit.
-    needs_full_leg: the leg was flown to its end; otherwise only failures are reported.
-    needs_no_gap: the log has no gap at the waypoint; a leg with a gap is never passed.
-    reports_missing: reported as not judged if the rule finds nothing because `quantities` are missing.
+    needs_planned_heights: True if the plan must state altitudes.
+    needs_aircraft: True if the aircraft must be known, unless the scenario sets the limit.
+    needs_full_leg: True if the leg must be flown to its end; otherwise only failures are reported.
+    needs_no_gap: True if the log must have no gap at the waypoint.  A leg with a gap never passes, whatever the rule.
+    reports_missing: True if the rule is reported as not judged if it finds nothing because `quantities` are missing.
     """
 
     quantities: tuple[Quantity, ...] = ()
@@ -62,18 +62,20 @@ class LogNeeds:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
-    """A rule of the verdict.
+    """Rule of the verdict.
 
-    name: name of its words in `logs.verdict.rule_words.RULE_WORDS`.
+    name: name of the rule's words in `logs.verdict.rule_words.RULE_WORDS`.
     tolerances: names of the constants in `logs.verdict.tolerances` that the rule and its measures use.
 
     Judging functions, each None if the rule has none:
-    judge: planned path and flown track.  judge_items, judge_end, judge_imported_end, merge: see their types.
-    An imported flight is judged by `judge`, stretch by stretch, as far as the log meets ``log``.
-    suggest: suggests changes that make a failed finding pass.
-    judges_whole_flight: True if it judges the flight as a whole, not a leg, a corner, a threat or a zone.
-    is_same_for_plan: True if it gives the same result for a flight as for its planned path, so that it runs once for
-        both.
+    judge: judges the planned path and the flown track, and an imported flight stretch by stretch, as far as the log
+        meets ``log``.
+    judge_items, judge_end, judge_imported_end, merge, suggest: see their types.
+
+    log: data that the rule needs from an imported log.
+    judges_whole_flight: True if the rule judges the flight as a whole, not a leg, a corner, a threat or a zone.
+    is_same_for_plan: True if the rule gives the same result for a flight as for its planned path, so that it runs once
+        for both.
     """
 
     name: str

@@ -21,12 +21,12 @@ from logs.verdict.headline_phrases import (
 
 @dataclass(frozen=True, slots=True)
 class Margin:
-    """The quantity whose distance to the limit is a rule's margin, and the scale that ranks flights by it.
+    """Quantity whose distance from the limit is a rule's margin, and the scale by which flights are ranked.
 
     quantity: name of the quantity that is compared with the limit.
-    unit: unit of quantity, limit and margin.
-    scale: a difference that a person would call noticeable, in that unit.  It ranks flights and marks a narrow pass,
-    but decides no verdict.  None for a count, a time or a limit of geometry, which do not say how close a flight was.
+    unit: unit of the quantity, the limit and the margin.
+    scale: difference that a person would call noticeable, in this unit.  It ranks flights and marks a narrow pass, but
+        decides no verdict.  None for a count, a time or a geometric limit, which do not show how close a flight was.
     """
 
     quantity: str
@@ -36,16 +36,17 @@ class Margin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RuleWords:
-    """The texts of a rule.
+    """Texts of a rule.
 
     name: name in findings, in file formats, and in the columns of a campaign's table.
-    title: heading of the rule's findings in tables.  noun: name of the rule within a sentence; "" to use `name`.
-    question: the question that the rule answers, one sentence.
-    margin: None for a rule without a number of its own.
+    title: heading of the rule's findings in tables.
+    noun: name of the rule within a sentence; "" to use `name`.
+    question: question that the rule answers, one sentence.
+    margin: quantity of the rule's margin; None for a rule without a number of its own.
     urgency: a headline names failures of a greater urgency first.
-    phrase: makes the phrase of a failed finding in a headline.
-    unjudged: names what was not judged in the headline of a flyable verdict; "" to omit it.
-    unjudged_unit: the unit, in the singular, in which the headline counts findings that were not judged.
+    phrase: function that makes the phrase of a failed finding in a headline.
+    unjudged: name of the unjudged part in the headline of a flyable verdict; "" to omit it.
+    unjudged_unit: noun, in the singular, with which the headline counts findings that were not judged.
     explains_unjudged: True if the summary states why the rule was not judged.
     is_warning: True if the rule's findings are warnings, which decide no verdict.
     """

@@ -1,7 +1,8 @@
-"""Suggest the smallest change that makes a finding pass: gentler slope, longer leg, lower speed.
+"""Suggest the smallest changes that make a finding pass, such as a gentler slope, a longer leg or a lower airspeed.
 
-Each function takes the route's requirements, the aligned track (None if nothing was flown) and the failed finding; a
-rule names the function that suggests for it.  All suggestions are alternatives, the smallest relative change first.
+Each public function takes the route's requirements, the aligned track (None if nothing was flown) and the failed
+finding; each `Rule` names the function that suggests changes for its findings.  The suggestions are alternatives, the
+smallest relative change first; the tuple is empty if no change helps.
 """
 
 import math
@@ -46,9 +47,9 @@ from world.kernels import Records
 from world.terrain import Terrain
 
 # ----------------------------------------------------------------------
-# The side on which a path should pass a zone: the smallest shift of its legs that ends the violation.
+# Shift of a path past a zone: the smallest shift of its legs that ends the violation.
 
-# Horizontal shifts of a path: their name, the coordinate, and its sign.
+# Horizontal shifts of a path: name, coordinate, and sign of the shift.
 _HORIZONTAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (
     ("north", "north", 1.0),
     ("east", "east", 1.0),
@@ -62,12 +63,12 @@ _VERTICAL_SHIFTS: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.
 def suggest_passing_zone(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a zone further to one side, higher or lower, with the smallest change first.
+    """Suggest passing a zone further to one side, or higher or lower; the smallest change first.
 
     finding: the finding on the violated zone.
 
-    If the planned path violates the zone, its violating legs are shifted, by the flight's extra depth as well.  If only
-    the flight violates the zone, the violating legs of the flight are shifted.
+    If the planned path violates the zone, its violating legs are shifted, by the additional depth of the flight, too.
+    If only the flight violates the zone, the violating legs of the flight are shifted.
     """
     zone_index, facts = finding.place.index, {fact.what: fact.value for fact in finding.facts}
     if zone_index is None or "entry leg" not in facts:
@@ -125,16 +126,16 @@ def _smallest_shift(
     return None
 
 
-# A suggestion with the relative size of its change.
-_Sized = tuple[float, Suggestion]
+# Relative size of a change, and the suggestion.
+_SizedSuggestion = tuple[float, Suggestion]
 
 
 # Largest suggested relative change: ten times the planned value is no advice (a leg of 84 km instead of 326 m).
 _MAX_RELATIVE_CHANGE = 9.0
 
 
-def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
-    """Sort alternatives by the relative size of their changes, and drop changes that are too large."""
+def _smallest_first(alternatives: list[_SizedSuggestion]) -> tuple[Suggestion, ...]:
+    """Return alternatives sorted by the relative size of their changes, without changes that are too large."""
     helpful = [sized for sized in alternatives if sized[0] <= _MAX_RELATIVE_CHANGE]
     return tuple(suggestion for _, suggestion in sorted(helpful, key=lambda sized: sized[0]))
 
@@ -142,10 +143,10 @@ def _smallest_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
 def suggest_gentler_slope(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a gentler slope, a longer leg or another speed for one leg; the smallest relative change first.
+    """Suggest a gentler slope, a longer leg or another airspeed for one leg; the smallest relative change first.
 
-    If the aircraft is not known well enough, suggest a flight that measures its ability; for a guessed climb, suggest
-    to state it first.
+    If the aircraft is not known well enough, suggest a flight that measures its ability; if its climb performance is
+    only guessed, first suggest that the user state it.
     """
     leg = finding.place.index
     if leg is None:
@@ -169,7 +170,7 @@ def suggest_gentler_slope(
         return _gentler_arc(requirements, leg)
     place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     gentler_height_change, longer_length = leg_length * math.tan(max_slope), height_change / math.tan(max_slope)
-    alternatives: list[_Sized] = []
+    alternatives: list[_SizedSuggestion] = []
     if gentler_height_change >= MIN_SUGGESTED_RISE_M:
         change = Change("rise", place, sign * height_change, sign * math.floor(gentler_height_change), "m")
         alternatives.append((1.0 - gentler_height_change / height_change, (change,)))
@@ -181,14 +182,14 @@ def suggest_gentler_slope(
         alternatives.append(
             (abs(speed - current_speed) / current_speed, (Change("airspeed", place, current_speed, speed, "m/s"),))
         )
-    # A leg that goes straight up has no length to compare with.
+    # A vertical leg has no length to compare with.
     relative_growth = longer_length / leg_length - 1.0 if leg_length >= MIN_LEG_LENGTH_M else _MAX_RELATIVE_CHANGE
     alternatives.append((relative_growth, (Change("length", place, leg_length, float(math.ceil(longer_length)), "m"),)))
     return _smallest_first(alternatives)
 
 
 def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
-    """Suggest gentler legs before and after a fly-by arc that is too steep."""
+    """Suggest gentler legs before and after a fly-by arc at a leg's end; return () if the arc is not too steep."""
     arc = steep_arc(requirements, leg)
     if arc is None:
         return ()
@@ -206,7 +207,7 @@ def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion,
 def suggest_gentler_turn(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a gentler turn, longer legs or a lower speed; the smallest relative change first."""
+    """Suggest a gentler turn, longer legs or a lower airspeed; the smallest relative change first."""
     corner = finding.place.index
     if corner is None:
         return ()
@@ -215,7 +216,7 @@ def suggest_gentler_turn(
     if planned_turn <= limit or limit <= SUGGESTION_ANGLE_MARGIN_RAD:
         return ()
     place, max_turn = requirements.waypoint(corner), limit - SUGGESTION_ANGLE_MARGIN_RAD
-    alternatives: list[_Sized] = []
+    alternatives: list[_SizedSuggestion] = []
     if source == "aircraft" and math.isfinite(requirements.length_before[corner]):
         speed = _turn_speed(requirements, corner)
         if speed is not None:
@@ -231,8 +232,8 @@ def suggest_gentler_turn(
     return _smallest_first(alternatives)
 
 
-def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_Sized]:
-    """Suggest longer legs at a waypoint that fit its turn and the neighbouring turns; return [] if all turns fit."""
+def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_SizedSuggestion]:
+    """Suggest longer legs at a corner, long enough for its turn and the neighbouring turns; return [] if all fit."""
     needed_before = (
         requirements.length_before[corner]
         + requirements.length_after[corner - 1]
@@ -256,7 +257,7 @@ def _longer_legs(requirements: RouteRequirements, corner: int) -> list[_Sized]:
 
 
 def _gentler_turn(requirements: RouteRequirements, corner: int, max_turn: float) -> float:
-    """Return the largest passing turn up to ``max_turn`` (rad), in degrees in steps of 0.1; 0 if none passes.
+    """Return the largest turn up to ``max_turn`` (rad) that passes at a corner, deg, in steps of 0.1; 0 if none passes.
 
     The route after the waypoint is rotated with the turn.  In wind the next turns change with their courses, and so
     does the length available to this turn.
@@ -295,13 +296,15 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
     return float(requirements.route.airspeed[leg] / requirements.setup.demanded_route.airspeed[leg])
 
 
-def _level_speeds(requirements: RouteRequirements, amsl: float, current_speed: float, factor: float) -> list[float]:
-    """Return the airspeeds to command for level flight at an altitude, m/s, the nearest to ``current_speed`` first.
+def _level_speeds(requirements: RouteRequirements, altitude: float, current_speed: float, factor: float) -> list[float]:
+    """Return the airspeeds to command for level flight at an altitude (m AMSL), m/s, in steps of 0.5 m/s.
+
+    The airspeed nearest to ``current_speed`` comes first.
 
     factor: ratio of true airspeed to commanded airspeed.
     """
     envelope = requirements.setup.envelope
-    min_speed, max_speed = envelope.level_speeds(amsl)
+    min_speed, max_speed = envelope.level_speeds(altitude)
     min_speed, max_speed = (
         max(min_speed * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0])),
         min(max_speed, float(envelope.airspeed[-1])),
@@ -317,7 +320,10 @@ def _level_speeds(requirements: RouteRequirements, amsl: float, current_speed: f
 
 
 def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
-    """Return the airspeed nearest to the command at which the aircraft holds a leg's slope, or None."""
+    """Return the commanded airspeed nearest to the current one at which the aircraft holds a leg's slope, m/s, or None.
+
+    slope: absolute value of the slope, rad.
+    """
     course, direction = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     factor = _true_airspeed_ratio(requirements, leg)
@@ -332,7 +338,7 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
 
 
 def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
-    """Return the maximum airspeed below the command at which a waypoint's turn fits its legs, or None."""
+    """Return the highest commanded airspeed, below the current one, at which a turn fits its legs, m/s, or None."""
     current_speed = float(max(requirements.setup.demanded_route.airspeed[corner - 1 : corner + 1]))
     available_length = min(
         available_lengths(
@@ -357,15 +363,15 @@ def _turn_speed(requirements: RouteRequirements, corner: int) -> float | None:
     return first_that_passes(sorted(slower_speeds, reverse=True), does_turn_fit)
 
 
-def _whole_metres(metres: float) -> float:
-    """Round a length to whole metres for a suggestion."""
-    return float(round(metres))
+def _round_to_meter(length: float) -> float:
+    """Round a length (m) to a whole meter for a suggestion."""
+    return float(round(length))
 
 
 def suggest_wider_berth(
     requirements: RouteRequirements, aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest passing a missile's sphere further away."""
+    """Suggest passing a missile at a greater distance, outside its sphere."""
     missile = finding.place.index
     if missile is None or finding.place.kind != "missile":
         return ()
@@ -375,7 +381,7 @@ def suggest_wider_berth(
     min_distance = path_spheres(requirements.path.points, requirements.path.times, *spheres).closest[0]
     if aligned is not None and len(aligned.track) > 1:
         min_distance = min(min_distance, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
-    extra_distance = _whole_metres(threats.kill_radius[missile] - min_distance + SUGGESTION_LENGTH_MARGIN_M)
+    extra_distance = _round_to_meter(threats.kill_radius[missile] - min_distance + SUGGESTION_LENGTH_MARGIN_M)
     return ((Change("distance", finding.place, None, extra_distance, "m"),),)
 
 
@@ -390,7 +396,7 @@ def suggest_flying_higher(
         # A flight that ended early did not reach the lowest point.
         shortfall = max(shortfall, finding.limit - finding.planned + SUGGESTION_LENGTH_MARGIN_M)
     return (
-        ((Change("height", finding.place, None, _whole_metres(shortfall), "m"),),)
+        ((Change("height", finding.place, None, _round_to_meter(shortfall), "m"),),)
         if shortfall > SUGGESTION_LENGTH_MARGIN_M
         else ()
     )
@@ -399,27 +405,27 @@ def suggest_flying_higher(
 def suggest_flying_lower(
     _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest flying a leg lower above the ground."""
+    """Suggest flying a leg lower, below the maximum height above ground."""
     heights = [height for height in (finding.planned, finding.flown) if height is not None]
     if finding.place.kind != "leg" or finding.limit is None or not heights or not max(heights) > finding.limit:
         return ()
-    excess = _whole_metres(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
+    excess = _round_to_meter(max(heights) - finding.limit + SUGGESTION_LENGTH_MARGIN_M)
     return ((Change("descent", finding.place, None, excess, "m"),),)
 
 
 def suggest_staying_inside(
     _requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest bringing the path further inside the area."""
+    """Suggest moving the path further inside the area."""
     if finding.margin is None or not finding.margin < 0.0:
         return ()
-    return ((Change("inset", FLIGHT, None, _whole_metres(-finding.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
+    return ((Change("inset", FLIGHT, None, _round_to_meter(-finding.margin + SUGGESTION_LENGTH_MARGIN_M), "m"),),)
 
 
 def suggest_using_less_energy(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, finding: Finding
 ) -> tuple[Suggestion, ...]:
-    """Suggest a shorter flight, or a larger battery or tank."""
+    """Suggest a shorter flight, or a battery or tank with more energy."""
     energy = finding.planned if finding.flown is None else finding.flown
     if energy is None or finding.limit is None or finding.margin is None or energy <= finding.limit:
         return ()

@@ -1,4 +1,4 @@
-"""Write the summary of a verdict: the headline, and the lines that a reader needs with it."""
+"""Write the summary of a verdict: the headline, and the lines that explain it."""
 
 import math
 from collections.abc import Sequence
@@ -30,9 +30,10 @@ _LEVEL_TITLES = {
 
 
 def headline(findings: Sequence[Finding], flyable: bool, source: str = "") -> str:
-    """Write the first line: the answer, with the failed, unjudged or narrowly passed findings.
+    """Return the first line of a verdict: the answer, with the failed, unjudged or narrowly passed findings.
 
-    source: the source of the aircraft's model, if the model is uncertain.
+    flyable: True if the verdict is flyable.
+    source: source of the aircraft's model, if the model is uncertain, otherwise "".
     """
     source_notes = [f"an aircraft from {source}"] if source else []
     if flyable:
@@ -130,7 +131,7 @@ def _failed_by_urgency(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def _unjudged_text(findings: Sequence[Finding], rule: RuleWords) -> str:
-    """Describe which findings of a rule were not judged; return "" if all were judged."""
+    """Describe the number of a rule's findings that were not judged; return "" if all were judged."""
     rule_findings = [finding for finding in findings if finding.rule == rule.name]
     unjudged_count = sum(finding.ok is None for finding in rule_findings)
     if not unjudged_count:
@@ -151,7 +152,7 @@ def _near_miss_notes(findings: Sequence[Finding]) -> list[str]:
 
 
 def _altitude_notes(findings: Sequence[Finding]) -> list[str]:
-    """Name the waypoint with the largest height error, if that error is notable, and count the others."""
+    """Return a note on the waypoint with the largest altitude error, if the error is notable; otherwise []."""
     errors = [
         (fact.value, finding.place)
         for finding in findings
@@ -179,7 +180,7 @@ def _headline_findings(failed: list[Finding]) -> list[Finding]:
 
 
 def _headline_phrase(finding: Finding) -> str:
-    """Describe a failed finding in a few words."""
+    """Return the headline's phrase for a failed finding."""
     rule = RULE_WORDS[finding.rule]
     return rule.phrase(rule.word, finding)
 
@@ -192,7 +193,7 @@ def summary_lines(
     conditions: Conditions,
     deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Write the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings, levels.
+    """Return the lines of the summary: answer, start, conditions, autopilot, unjudged rules, warnings, levels.
 
     levels: answers of all levels; the last one is the verdict's own answer, whose headline is the first line.
     """
@@ -209,7 +210,7 @@ def summary_lines(
     lines += [f"Not judged: {RULE_WORDS[rule].title} ({reason})" for rule, reason in reasons.items()]
     if reason := unjudged_return_text(setup):
         lines.append(f"Not judged: {RULE_WORDS['return'].title} ({reason})")
-    # These limits are the autopilot's, and do not limit the aircraft.
+    # These are limits of PX4 and not of the aircraft, so they decide nothing for another autopilot.
     lines += [
         f"PX4 would reject the mission: {finding.reason}"
         for finding in findings
@@ -240,23 +241,28 @@ def summary_lines(
 def _airframe_or_autopilot_lines(
     levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, setup: FlightSetup
 ) -> list[str]:
-    """If the airframe can fly the mission but the autopilot cannot, say so and name the parameter that decides."""
+    """Return a line if the airframe can fly the mission but the autopilot cannot, otherwise [].
+
+    The line names the parameter that decides, if it is known.
+    """
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe") or levels[-1].undecided:
         return []
     parameters_note = "" if setup.autopilot.parameters is None else " with these parameters"
     # Other parameter values are always tried with the simulated control law, even if the autopilot's program flew.
-    by_law = setup.autopilot.program is not None
-    reason = "" if by_law or not parameters_note else ": the flight fails with every parameter value that was tried"
+    flew_program = setup.autopilot.program is not None
+    reason = (
+        "" if flew_program or not parameters_note else ": the flight fails with every parameter value that was tried"
+    )
     if deciding is not None:
-        reason = f": {deciding_text(deciding)}{', by the simulated flight' if by_law else ''}"
+        reason = f": {deciding_text(deciding)}{', by the simulated flight' if flew_program else ''}"
     return [f"The aircraft can fly this mission, but {setup.autopilot.title}{parameters_note} cannot{reason}"]
 
 
 def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
-    """Describe the sources of the parameters, and names in the parameter file that have no effect.
+    """Return lines on the sources of the parameters, on names without an effect, and on contradictions.
 
-    Return [] without a parameter file.  Without a flight, only faults of the file are described.
+    Return [] without a parameter file.  Without a flight, the sources are only described if the file has a fault.
     """
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
@@ -265,7 +271,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
         return misfits
     counts = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
-    # A name that is too long is a mistake in the file, and the others belong to other hardware.
+    # A name that is too long is a mistake in the file; other unused names belong to other hardware.
     unused_by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
     unused_names = [
         name if len(name) <= LONGEST_NAME else f"{name} (longer than {LONGEST_NAME} characters)"
@@ -290,7 +296,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
 
 
 def _ignored_settings_lines(setup: FlightSetup) -> list[str]:
-    """Name the settings of the scenario's [returns] for which the autopilot has no parameter."""
+    """Return a line if the scenario states rtl_autoland but the autopilot has no such parameter, otherwise []."""
     rtl_settings, parameters = setup.scenario.returns, setup.autopilot.parameters
     if (
         rtl_settings is None

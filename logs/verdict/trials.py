@@ -1,7 +1,4 @@
-"""Search candidate changes for one that passes a trial: a flight, a simulated return, or a computation.
-
-Code that searches for remedies uses these two functions.
-"""
+"""Search candidate changes for one that passes a trial, which may be a flight, a simulated return or a computation."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import TypeVar

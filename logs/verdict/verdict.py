@@ -1,4 +1,4 @@
-"""Define the verdict: findings, and the answers to whether the plan is flyable and was flown to its end."""
+"""Define the verdict: the findings, whether the plan is flyable, and whether it was flown to its end."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -24,26 +24,29 @@ from world.extras import require_extra
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Verdict:
-    """The answer to the question whether a plan can really be flown, with a finding for every rule and place.
+    """Answer to the question whether a plan can really be flown, with a finding for every rule and place.
 
-    flyable: complete, and no finding failed.
-    complete: the plan was feasible, flown to its end, and recorded in full (at the geometric level: feasible, or a
-    mission that a person brought).
+    findings: findings of all rules, in the order in which they are listed.
+    flyable: True if the verdict is complete and no finding failed.
+    complete: True if the plan was feasible, flown to its end, and recorded in full (at the geometric level: if the plan
+    was feasible, or if a person brought the mission).
     lines: the summary for a person; its first line, the headline, answers the question.
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).
-    levels: the answers of the judged levels, geometry first, the verdict's own last; empty for a plan that was
+    levels: the answers of the judged levels, geometry first, the verdict's own answer last; empty for a plan that was
     not flown.
-    deciding: the autopilot's parameter that decides, if the flight fails by one parameter and the aircraft passes.
-    notes: items that are not flown as the mission states them; the lines name them too.
-    leg_ends: times (s) at which the flight passed each waypoint between its ends, inf from the first waypoint that it
-    did not reach; empty if too little was recorded.
+    deciding: the autopilot parameter that decides, if the airframe passes and the flight fails because of one
+    parameter.
+    notes: items that are not flown as the mission states them; the lines name them, too.
+    leg_ends: times (s) at which the flight passed each waypoint between the first and the last, inf from the first
+    waypoint that it did not reach; empty if too little was recorded.
     program: the SITL program that flew, or None.
     parameters: the parameters of the autopilot that flew, or None.
-    unjudged: the part that was not judged, for which the flight is not flyable although nothing failed, or "": items
-    that the log of an imported flight lacks, its end, or slopes that the aircraft is not known well enough for.
+    unjudged: text on the part that was not judged, because of which the verdict is undecided although nothing failed,
+    such as mission items that are missing in an imported log, or slopes near the limit of an uncertain aircraft; "" if
+    there is none.
     imported: True for a flight logged by another program; its answer is "flown as planned" or "not flown as planned".
-    conditions: aircraft, speed, weather, navigation, autopilot and ground of the verdict; the lines name them too.
+    conditions: aircraft, speed, weather, navigation, autopilot and ground of the verdict; the lines name them, too.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -81,7 +84,7 @@ class Verdict:
 
     @property
     def state(self) -> str:
-        """The answer for colours: "ok", "open" (nothing failed, and a part was not judged) or "fail"."""
+        """Answer by which a display chooses colors: "ok", "open" (nothing failed, a part was not judged) or "fail"."""
         return "ok" if self.flyable else "open" if self.undecided else "fail"
 
     @property
@@ -91,7 +94,7 @@ class Verdict:
 
     @property
     def flies(self) -> bool:
-        """True if the flight is flyable, except that departure, approach or returns may be undecided.
+        """True if the verdict is flyable, or complete and undecided only on departure, approach or returns.
 
         >>> from dataclasses import replace
         >>> from logs.verdict.findings import GROUND_PATH, make_finding
@@ -116,12 +119,12 @@ class Verdict:
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """The findings that fail."""
+        """The findings that failed."""
         return tuple(finding for finding in self.findings if finding.ok is False)
 
     @property
     def closest(self) -> dict[str, Finding]:
-        """By rule, the failed finding furthest beyond its limit, or else the finding closest to its limit.
+        """For each rule, the failed finding furthest beyond its limit, or else the finding closest to its limit.
 
         Rules without a finding that failed or was judged by a number are left out.
 
@@ -139,7 +142,7 @@ class Verdict:
         """Return a `pandas.DataFrame` with a row for each finding, in the verdict's order, and NaN for missing numbers.
 
         Columns: rule, place and index (of the leg, turn or threat), then as in `Finding`: planned, flown, limit,
-        tolerance, margin, unit, limit_source, method, ok (None where it was not judged) and reason.
+        tolerance, margin, unit, limit_source, method, ok (None if not judged) and reason.
         Raises `planfly.MissingExtraError`, which is an ImportError, without the extra ``planfly[tables]``.
         """
         require_extra("tables", "to_pandas() needs")

@@ -135,7 +135,7 @@ class ReturnsResult:
     @property
     def notes(self) -> tuple[str, ...]:
         """Notes on how the returns were flown."""
-        notes = ["by the simulated ArduPlane on a point mass, in the mean wind"]
+        notes = ["by the simulated ArduPlane flying a point-mass model, in the mean wind"]
         if self.returns.jsbsim_differences:
             max_difference = max(abs(difference) for difference in self.returns.jsbsim_differences)
             notes.append(

@@ -317,7 +317,9 @@ class _StoredFlights:
             if self._requests.get(request.number, request) != request:
                 path = self._store.path
                 raise StoreError(
-                    f"{path}: flight {request.number} is not the flight that this search would request", file=path
+                    f"{path}: flight {request.number} belongs to a search with other settings, so this search cannot"
+                    " continue with this table",
+                    file=path,
                 )
         return [request for request in requests if request.number not in self.flown]
 

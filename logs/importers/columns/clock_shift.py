@@ -1,4 +1,4 @@
-"""Find the offset between two clocks from a pair of signals that move together."""
+"""Find the offset between two clocks from two signals that vary together."""
 
 from typing import NamedTuple
 
@@ -19,19 +19,19 @@ _MIN_OVERLAP_FRACTION = 0.5
 
 
 class ClockShift(NamedTuple):
-    """Seconds to add to the clock of the first signal, and the correlation of both signals after it."""
+    """Shift to add to the times of the first signal, s, and the correlation of both signals after the shift."""
 
     shift: float
     correlation: float
 
 
 def find_clock_shift(
-    time: Floats, values: Floats, other_time: Floats, other_values: Floats, within: float
+    time: Floats, values: Floats, other_time: Floats, other_values: Floats, max_shift: float
 ) -> ClockShift:
-    """Return the shift of the first signal, at most ``within`` seconds, that correlates it best with the other signal.
+    """Return the shift of the first signal, at most ``max_shift`` (s), with the best correlation of both signals.
 
     The signals are linearly interpolated.  The correlation is 0 if the signals have too little time in common or do
-    not move.
+    not vary.
 
     >>> time = np.arange(0.0, 100.0, 0.1)
     >>> chirp = np.sin(0.02 * time**2)
@@ -43,17 +43,18 @@ def find_clock_shift(
     grid = np.arange(other_time[0], other_time[-1], _GRID_STEP_S)
     other = np.interp(grid, other_time, other_values)
     best = ClockShift(0.0, 0.0)
-    for step, reach in ((_COARSE_STEP_S, within), (_FINE_STEP_S, _COARSE_STEP_S)):
+    for step, reach in ((_COARSE_STEP_S, max_shift), (_FINE_STEP_S, _COARSE_STEP_S)):
         for shift in (best.shift + np.arange(-reach, reach + 0.5 * step, step)).tolist():
-            begin, end = np.searchsorted(grid, (time[0] + shift, time[-1] + shift)).tolist()
-            if (end - begin) * _GRID_STEP_S >= min_overlap:
-                own = np.interp(grid[begin:end] - shift, time, values)
-                correlation = _correlation(own, other[begin:end])
-                best = max(best, ClockShift(shift, correlation), key=lambda found: found.correlation)
+            start, end = np.searchsorted(grid, (time[0] + shift, time[-1] + shift)).tolist()
+            if (end - start) * _GRID_STEP_S >= min_overlap:
+                shifted_values = np.interp(grid[start:end] - shift, time, values)
+                correlation = _correlation(shifted_values, other[start:end])
+                best = max(best, ClockShift(shift, correlation), key=lambda clock_shift: clock_shift.correlation)
     return best
 
 
 def _correlation(values: Floats, other_values: Floats) -> float:
+    """Return the correlation coefficient of two signals; 0 if one of them does not vary."""
     values, other_values = values - values.mean(), other_values - other_values.mean()
-    size = float(np.sqrt((values @ values) * (other_values @ other_values)))
-    return float(values @ other_values) / size if size > 0.0 else 0.0
+    norm_product = float(np.sqrt((values @ values) * (other_values @ other_values)))
+    return float(values @ other_values) / norm_product if norm_product > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Hold the quantities of a table of columns against each other: signs, frames and units that contradict the motion."""
+"""Check the quantities of a table of columns against each other, to find wrong signs, frames, units and clocks."""
 
 import math
 from collections.abc import Iterator
@@ -13,76 +13,79 @@ from world.errors import LogError
 
 # Interval of the grid on which quantities are compared, s; rates are means over it.
 _STEP_S = 0.5
-# Least time between samples of the ground speed in which the recorder stopped, s.
+# Minimum pause between samples of the ground speed that shows that the recorder stopped, s.
 _MIN_GAP_S = 5.0
 # Ground speed above which the aircraft flies, m/s.
 _FLYING_MPS = 6.0
-# Correlation beyond which two measurements of one quantity agree, or contradict each other.
+# Minimum absolute correlation at which two measurements clearly agree or contradict each other.
 _CLEAR_CORRELATION = 0.6
-# Largest ratio of two measurements of one quantity, in either direction; that of ft/s to km/h is 1.10, of mph to kt
-# 1.15, and of km/h to kt 1.85.
+# Largest ratio between two measurements of one quantity, in either direction.  The ratio of ft/s to km/h is 1.10, of
+# mph to kt 1.15, and of km/h to kt 1.85.
 _MAX_RATIO = 1.25
 # Shifts at which two measurements of one quantity are compared, s.
 _SHIFTS_S = np.arange(-5.0, 5.01, 0.25)
-# Least shift that is a late signal; receivers and estimators are later than inertial sensors by up to 0.3 s.
+# Minimum shift that counts as a delay, s; receivers and estimators are later than inertial sensors by up to 0.3 s.
 _LATE_S = 0.5
-# Least correlation of a signal that is compared at other times.
+# Minimum correlation at the best shift for a delay to be reported.
 _SHIFTED_CORRELATION = 0.8
-# Share of the unexplained variance that is left at the time that is right.
+# Largest ratio of the unexplained variance at the best shift to that without a shift, for a delay to be reported.
 _SHIFTED_RESIDUAL = 0.5
-# Least duration for which a sensor that works never repeats a value, s.
+# Minimum duration for which a working sensor never repeats a value, s.
 _FROZEN_S = 20.0
-# The same, as a multiple of the 95th percentile of the times between changes of coarsely rounded values.
+# The same duration for coarsely rounded values, as a multiple of the 95th percentile of the times between changes.
 _FROZEN_RUNS = 10.0
 # Least mean wind whose direction is checked, m/s.
 _CLEAR_WIND_MPS = 2.5
-# Range of the logged wind along the wind of the velocities, as a fraction of it.
+# Range of the logged wind's component along the wind that follows from the velocities, as a fraction of the latter.
 _WIND_RATIO_RANGE = (0.4, 1.7)
 # Least number of rows in flight that are compared.
 _MIN_ROWS = 40
 # Range of the median specific force along the axis down in flight, m/s^2; a circle at 60 degrees of bank has -19.6.
 _FORCE_RANGE_MPS2 = (-20.0, -4.0)
-# Least mean alignment of heading and ground course, or of the reversed heading, that shows which one is right.
+# Minimum mean alignment of the heading, or of the reversed heading, with the ground course that shows its sign.
 _CLEAR_ALIGNMENT = 0.7
 # Largest mean angle between heading and ground course, rad.
 _MAX_HEADING_DIFFERENCE_RAD = math.radians(50.0)
 # Gravity, m/s^2.
 _GRAVITY_MPS2 = 9.80665
-# Interval over which positions are compared with velocities, s; a place that is rounded to 11 m (four decimals of a
+# Interval over which positions are compared with velocities, s; a position that is rounded to 11 m (four decimals of a
 # degree) still shows the velocity.
 _PLACE_STEP_S = 2.0
-# Sensors whose noise never rests in flight; a latitude, an altitude or a speed over ground can stay.
+# Quantities whose noise never stops in flight; a latitude, an altitude or a ground speed can stay constant.
 _SENSORS = (
     *("roll", "pitch", "yaw", "roll_rate", "pitch_rate", "yaw_rate", "airspeed", "current"),
     *("acceleration_forward", "acceleration_right", "acceleration_down"),
 )
-# Least standard deviation of quantities that must follow their partners, SI units and rad; the lateral acceleration of
-# a turn without sideslip is less than the noise of a receiver's velocities.
+# Minimum standard deviation from which a quantity must follow its partner, SI units and rad.  The lateral acceleration
+# is not listed: in a turn without sideslip it is less than the noise of a receiver's velocities.
 _LEAST_MOTIONS = {
     **dict.fromkeys(("roll_rate", "pitch_rate", "yaw_rate"), math.radians(1.0)),
     **dict.fromkeys(("velocity_north", "velocity_east", "velocity_down"), 1.0),
     **dict.fromkeys(("acceleration_forward", "acceleration_down"), 1.0),
 }
-# Least correlation of these with their partners.
+# Minimum correlation of these quantities with their partners.
 _LEAST_CORRELATION = 0.5
-# Largest ratio of the airspeed and that of ground velocity and heading; density and position error explain 1.2.
+# Largest ratio between the airspeed and the airspeed from ground velocity and heading; air density and position error
+# explain a ratio of 1.2.
 _MAX_AIRSPEED_RATIO = 1.35
 # Least median airspeed in flight, m/s.
 _MIN_AIRSPEED_MPS = 2.0
 # Least range of a throttle that moves.
 _MIN_THROTTLE_RANGE = 0.01
-# Least range of the current, 5 to 95 %, that only a throttle changes, A.
+# Minimum range of the current, from its 5th to its 95th percentile, that only the throttle can cause, A.
 _MIN_CURRENT_RANGE_A = 3.0
 _EARTH_RADIUS_M = 6_371_008.8
 
 
 class _Pair(NamedTuple):
-    """Two measurements of one quantity.
+    """Two measurements that must agree or vary together.
 
-    quantity: the quantity that is checked.  partner: the quantities that it is held against, for people.
-    series: of the quantity.  expected: (n,) by the partner, on the grid.
-    exact: true if both measure the same, and not only move together.
-    at_once: true if both move at the same time.
+    quantity: the quantity that is checked.
+    partner: text that names the quantities with which it is compared.
+    series: values of the quantity.
+    expected: values that follow from the partner, at the times of the grid, (n,).
+    exact: True if both must be equal, False if they only vary together.
+    at_once: True if both vary at the same time, without a delay of the motion.
     """
 
     quantity: str
@@ -94,7 +97,10 @@ class _Pair(NamedTuple):
 
 
 def check_signs_and_units(log: ColumnLog) -> None:
-    """Raise LogError for the first quantity that contradicts the others, with the key of the table to look at."""
+    """Raise LogError for the first quantity that contradicts the others, with the key of the table to check.
+
+    Nothing is checked for a log with too few rows in flight.
+    """
     grid = _flying_grid(log)
     if len(grid) < _MIN_ROWS:
         return
@@ -116,7 +122,10 @@ def check_signs_and_units(log: ColumnLog) -> None:
 
 
 def _flying_grid(log: ColumnLog) -> Floats:
-    """Return recorded times in flight, (n,); none if neither velocity nor ground speed tells them."""
+    """Return the times of a regular grid at which the aircraft flies and the log has rows, s, (n,).
+
+    The grid is empty for a log without ground velocity and ground speed.
+    """
     if log.has("velocity_north", "velocity_east"):
         north, east = log.series("velocity_north"), log.series("velocity_east")
         speed = Series(north.time, np.hypot(north.values, np.interp(north.time, *_known(east))))
@@ -129,34 +138,39 @@ def _flying_grid(log: ColumnLog) -> Floats:
         return np.zeros(0)
     grid = np.arange(time[0], time[-1], _STEP_S)
     after = np.clip(np.searchsorted(time, grid, side="right"), 1, len(time) - 1)
-    recorded = time[after] - time[after - 1] < _MIN_GAP_S
-    return np.asarray(grid[recorded & (np.interp(grid, time, values) > _FLYING_MPS)])
+    is_recorded = time[after] - time[after - 1] < _MIN_GAP_S
+    return np.asarray(grid[is_recorded & (np.interp(grid, time, values) > _FLYING_MPS)])
 
 
 def _known(series: Series) -> tuple[Floats, Floats]:
-    finite = np.isfinite(series.values)
-    return series.time[finite], series.values[finite]
+    """Return the times and values of the rows with a value."""
+    is_known = np.isfinite(series.values)
+    return series.time[is_known], series.values[is_known]
 
 
-def _on_grid(series: Series, grid: Floats, *, turning: bool = False) -> Floats:
-    """Return means of a series over the intervals around the times of a grid."""
+def _on_grid(series: Series, grid: Floats, *, wraps: bool = False) -> Floats:
+    """Return the mean of a series over an interval of `_STEP_S` around each time of a grid, (n,).
+
+    wraps: True for an angle that jumps at full turns.
+    """
     time, values = _known(series)
-    values = np.unwrap(values) if turning else values
+    values = np.unwrap(values) if wraps else values
     sums = np.concatenate([[0.0], np.cumsum(values)])
-    begin, end = (np.searchsorted(time, grid + side * 0.5 * _STEP_S) for side in (-1.0, 1.0))
-    means = (sums[end] - sums[begin]) / np.maximum(1, end - begin)
-    return np.asarray(np.where(end > begin, means, np.interp(grid, time, values)))
+    start_rows, end_rows = (np.searchsorted(time, grid + side * 0.5 * _STEP_S) for side in (-1.0, 1.0))
+    means = (sums[end_rows] - sums[start_rows]) / np.maximum(1, end_rows - start_rows)
+    return np.asarray(np.where(end_rows > start_rows, means, np.interp(grid, time, values)))
 
 
-def _change(series: Series, grid: Floats, *, turning: bool = False, step: float = _STEP_S) -> Floats:
-    """Return the rate of change of a series over intervals of `step`, s, around the times of a grid."""
+def _change(series: Series, grid: Floats, *, wraps: bool = False, step: float = _STEP_S) -> Floats:
+    """Return the rate of change of a series over an interval of `step` (s) around each time of a grid, 1/s, (n,)."""
     time, values = _known(series)
-    values = np.unwrap(values) if turning else values
+    values = np.unwrap(values) if wraps else values
     later, earlier = (np.interp(grid + side * 0.5 * step, time, values) for side in (1.0, -1.0))
     return np.asarray((later - earlier) / step)
 
 
 def _pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
+    """Yield all pairs of quantities of a log that must agree or vary together."""
     if log.has("velocity_down", "altitude"):
         sink = -_change(log.series("altitude"), grid)
         yield _Pair("velocity_down", "the change of altitude", log.series("velocity_down"), sink)
@@ -164,7 +178,7 @@ def _pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
         latitude = log.series("latitude")
         north = _change(latitude, grid, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
         yield _Pair("velocity_north", "the change of latitude", log.series("velocity_north"), north)
-        east = _change(log.series("longitude"), grid, turning=True, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
+        east = _change(log.series("longitude"), grid, wraps=True, step=_PLACE_STEP_S) * _EARTH_RADIUS_M
         east = east * np.cos(_on_grid(latitude, grid))
         yield _Pair("velocity_east", "the change of longitude", log.series("velocity_east"), east)
     if log.has("roll", "pitch", "yaw"):
@@ -178,15 +192,15 @@ def _pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
     if (triangle := _velocity_triangle(log, grid)) is not None:
         air = np.abs(triangle.velocity - triangle.wind)
         yield _Pair("airspeed", "ground velocity and heading", log.series("airspeed"), air, exact=False)
-    # Last, as a wrong velocity or attitude contradicts all accelerations.
+    # The accelerations come last, because a wrong velocity or attitude contradicts all of them.
     yield from _force_pairs(log, grid)
 
 
 def _attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
-    """Yield the pairs of angular rates with the change of attitude, and of the bank with the turn."""
+    """Yield the pairs of each angular rate with the change of attitude, and of the bank with the turn rate."""
     angles = {name: log.series(name) for name in ("roll", "pitch", "yaw")}
-    roll, pitch = (_on_grid(angles[name], grid, turning=True) for name in ("roll", "pitch"))
-    roll_change, pitch_change, yaw_change = (_change(series, grid, turning=True) for series in angles.values())
+    roll, pitch = (_on_grid(angles[name], grid, wraps=True) for name in ("roll", "pitch"))
+    roll_change, pitch_change, yaw_change = (_change(series, grid, wraps=True) for series in angles.values())
     expected = {
         "roll_rate": roll_change - yaw_change * np.sin(pitch),
         "pitch_rate": pitch_change * np.cos(roll) + yaw_change * np.cos(pitch) * np.sin(roll),
@@ -199,19 +213,19 @@ def _attitude_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
 
 
 def _force_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
-    """Yield the pairs of accelerations with the change of velocity, less gravity, in the axes of the body."""
+    """Yield the pairs of each acceleration with the change of velocity minus gravity, in body axes."""
     if not log.has("roll", "pitch", "yaw", "velocity_north", "velocity_east", "velocity_down"):
         return
-    roll, pitch, yaw = (_on_grid(log.series(name), grid, turning=True) for name in ("roll", "pitch", "yaw"))
+    roll, pitch, yaw = (_on_grid(log.series(name), grid, wraps=True) for name in ("roll", "pitch", "yaw"))
     north, east, down = (_change(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east", "down"))
-    ahead = north * np.cos(yaw) + east * np.sin(yaw)
+    forward = north * np.cos(yaw) + east * np.sin(yaw)
     right = east * np.cos(yaw) - north * np.sin(yaw)
     down = down - _GRAVITY_MPS2
-    across = ahead * np.sin(pitch) + down * np.cos(pitch)
+    pitched_down = forward * np.sin(pitch) + down * np.cos(pitch)
     forces = {
-        "acceleration_forward": ahead * np.cos(pitch) - down * np.sin(pitch),
-        "acceleration_right": right * np.cos(roll) + across * np.sin(roll),
-        "acceleration_down": across * np.cos(roll) - right * np.sin(roll),
+        "acceleration_forward": forward * np.cos(pitch) - down * np.sin(pitch),
+        "acceleration_right": right * np.cos(roll) + pitched_down * np.sin(roll),
+        "acceleration_down": pitched_down * np.cos(roll) - right * np.sin(roll),
     }
     for name, values in forces.items():
         if log.has(name):
@@ -219,20 +233,22 @@ def _force_pairs(log: ColumnLog, grid: Floats) -> Iterator[_Pair]:
 
 
 def _ground_velocity(log: ColumnLog, grid: Floats) -> NDArray[np.complex128] | None:
-    """Return the ground velocity (n,), north and east as a complex number, m/s; None if the log has none."""
+    """Return the ground velocity on the grid, m/s, (n,), north + i east as a complex number; None if unknown."""
     if log.has("velocity_north", "velocity_east"):
         north, east = (_on_grid(log.series(f"velocity_{axis}"), grid) for axis in ("north", "east"))
         return np.asarray(north + 1j * east)
     if log.has("ground_speed", "ground_course"):
-        course = _on_grid(log.series("ground_course"), grid, turning=True)
+        course = _on_grid(log.series("ground_course"), grid, wraps=True)
         return np.asarray(_on_grid(log.series("ground_speed"), grid) * np.exp(1j * course))
     return None
 
 
 class _Triangle(NamedTuple):
-    """Triangle of ground velocity, heading and airspeed; complex numbers are north and east.
+    """Triangle of ground velocity, airspeed and wind; complex numbers are north + i east.
 
-    velocity: (n,) ground velocity, m/s.  factor: of the airspeed that fits best.  wind: mean wind, m/s.
+    velocity: ground velocity, m/s, (n,).
+    factor: factor of the logged airspeed with which the triangle fits best.
+    wind: mean wind, m/s.
     """
 
     velocity: NDArray[np.complex128]
@@ -241,11 +257,14 @@ class _Triangle(NamedTuple):
 
 
 def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
-    """Return the triangle; None without its quantities, or without turns, which tell wind and airspeed apart."""
+    """Return the best-fitting triangle; None without its quantities, or in a flight without turns.
+
+    Only turns distinguish the wind from an error of the airspeed.
+    """
     velocity = _ground_velocity(log, grid)
     if velocity is None or not log.has("airspeed", "yaw"):
         return None
-    direction = np.exp(1j * _on_grid(log.series("yaw"), grid, turning=True))
+    direction = np.exp(1j * _on_grid(log.series("yaw"), grid, wraps=True))
     if abs(direction.mean()) > _CLEAR_ALIGNMENT:
         return None
     air = _on_grid(log.series("airspeed"), grid) * direction
@@ -257,48 +276,49 @@ def _velocity_triangle(log: ColumnLog, grid: Floats) -> _Triangle | None:
 
 
 def _correlate(values: Floats, expected: Floats) -> float:
+    """Return the correlation coefficient of two series; 0 if one of them is constant."""
     values, expected = values - values.mean(), expected - expected.mean()
-    size = float(np.sqrt((values @ values) * (expected @ expected)))
-    return float(values @ expected) / size if size > 0.0 else 0.0
+    norm_product = float(np.sqrt((values @ values) * (expected @ expected)))
+    return float(values @ expected) / norm_product if norm_product > 0.0 else 0.0
 
 
 def _contradiction(log: ColumnLog, quantity: str, message: str, hint: str) -> LogError:
-    """Return the error of a quantity that contradicts the others."""
+    """Return the error for a quantity that contradicts the others.  hint: text on what to check in the table."""
     field = f"columns.{quantity}"
     text = f"{log.table_path}: {field}: {log.column(quantity)} {message}: {hint}"
     return LogError(text, file=log.table_path, field=field, allowed=hint)
 
 
 def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
-    """Raise LogError for a sensor that repeats one value in flight; a current of zero is an idle motor."""
+    """Raise LogError for a sensor that repeats one value for too long in flight; a current of 0 is an idle motor."""
     time, values = _known(log.series(quantity))
-    inside = (time >= grid[0]) & (time <= grid[-1])
-    time, values = time[inside], values[inside]
+    is_in_flight = (time >= grid[0]) & (time <= grid[-1])
+    time, values = time[is_in_flight], values[is_in_flight]
     if len(time) < 2:
         return
     firsts = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1])
-    # A run ends at its last sample: a gap in the log is not a value that stays.
+    # A run of equal values ends at its last sample, because the values in a gap of the log are unknown.
     lasts = np.append(firsts[1:] - 1, len(time) - 1)
     durations = time[lasts] - time[firsts]
     limit = max(_FROZEN_S, _FROZEN_RUNS * float(np.quantile(durations, 0.95))) if len(durations) > 1 else _FROZEN_S
     for k in np.flatnonzero(durations > limit).tolist():
-        begin, end = float(time[firsts[k]]), float(time[min(lasts[k] + 1, len(time) - 1)])
-        flown = np.count_nonzero((grid > begin) & (grid < end)) * _STEP_S
-        if flown > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
+        start, end = float(time[firsts[k]]), float(time[min(lasts[k] + 1, len(time) - 1)])
+        flight_time = np.count_nonzero((grid > start) & (grid < end)) * _STEP_S
+        if flight_time > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
             hint = "expected a sensor that works; leave its cells empty, or read a part (span_s)"
-            raise _contradiction(log, quantity, f"keeps one value from {begin:.6g} to {end:.6g} s, in flight", hint)
+            raise _contradiction(log, quantity, f"keeps one value from {start:.6g} to {end:.6g} s, in flight", hint)
 
 
 def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
-    """Raise LogError if two measurements run against each other, or differ by a factor.
+    """Raise LogError if two measurements vary in opposite directions, do not correlate, or differ by a factor.
 
-    Errors of either measurement put the factor between r c and r / c, with the ratio r of the deviations and the
-    correlation c (Frisch 1934).
+    With errors in both measurements, the factor lies between r c and r / c, where r is the ratio of the standard
+    deviations and c the correlation (Frisch 1934).
     """
-    values = _on_grid(pair.series, grid, turning=pair.quantity == "yaw")
+    values = _on_grid(pair.series, grid, wraps=pair.quantity == "yaw")
     correlation = _correlate(values, pair.expected)
     if correlation < -_CLEAR_CORRELATION:
-        message = f"runs against {pair.partner} (correlation {correlation:.2f})"
+        message = f"varies opposite to {pair.partner} (correlation {correlation:.2f})"
         raise _contradiction(log, pair.quantity, message, "check sign and frame")
     moves = max(float(values.std()), float(pair.expected.std())) > _LEAST_MOTIONS.get(pair.quantity, math.inf)
     if moves and correlation < _LEAST_CORRELATION:
@@ -314,17 +334,17 @@ def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
     """Raise LogError if a measurement comes earlier or later than its partner, by the shift with the best correlation.
 
-    Two measurements of one quantity whose sizes differ at that shift are not the same motion.
+    A shift at which the sizes of two measurements of one quantity differ does not compare the same motion.
     """
-    inner = (grid > grid[0] - _SHIFTS_S[0]) & (grid < grid[-1] - _SHIFTS_S[-1])
-    if not pair.at_once or np.count_nonzero(inner) < _MIN_ROWS:
+    is_inner = (grid > grid[0] - _SHIFTS_S[0]) & (grid < grid[-1] - _SHIFTS_S[-1])
+    if not pair.at_once or np.count_nonzero(is_inner) < _MIN_ROWS:
         return
-    expected = pair.expected[inner]
-    correlations = [_correlate(_on_grid(pair.series, grid[inner] + shift), expected) for shift in _SHIFTS_S.tolist()]
-    best, now = max(correlations), correlations[len(correlations) // 2]
+    expected, inner_grid = pair.expected[is_inner], grid[is_inner]
+    correlations = [_correlate(_on_grid(pair.series, inner_grid + shift), expected) for shift in _SHIFTS_S.tolist()]
+    best, unshifted = max(correlations), correlations[len(correlations) // 2]
     shift = float(_SHIFTS_S[int(np.argmax(correlations))])
-    is_better = 1.0 - best * best < _SHIFTED_RESIDUAL * (1.0 - now * now)
-    ratio = float(np.std(_on_grid(pair.series, grid[inner] + shift)) / max(1e-12, float(np.std(expected))))
+    is_better = 1.0 - best * best < _SHIFTED_RESIDUAL * (1.0 - unshifted * unshifted)
+    ratio = float(np.std(_on_grid(pair.series, inner_grid + shift)) / max(1e-12, float(np.std(expected))))
     if pair.exact and not 1.0 / _MAX_RATIO <= ratio <= _MAX_RATIO:
         return
     if best > _SHIFTED_CORRELATION and is_better and abs(shift) >= _LATE_S:
@@ -333,6 +353,7 @@ def _check_delay(log: ColumnLog, pair: _Pair, grid: Floats) -> None:
 
 
 def _check_force(log: ColumnLog, force: float) -> None:
+    """Raise LogError for an implausible median of the specific force down in flight, m/s²."""
     low, high = _FORCE_RANGE_MPS2
     if not low <= force <= high:
         entry = log.table.columns["acceleration_down"][0]
@@ -344,7 +365,10 @@ def _check_force(log: ColumnLog, force: float) -> None:
 
 
 def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError for an airspeed that is zero in flight, or not that of ground velocity and heading."""
+    """Raise LogError for an airspeed that is almost zero in flight, or that contradicts ground velocity and heading.
+
+    If turns determine the wind, a logged wind that contradicts it raises LogError, too.
+    """
     airspeed, column = _on_grid(log.series("airspeed"), grid), log.column("airspeed")
     if np.median(airspeed) < _MIN_AIRSPEED_MPS:
         allowed = f"expected more than {_MIN_AIRSPEED_MPS:g} m/s: check column and unit"
@@ -358,25 +382,28 @@ def _check_airspeed(log: ColumnLog, grid: Floats) -> None:
         raise _contradiction(log, "airspeed", message, f"check unit ({log.unit('airspeed')}) and scale")
     if abs(triangle.wind) > _CLEAR_WIND_MPS:
         for quantity, wind in _logged_winds(log, grid):
-            along = (wind / triangle.wind).real
+            wind_ratio = (wind / triangle.wind).real
             low, high = _WIND_RATIO_RANGE
-            if not low <= along <= high:
-                message = f"states {along:.2g} times the wind of airspeed, heading and ground velocity"
+            if not low <= wind_ratio <= high:
+                message = f"states {wind_ratio:.2g} times the wind of airspeed, heading and ground velocity"
                 raise _contradiction(log, quantity, message, "check unit and frame (from, to)")
 
 
 def _logged_winds(log: ColumnLog, grid: Floats) -> Iterator[tuple[str, complex]]:
-    """Yield the mean wind of each pair of quantities that states it, north and east, m/s."""
+    """Yield a quantity's name and the mean wind for each pair of quantities that states the wind, m/s.
+
+    The wind is a complex number, north + i east.
+    """
     if log.has("wind_north", "wind_east"):
         north, east = (float(np.mean(_on_grid(log.series(f"wind_{axis}"), grid))) for axis in ("north", "east"))
         yield "wind_north", complex(north, east)
     if log.has("wind_speed", "wind_direction"):
-        origin = _on_grid(log.series("wind_direction"), grid, turning=True)
+        origin = _on_grid(log.series("wind_direction"), grid, wraps=True)
         yield "wind_direction", complex(-np.mean(_on_grid(log.series("wind_speed"), grid) * np.exp(1j * origin)))
 
 
 def _check_throttle(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError for a throttle that stays where it is while the current changes."""
+    """Raise LogError for a throttle that is constant in flight while the current changes."""
     throttle, current = (_on_grid(log.series(name), grid) for name in ("throttle", "current"))
     low, high = np.percentile(current, [5.0, 95.0]).tolist()
     if np.ptp(throttle) < _MIN_THROTTLE_RANGE and high - low > _MIN_CURRENT_RANGE_A:
@@ -385,17 +412,17 @@ def _check_throttle(log: ColumnLog, grid: Floats) -> None:
 
 
 def _check_heading(log: ColumnLog, grid: Floats) -> None:
-    """Raise LogError if the heading is not that of the ground course, or runs against it."""
+    """Raise LogError if the heading differs too much from the ground course, or turns in the opposite direction."""
     velocity = _ground_velocity(log, grid)
     if velocity is None:
         return
-    course, yaw = np.angle(velocity), _on_grid(log.series("yaw"), grid, turning=True)
+    course, yaw = np.angle(velocity), _on_grid(log.series("yaw"), grid, wraps=True)
     same, reversed_yaw = (complex(np.mean(np.exp(1j * (course - sign * yaw)))) for sign in (1.0, -1.0))
     difference = math.degrees(math.atan2(same.imag, same.real))
     message = ""
     if abs(same) > _CLEAR_ALIGNMENT and abs(math.radians(difference)) > _MAX_HEADING_DIFFERENCE_RAD:
         message = f"differs by {difference:.0f} deg from the ground course on average"
     elif abs(reversed_yaw) > _CLEAR_ALIGNMENT > abs(same):
-        message = "turns against the ground course"
+        message = "turns opposite to the ground course"
     if message:
         raise _contradiction(log, "yaw", message, "check sign, frame and offset")

@@ -32,12 +32,12 @@ from world.arrays import Flags, Floats
 from world.errors import LogError
 from world.files import did_you_mean
 
-# Largest ratio of the stated and the measured rate of a clock, in either direction.
+# Largest ratio between the stated and the measured rate of a clock, in either direction.
 _MAX_RATE_RATIO = 1.25
 # Longest log, s: checks resample it in steps of 0.2 to 1 s, which takes 100 MB for seven days.
 _MAX_DURATION_S = 604_800.0
-# Share of the values that must lie in a quantity's plausible range.
-_PLAUSIBLE_SHARE = 0.98
+# Minimum fraction of the values in a quantity's plausible range.
+_MIN_PLAUSIBLE_FRACTION = 0.98
 # Largest difference of a quaternion's length from 1.
 _MAX_QUATERNION_ERROR = 0.05
 # Minimum correlation of the two signals that align a clock.
@@ -48,7 +48,11 @@ _UTC_AFTER_S = 3e8
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """Values of one quantity.  time: (n,) s of the main clock.  values: (n,), NaN for rows without a value."""
+    """Values of one quantity.
+
+    time: times on the main clock, s, (n,).
+    values: (n,); NaN for rows without a value.
+    """
 
     time: Floats
     values: Floats
@@ -56,7 +60,12 @@ class Series:
 
 @dataclass(slots=True)
 class _Clock:
-    """Times of a clock, (n,) s, as written, and its file."""
+    """Clock of a data file.
+
+    data: the file.
+    time: times as in the file plus the stated offset, s, (n,).
+    rate: rows per second.
+    """
 
     data: DataFile
     time: Floats
@@ -88,7 +97,7 @@ class ColumnLog:
     def data_sha256(self) -> str:
         """SHA-256 of the bytes of all data files, in the order of their paths, and of the span that is read.
 
-        It tells if an aircraft was identified from these rows, whatever else of the table was edited since.
+        It identifies the rows from which an aircraft was identified, even if other parts of the table are edited.
         """
         digest = hashlib.sha256(repr(self.table.span_s).encode())
         for path in sorted({self._file_of(clock) for clock in self.table.clocks.values()}):
@@ -96,11 +105,12 @@ class ColumnLog:
         return digest.hexdigest()
 
     def has(self, *quantities: str) -> bool:
-        """Return True if the table names all these quantities; a quaternion is roll, pitch and yaw."""
+        """Return True if the table has all these quantities; roll, pitch and yaw may come from a quaternion."""
         named = self.table.columns.keys()
         return all(quantity in named or self._is_from_quaternion(quantity) for quantity in quantities)
 
     def _is_from_quaternion(self, quantity: str) -> bool:
+        """Return True if a quantity is an angle that is computed from the table's quaternion."""
         named = self.table.columns.keys()
         return quantity in ANGLES and quantity not in named and named >= set(QUATERNION)
 
@@ -118,7 +128,9 @@ class ColumnLog:
         return self.table.columns[quantity][0].frame or QUANTITIES[quantity].frames[0]
 
     def series(self, quantity: str) -> Series:
-        """Return a quantity in SI units and radians in its first frame; several entries are merged by their conditions.
+        """Return a quantity in SI units and radians, in its default frame.
+
+        If a quantity has several entries, each row has the value of the first entry whose condition is met.
 
         Raises LogError for a missing column, text in place of numbers, and implausible values.
         """
@@ -137,9 +149,9 @@ class ColumnLog:
         return Series(time, values)
 
     def _angle_of_quaternion(self, angle: str) -> Series:
-        """Return roll, pitch or yaw of the quaternion from FRD to NED, or from FLU to ENU.
+        """Return roll, pitch or yaw from the quaternion from FRD to NED, or from FLU to ENU.
 
-        Raises LogError for parts of different length, and for a quaternion whose length is not 1.
+        Raises LogError if the parts have different times, and for a quaternion whose norm is not 1.
         """
         parts = [self.series(name) for name in QUATERNION]
         time = parts[0].time
@@ -147,9 +159,9 @@ class ColumnLog:
             allowed = "expected the clock of quaternion_w"
             raise self._error("columns.quaternion_x.clock", self.column("quaternion_x"), allowed)
         w, x, y, z = (part.values for part in parts)
-        lengths = np.sqrt(w * w + x * x + y * y + z * z)
-        known = lengths[np.isfinite(lengths)]
-        if known.size and np.mean(np.abs(known - 1.0) < _MAX_QUATERNION_ERROR) < _PLAUSIBLE_SHARE:
+        norms = np.sqrt(w * w + x * x + y * y + z * z)
+        known = norms[np.isfinite(norms)]
+        if known.size and np.mean(np.abs(known - 1.0) < _MAX_QUATERNION_ERROR) < _MIN_PLAUSIBLE_FRACTION:
             shown = f"{self.column('quaternion_w')} and the other parts have a length of {np.median(known):.3g}"
             raise self._error("columns.quaternion_w", shown, "expected 1")
         angles = {
@@ -161,7 +173,7 @@ class ColumnLog:
         return Series(time, factor * angles[angle]() + offset)
 
     def raw(self, quantity: str) -> tuple[Floats, Column]:
-        """Return times and unconverted values of a quantity, for texts and numbers of modes."""
+        """Return the times and the unconverted values of a quantity, such as the names or numbers of modes."""
         entry = self.table.columns[quantity][0]
         clock = self._clock(entry.clock)
         return self._times(entry.clock), self._column(
@@ -169,7 +181,7 @@ class ColumnLog:
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the autopilot's parameters by name."""
+        """Return the autopilot's parameters by name; the table's [parameters] take precedence over its columns."""
         if self.table.parameter_columns is None:
             return dict(self.table.parameters)
         data = self._data(next(iter(self.table.clocks.values())))
@@ -184,9 +196,11 @@ class ColumnLog:
     # Files and clocks.
 
     def _error(self, field: str, value: Any, allowed: str) -> LogError:
+        """Return the error for a field of the table."""
         return LogError.at(self.table_path, field, value, allowed)
 
     def _file_of(self, clock: ClockTable) -> Path:
+        """Return the data file of a clock: its own file, or else the opened data file, or else the table's file."""
         if clock.file is not None:
             return self.table_path.parent / clock.file
         if self.path != self.table_path:
@@ -198,17 +212,23 @@ class ColumnLog:
         return self.table_path.parent / self.table.file
 
     def _data(self, clock: ClockTable) -> DataFile:
+        """Return the contents of a clock's data file, which is read once."""
         path = self._file_of(clock)
         if path not in self._files:
             self._files[path] = read_data_file(path)
         return self._files[path]
 
     def _clock(self, name: str) -> _Clock:
+        """Return a clock by name, which is read once."""
         if name not in self._clocks:
             self._clocks[name] = self._read_clock(name, self.table.clocks[name])
         return self._clocks[name]
 
     def _read_clock(self, name: str, clock: ClockTable) -> _Clock:
+        """Read a clock's times, or count its rows if it has no column of times.
+
+        Raises LogError for missing, decreasing or too many times, and for a stated rate that contradicts the times.
+        """
         data, field = self._data(clock), f"clocks.{name}"
         if clock.column is None:
             lengths = [len(self._named(data, column)) for column in self._columns_of(name)]
@@ -219,12 +239,13 @@ class ColumnLog:
             time = _seconds_of_dates(values, self._place(data, clock.column))
         else:
             time = _numbers(values, self._place(data, clock.column)) * UNITS["time"][clock.unit]
-        bad = np.flatnonzero(~np.isfinite(time))
-        if bad.size:
-            raise LogError.at(data.path, f"{clock.column}[{bad[0]}]", time[bad[0]], "expected a time in every row")
-        back = np.flatnonzero(np.diff(time) < 0.0)
-        if back.size:
-            k = int(back[0]) + 1
+        missing_rows = np.flatnonzero(~np.isfinite(time))
+        if missing_rows.size:
+            k = int(missing_rows[0])
+            raise LogError.at(data.path, f"{clock.column}[{k}]", time[k], "expected a time in every row")
+        decreasing_rows = np.flatnonzero(np.diff(time) < 0.0)
+        if decreasing_rows.size:
+            k = int(decreasing_rows[0]) + 1
             allowed = f"after {time[k - 1]:.6g} s: expected rising times"
             raise LogError.at(data.path, f"{clock.column}[{k}]", f"{time[k]:.6g} s", allowed)
         if len(time) < 2 or time[-1] <= time[0]:
@@ -235,15 +256,15 @@ class ColumnLog:
             raise LogError.at(data.path, clock.column, f"{duration:.6g} s", allowed)
         rate = float(len(time) - 1) / duration
         steps = np.diff(time)
-        usual = float(1.0 / np.median(steps[steps > 0.0]))
-        if clock.rate is not None and not 1.0 / _MAX_RATE_RATIO <= usual / clock.rate <= _MAX_RATE_RATIO:
-            allowed = f"the times in {clock.column} have {usual:.3g} rows a second: check the unit ({clock.unit})"
+        usual_rate = float(1.0 / np.median(steps[steps > 0.0]))
+        if clock.rate is not None and not 1.0 / _MAX_RATE_RATIO <= usual_rate / clock.rate <= _MAX_RATE_RATIO:
+            allowed = f"the times in {clock.column} have {usual_rate:.3g} rows a second: check the unit ({clock.unit})"
             raise self._error(f"{field}.rate", f"{clock.rate:g} Hz", allowed)
         return _Clock(data, time + clock.offset_s, rate)
 
     @cached_property
     def start(self) -> float:
-        """Time of the main clock that becomes zero: its first time if it counts from 1970, otherwise 0, s."""
+        """Time of the main clock that becomes time 0, s: its first time if it counts from 1970, otherwise 0."""
         first = float(self._clock(self._main).time[0])
         if first > _UTC_AFTER_S:
             self.utc_start = first
@@ -252,28 +273,32 @@ class ColumnLog:
 
     @property
     def _main(self) -> str:
+        """Name of the main clock: "main", or the first clock if none has this name."""
         return MAIN_CLOCK if MAIN_CLOCK in self.table.clocks else next(iter(self.table.clocks))
 
     def _times(self, name: str) -> Floats:
-        """Return the times of a clock on the main clock."""
+        """Return the times of a clock, converted to the main clock, s."""
         self._check_overlap(name)
         return self._own_times(name) + self._clock_shift(name)
 
     def _check_overlap(self, name: str) -> None:
-        """Raise LogError for a clock without any time in common with the main clock, if nothing aligns it."""
-        own, main = self._own_times(name), self._own_times(self._main)
-        if self.table.clocks[name].align is None and (own[0] > main[-1] or own[-1] < main[0]):
-            spans = f"{own[0]:.6g} to {own[-1]:.6g} s, and {self._main} from {main[0]:.6g} to {main[-1]:.6g} s"
+        """Raise LogError for a clock that is not aligned and has no time in common with the main clock."""
+        time, main = self._own_times(name), self._own_times(self._main)
+        if self.table.clocks[name].align is None and (time[0] > main[-1] or time[-1] < main[0]):
+            spans = f"{time[0]:.6g} to {time[-1]:.6g} s, and {self._main} from {main[0]:.6g} to {main[-1]:.6g} s"
             allowed = f"runs from {spans}: expected the same clock, `offset_s` or `align`"
             raise self._error(f"clocks.{name}", self.table.clocks[name].column or "rows", allowed)
 
     def _own_times(self, name: str) -> Floats:
-        """Return the times of a clock before its alignment; dates are counted from the start of the main clock."""
+        """Return the times of a clock before its alignment, s; dates become seconds since the main clock's start."""
         time = self._clock(name).time
         return time - self.start if time[0] > _UTC_AFTER_S else time
 
     def _clock_shift(self, name: str) -> float:
-        """Return the shift that best aligns a clock's column with its partner, s; 0 for a clock without `align`."""
+        """Return the shift that best aligns a clock's column with its partner, s; 0 for a clock without `align`.
+
+        Raises LogError if the correlation is too small at every shift.
+        """
         align = self.table.clocks[name].align
         if align is None:
             return 0.0
@@ -296,7 +321,7 @@ class ColumnLog:
         return self._shifts[name]
 
     def _partner(self, name: str, field: str) -> tuple[Floats, Floats]:
-        """Return the finite rows of a quantity, or of a column of the main clock."""
+        """Return times and values of the finite rows of a quantity, or of a column with the main clock."""
         if name in self.table.columns:
             series = self.series(name)
         else:
@@ -310,6 +335,7 @@ class ColumnLog:
     # Columns.
 
     def _columns_of(self, clock: str) -> list[str]:
+        """Return the names of the columns that use a clock."""
         return [
             entry.column
             for entries in self.table.columns.values()
@@ -318,7 +344,7 @@ class ColumnLog:
         ]
 
     def _check_names(self) -> None:
-        """Raise LogError for the first column that its file does not have."""
+        """Raise LogError for the first column of the table that its data file does not have."""
         for quantity, entries in self.table.columns.items():
             for entry in entries:
                 if entry.column is not None:
@@ -326,12 +352,14 @@ class ColumnLog:
                     self._named(data, entry.column, f"columns.{quantity}.column")
 
     def _named(self, data: DataFile, name: str, field: str = "") -> Column:
+        """Return a column by name.  Raises LogError, with a similar name as a hint, if the file does not have it."""
         if name not in data.columns:
             hint = did_you_mean(name, data.columns) or f": it has {', '.join(list(data.columns)[:12])}"
             raise self._error(field or "column", name, f"no such column in {data.path.name}{hint}")
         return data.columns[name]
 
     def _column(self, clock: _Clock, name: str, field: str, clock_name: str) -> Column:
+        """Return a column with a clock.  Raises LogError if it has another number of rows than the clock."""
         values = self._named(clock.data, name, field)
         if len(values) != len(clock.time):
             allowed = f"{len(values)} rows, and the clock {clock_name} has {len(clock.time)}: expected as many"
@@ -339,9 +367,14 @@ class ColumnLog:
         return values
 
     def _place(self, data: DataFile, name: str) -> str:
+        """Return file and column as the start of a message."""
         return f"{data.path}: {name}"
 
     def _entry_series(self, quantity: str, entry: ColumnTable) -> Series:
+        """Return the series of one entry in SI units, radians and the default frame, within the span that is read.
+
+        Rows that do not meet the entry's condition are NaN.
+        """
         if entry.value is not None:
             time = self._times(self._main)
             return Series(time, np.full(len(time), self._convert(quantity, entry, np.array([entry.value]))[0]))
@@ -358,78 +391,90 @@ class ColumnLog:
         if entry.rate is not None:
             time, values = self._fresh_rows(quantity, entry, time, values)
         if self.table.span_s is not None:
-            begin, end = self.table.span_s
-            inside = (time >= begin) & (time <= end)
-            if not inside.any():
+            start, end = self.table.span_s
+            is_in_span = (time >= start) & (time <= end)
+            if not is_in_span.any():
                 allowed = f"no rows of {quantity}, which has {time[0]:.6g} to {time[-1]:.6g} s"
-                raise self._error("span_s", f"{begin:g} to {end:g} s", allowed)
-            time, values = time[inside], values[inside]
+                raise self._error("span_s", f"{start:g} to {end:g} s", allowed)
+            time, values = time[is_in_span], values[is_in_span]
         return Series(time, values)
 
     def _convert(self, quantity: str, entry: ColumnTable, raw: Floats) -> Floats:
+        """Convert values of an entry to SI units, radians and the default frame."""
         factor = UNITS[QUANTITIES[quantity].dimension][entry.unit]
         frame_factor, frame_offset = to_frame(quantity, entry.frame)
         stated = entry.sign * (entry.scale * raw + entry.offset)
         return np.asarray(frame_factor * (factor * stated + UNIT_ZEROS.get(entry.unit, 0.0)) + frame_offset)
 
     def _check_plausible(self, quantity: str, entry: ColumnTable, values: Floats) -> None:
-        """Raise LogError for values that no flight has, with the unit in which they would be plausible."""
+        """Raise LogError for values outside the plausible range, with the unit in which they would be plausible."""
         known = values[np.isfinite(values)]
         if not known.size:
             raise self._error(f"columns.{quantity}", entry.column, "holds no numbers in the rows that are read")
         limits = QUANTITIES[quantity]
         if limits.dimension == "mode":
             return
-        inside = (known >= limits.low) & (known <= limits.high)
-        if inside.mean() >= _PLAUSIBLE_SHARE:
+        is_plausible = (known >= limits.low) & (known <= limits.high)
+        if is_plausible.mean() >= _MIN_PLAUSIBLE_FRACTION:
             return
         factor = UNITS[limits.dimension][entry.unit]
-        worst = float(known[np.argmax(np.abs(known))])
+        largest = float(known[np.argmax(np.abs(known))])
         zero = UNIT_ZEROS.get(entry.unit, 0.0)
         unit = better_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
         hint = f"; is it in {unit}?" if unit else ""
-        shown = f"{(worst - zero) / factor:.4g} {entry.unit}".rstrip()
+        shown = f"{(largest - zero) / factor:.4g} {entry.unit}".rstrip()
         bounds = " to ".join(f"{(limit - zero) / factor:.4g}" for limit in (limits.low, limits.high))
         allowed = f"expected {bounds} {entry.unit}".rstrip()
         raise self._error(f"columns.{quantity}", f"{entry.column} has {shown}", f"{allowed}{hint}")
 
     def _fresh_rows(self, quantity: str, entry: ColumnTable, time: Floats, values: Floats) -> tuple[Floats, Floats]:
-        """Return the rows with a new value of a column that is written more often than it is measured."""
+        """Return the rows in which the value changes, for a column that is written more often than it is measured.
+
+        Raises LogError if the value changes more often than the stated rate.
+        """
         changes: Flags = np.concatenate([[True], np.diff(values) != 0.0]) & np.isfinite(values)
-        rate, limit = changes.sum() / max(1e-9, float(np.ptp(time))), entry.rate or 0.0
-        if rate > _MAX_RATE_RATIO * limit:
-            raise self._error(f"columns.{quantity}.rate", f"{limit:g} Hz", f"it changes {rate:.3g} times a second")
+        rate, stated_rate = changes.sum() / max(1e-9, float(np.ptp(time))), entry.rate or 0.0
+        if rate > _MAX_RATE_RATIO * stated_rate:
+            allowed = f"it changes {rate:.3g} times a second"
+            raise self._error(f"columns.{quantity}.rate", f"{stated_rate:g} Hz", allowed)
         return time[changes], values[changes]
 
 
 def _equals(values: Column, wanted: float | str) -> Flags:
+    """Return a mask of the values that equal a number or a text, (n,)."""
     if isinstance(wanted, str):
         return np.asarray([text_of(value) == wanted for value in values], np.bool_)
     return np.asarray(values == wanted, np.bool_)
 
 
 def text_of(value: Any) -> str:
-    """Return a value of a column of texts as a text."""
+    """Return a value of a text column, which may be bytes, as a str."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def _numbers(values: Column, place: str) -> Floats:
-    """Return a column as numbers; an empty text is NaN.  Raises LogError for any other text."""
+    """Return a column as numbers; an empty text becomes NaN.  Raises LogError for a text that is not a number.
+
+    place: file and column for the message.
+    """
     if values.dtype.kind in "fiub":
         return values.astype(np.float64)
-    out = np.full(len(values), np.nan)
+    numbers = np.full(len(values), np.nan)
     for k, value in enumerate(values):
         text = text_of(value).strip() if value is not None else ""
         if text:
             try:
-                out[k] = float(text)
+                numbers[k] = float(text)
             except ValueError:
                 raise LogError(f"{place}[{k}]: {text[:40]!r}: expected a number", file=place.split(":")[0]) from None
-    return out
+    return numbers
 
 
 def _seconds_of_dates(values: Column, place: str) -> Floats:
-    """Return times of day (ISO 8601) as seconds since 1970; a text without a time zone is UTC."""
+    """Return dates with times (ISO 8601) as seconds since 1970; a text without a time zone is UTC.
+
+    Raises LogError for a text that is not a date.
+    """
     import pandas as pd
 
     texts = values if values.dtype.kind == "M" else [text_of(value) for value in values]

@@ -1,4 +1,4 @@
-"""Motion of an aircraft from a table of columns, as `motion_log` reads it from ArduPilot's logs."""
+"""Read the motion of an aircraft by a table of columns, as `motion_log` does from ArduPilot's logs."""
 
 import math
 from dataclasses import dataclass
@@ -25,9 +25,11 @@ _SURFACES = ("elevator", "aileron", "rudder")
 
 
 def read_column_motion(path: Path) -> MotionLog:
-    """Read the motion of a log.  path: a table of columns, or a data file with a table next to it.
+    """Read the motion of an aircraft by a table of columns.
 
-    Raises LogError, in one line, for a file that cannot be read.
+    path: a table of columns, or a data file with a table next to it.
+
+    Raises LogError for a file that cannot be read, and for quantities that contradict each other.
     """
     log = ColumnLog(path)
     check_signs_and_units(log)
@@ -75,7 +77,10 @@ def _group(log: ColumnLog, *quantities: str) -> Samples:
 
 
 def join(parts: list[Series]) -> Samples:
-    """Return series as columns at the times of the series with most rows, interpolated, with finite rows only."""
+    """Join series as columns at the times of the longest series, with linear interpolation, (n, k).
+
+    Rows with a missing value are left out; there are no rows if a series has fewer than two values.
+    """
     longest = max(parts, key=lambda part: len(part.time))
     columns = []
     for part in parts:
@@ -90,12 +95,16 @@ def join(parts: list[Series]) -> Samples:
 
 
 def _attitude(log: ColumnLog) -> Samples:
+    """Return roll, pitch and yaw without jumps at full turns, rad, (n, 3); no rows if the table lacks one."""
     attitude = _group(log, "roll", "pitch", "yaw")
     return Samples(attitude.time, np.unwrap(attitude.values, axis=0)) if len(attitude.time) else attitude
 
 
 def read_velocity(log: ColumnLog) -> Samples:
-    """Return the ground velocity, north, east, down, from components or from ground speed and course."""
+    """Return the ground velocity to north, east and down, m/s, (n, 3), from components or from ground speed and course.
+
+    Without a vertical velocity, it is computed from the altitude; there are no rows if the table lacks both.
+    """
     if log.has("velocity_north", "velocity_east"):
         parts = [log.series("velocity_north"), log.series("velocity_east")]
     elif log.has("ground_speed", "ground_course"):
@@ -113,7 +122,7 @@ def read_velocity(log: ColumnLog) -> Samples:
 
 
 def _interpolate_at(series: Series, time: Floats, *, wraps: bool = False) -> Floats:
-    """Interpolate a series at these times.  wraps: True for an angle that wraps."""
+    """Return a series interpolated at other times.  wraps: True for an angle that jumps at full turns."""
     known = np.isfinite(series.values)
     values = np.unwrap(series.values[known]) if wraps else series.values[known]
     return np.asarray(np.interp(time, series.time[known], values))
@@ -121,11 +130,13 @@ def _interpolate_at(series: Series, time: Floats, *, wraps: bool = False) -> Flo
 
 @dataclass(frozen=True, slots=True)
 class AirData:
-    """Airspeed and wind of a log; no rows for what it lacks.
+    """Airspeed and wind of a log; a series that the log lacks has no rows.
 
-    airspeed: (n, 1) indicated.  true_airspeed: (n, 1).
-    ratio: (n, 1) ratio of true to indicated airspeed; no rows if it is taken from the standard atmosphere.
-    wind: (n, 2) north, east, in the direction of the air's motion.  wind_source: for people.
+    airspeed: indicated airspeed, m/s, (n, 1).
+    true_airspeed: true airspeed, m/s, (n, 1).
+    ratio: ratio of true to indicated airspeed, (n, 1); no rows if it is taken from the standard atmosphere.
+    wind: wind velocity to north and east, m/s, (n, 2).
+    wind_source: text on the source of the wind.
     """
 
     airspeed: Samples
@@ -136,7 +147,7 @@ class AirData:
 
 
 def read_air(log: ColumnLog) -> AirData:
-    """Read airspeed and wind.
+    """Read the airspeed and the wind of a log.
 
     The ratio of true to indicated airspeed comes from static pressure and temperature if the table has both.  A log
     without wind gets the wind of the triangle of ground velocity, heading and airspeed.
@@ -146,20 +157,21 @@ def read_air(log: ColumnLog) -> AirData:
         pressure = _group(log, "static_pressure", "temperature")
         density = pressure.values[:, 0] / (_GAS_CONSTANT * (pressure.values[:, 1] + _ZERO_CELSIUS_K))
         ratio = Samples(pressure.time, np.sqrt(_SEA_LEVEL_DENSITY / density)[:, np.newaxis])
-    airspeed = true = _group(log, "airspeed")
+    airspeed = true_airspeed = _group(log, "airspeed")
     if len(airspeed.time):
         factor = _airspeed_ratio_at(ratio, _group(log, "altitude"), airspeed.time)[:, np.newaxis]
         if log.frame("airspeed") == "true":
             airspeed = Samples(airspeed.time, airspeed.values / factor)
         else:
-            true = Samples(airspeed.time, airspeed.values * factor)
+            true_airspeed = Samples(airspeed.time, airspeed.values * factor)
     wind, source = _logged_wind(log), "wind of the table"
     if not len(wind.time):
-        wind, source = estimate_wind(read_velocity(log), _attitude(log), true), "the triangle of velocities"
-    return AirData(airspeed, true, ratio, wind, source)
+        wind, source = estimate_wind(read_velocity(log), _attitude(log), true_airspeed), "the triangle of velocities"
+    return AirData(airspeed, true_airspeed, ratio, wind, source)
 
 
 def _logged_wind(log: ColumnLog) -> Samples:
+    """Return the logged wind velocity to north and east, m/s, (n, 2); no rows if the table lacks the wind."""
     if log.has("wind_north", "wind_east"):
         return join([log.series("wind_north"), log.series("wind_east")])
     if log.has("wind_speed", "wind_direction"):
@@ -170,36 +182,45 @@ def _logged_wind(log: ColumnLog) -> Samples:
 
 
 def _airspeed_ratio_at(ratio: Samples, height: Samples, time: Floats) -> Floats:
-    """Return the ratio of true to indicated airspeed at these times; without rows the standard atmosphere's ratio."""
+    """Return the ratio of true to indicated airspeed at the given times, (n,).
+
+    Without rows in `ratio`, the ratio of the standard atmosphere at the altitude is returned.
+    """
     if len(ratio.time):
         return np.asarray(np.interp(time, ratio.time, ratio.values[:, 0]))
-    amsl = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
-    return np.asarray((1.0 - 2.25577e-5 * np.clip(amsl, -500.0, 9000.0)) ** -2.12794)
+    altitude = np.interp(time, height.time, height.values[:, 0]) if len(height.time) else np.zeros(len(time))
+    return np.asarray((1.0 - 2.25577e-5 * np.clip(altitude, -500.0, 9000.0)) ** -2.12794)
 
 
 def _controls(log: ColumnLog) -> tuple[Samples, tuple[bool, bool, bool], bool]:
-    """Return the controls as `MotionLog` has them, which of them are angles, and True if there are elevons.
+    """Return the controls as in `MotionLog`, flags for the surfaces given as angles, and True if there are elevons.
 
-    Left and right halves of a surface become one surface: an elevator is their mean, an aileron half their difference.
+    Left and right halves become one surface: the elevator is their mean, the aileron half their difference.  There are
+    no rows if elevator, aileron or throttle is missing; a missing rudder is 0.
     """
-    halves = log.has("elevon_left", "elevon_right")
+    has_elevons = log.has("elevon_left", "elevon_right")
     elevator = _surface(
-        log, "elevator", ("elevon_left", "elevon_right") if halves else ("elevator_left", "elevator_right")
+        log, "elevator", ("elevon_left", "elevon_right") if has_elevons else ("elevator_left", "elevator_right")
     )
-    aileron = _surface(log, "aileron", ("elevon_left", "elevon_right") if halves else ("aileron_left", "aileron_right"))
+    aileron = _surface(
+        log, "aileron", ("elevon_left", "elevon_right") if has_elevons else ("aileron_left", "aileron_right")
+    )
     rudder = _surface(log, "rudder", ())
     if elevator is None or aileron is None or not log.has("throttle"):
-        return NO_SAMPLES, (False, False, False), halves
+        return NO_SAMPLES, (False, False, False), has_elevons
     (elevator_series, elevator_unit), (aileron_series, aileron_unit) = elevator, aileron
     rudder_series, rudder_unit = rudder or (Series(elevator_series.time, 0.0 * elevator_series.values), "rad")
     negated = Series(elevator_series.time, -elevator_series.values), Series(rudder_series.time, -rudder_series.values)
     samples = join([negated[0], aileron_series, negated[1], log.series("throttle")])
     angles = tuple(unit not in FRACTION_UNITS for unit in (elevator_unit, aileron_unit, rudder_unit))
-    return samples, (angles[0], angles[1], angles[2]), halves
+    return samples, (angles[0], angles[1], angles[2]), has_elevons
 
 
 def _surface(log: ColumnLog, name: str, halves: tuple[str, ...]) -> tuple[Series, str] | None:
-    """Return a surface's deflections and unit, from one column or from its halves; None if the table lacks them."""
+    """Return a surface's deflections and their unit, from its own column or from its two halves.
+
+    Return None if the table lacks them.  Raises LogError for one half as an angle and the other as a fraction.
+    """
     if log.has(name):
         return log.series(name), log.unit(name)
     if not halves or not log.has(*halves):

@@ -20,9 +20,11 @@ _DATUMS: dict[str, VerticalDatum] = {"amsl": "amsl", "ellipsoid": "ellipsoid", "
 
 
 def read_columns(path: Path) -> RawLog:
-    """Read a log.  path: a table of columns, or a data file with a table next to it.
+    """Read a log by its table of columns.
 
-    Raises LogError, in one line, for a file that cannot be read and for a table without latitude and longitude.
+    path: a table of columns, or a data file with a table next to it.
+
+    Raises LogError for a file that cannot be read, and for a table without latitude or longitude.
     """
     log = ColumnLog(path)
     for quantity in ("latitude", "longitude"):
@@ -48,6 +50,7 @@ def read_columns(path: Path) -> RawLog:
 
 
 def _position(log: ColumnLog) -> LogSeries:
+    """Return latitude, longitude (deg) and altitude (m), (n, 3); the altitude is NaN if the table has none."""
     latitude, longitude = log.series("latitude"), log.series("longitude")
     parts = join([latitude, longitude])
     up = np.full(len(parts.time), math.nan)
@@ -79,7 +82,7 @@ def _series(log: ColumnLog) -> Iterator[tuple[str, LogSeries]]:
 
 
 def _battery(log: ColumnLog) -> LogSeries:
-    """Return current and the energy taken from the battery, Wh; NaN without a voltage."""
+    """Return the current, A, and the energy taken from the battery, Wh, (n, 2); the energy is NaN without a voltage."""
     if not log.has("voltage"):
         current = join([log.series("current")])
         return LogSeries(
@@ -93,13 +96,14 @@ def _battery(log: ColumnLog) -> LogSeries:
 
 
 def _missions(log: ColumnLog) -> Iterator[LoggedMission]:
+    """Yield the mission file that the table names, if any."""
     if log.table.mission is not None:
         path = log.table_path.parent / log.table.mission
         yield LoggedMission(0.0, read_mission(path), path.name)
 
 
 def _modes(log: ColumnLog) -> Iterator[ModeChange]:
-    """Yield each change of `mode`, named by [modes]."""
+    """Yield each change of the quantity `mode`, with the mode's name from the table's [modes]."""
     if not log.has("mode"):
         return
     time, values = log.raw("mode")

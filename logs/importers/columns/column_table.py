@@ -23,7 +23,9 @@ class _Table(BaseModel):
 class AlignTable(_Table):
     """[clocks.NAME.align]: a pair of signals whose correlation gives the offset of the clock from the main clock.
 
-    column: a column on this clock.  with: the quantity that moves with it, on the main clock, or another column.
+    column: a column with this clock.
+    with: the quantity that varies with the column, on the main clock, or a column with the main clock.
+    within_s: largest offset, s.
     """
 
     column: str
@@ -32,7 +34,7 @@ class AlignTable(_Table):
 
 
 class ClockTable(_Table):
-    """[clocks.NAME]: column of times; without a column, the rows are counted at ``rate``, Hz."""
+    """[clocks.NAME]: column of times; without a column, the times follow from the row numbers and ``rate``, Hz."""
 
     file: str | None = None
     column: str | None = None
@@ -43,7 +45,7 @@ class ClockTable(_Table):
 
 
 class ConditionTable(_Table):
-    """Condition ``when`` of a column: the rows in which another column of the same clock has a value."""
+    """Condition ``when`` of a column: only the rows in which another column with the same clock has this value."""
 
     column: str
     value: float | str
@@ -68,6 +70,7 @@ class ColumnTable(_Table):
 
     @model_validator(mode="after")
     def _check_source(self) -> "ColumnTable":
+        """Raise ValueError unless the entry has either a column or a constant."""
         if (self.column is None) == (self.value is None):
             raise ValueError("expected either `column`, the name of a column, or `value`, a constant")
         return self
@@ -81,6 +84,7 @@ class ModesTable(_Table):
 
 
 def _as_list(entry: Any) -> Any:
+    """Return a single entry as a list of one entry."""
     return entry if isinstance(entry, list) else [entry]
 
 
@@ -109,6 +113,7 @@ class LogTable(_Table):
 
     @model_validator(mode="after")
     def _check_entries(self) -> "LogTable":
+        """Raise ValueError for an unknown quantity, unit, frame or clock, and for clocks that cannot be aligned."""
         for quantity, entries in self.columns.items():
             if quantity not in QUANTITIES:
                 known = did_you_mean(quantity, QUANTITIES) or f": expected one of {', '.join(QUANTITIES)}"
@@ -129,6 +134,7 @@ class LogTable(_Table):
         return self
 
     def _check_entry(self, quantity: str, entry: ColumnTable) -> None:
+        """Raise ValueError for an entry with an unknown unit, frame or clock."""
         field, known = f"columns.{quantity}", QUANTITIES[quantity]
         if entry.unit or "" not in UNITS[known.dimension]:
             _check_choice(f"{field}.unit", entry.unit, UNITS[known.dimension])
@@ -139,6 +145,7 @@ class LogTable(_Table):
 
 
 def _check_choice(field: str, value: str, allowed: Iterable[str]) -> None:
+    """Raise ValueError if a value is not one of the allowed values."""
     choices = tuple(allowed)
     if value not in choices:
         expected = f"expected {', '.join(choices)}" if choices else "none is allowed here"
@@ -146,7 +153,7 @@ def _check_choice(field: str, value: str, allowed: Iterable[str]) -> None:
 
 
 def read_table(path: Path) -> LogTable:
-    """Read and check a table.  Raises LogError in one line: file, key, value and what is allowed."""
+    """Read and check a table of columns.  Raises LogError with the file, the key, the value and the allowed values."""
     text = read_small_file(path, _MAX_BYTES, "table of columns", LogError)
     try:
         data = toml_table(text.decode("utf-8-sig"))

@@ -1,4 +1,4 @@
-"""Read all columns of a CSV, MAT, Parquet or HDF5 file as arrays by name."""
+"""Read all columns of a CSV, MAT, Parquet or HDF5 file into arrays by name."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -18,7 +18,7 @@ _MAT_73 = b"MATLAB 7.3"
 _HDF5 = b"\x89HDF"
 # Characters that can separate the cells of a CSV file.
 _SEPARATORS = ",;\t"
-# A number as a CSV cell.
+# Pattern of a CSV cell with a number or without a value.
 _NUMBER = re.compile(r"\s*[-+]?(\d+[.,]?\d*|[.,]\d+)([eE][-+]?\d+)?\s*|\s*(nan|inf)?\s*", re.IGNORECASE)
 
 
@@ -27,7 +27,7 @@ class DataFile:
     """Columns of a data file.
 
     path: the file.
-    columns: arrays (n,) by name, in the order of the file; their lengths may differ.
+    columns: one-dimensional arrays by name, in the order of the file; their lengths may differ.
     units: units by name, for a CSV file that states them in a row below its header.
     """
 
@@ -37,7 +37,7 @@ class DataFile:
 
 
 def read_data_file(path: Path) -> DataFile:
-    """Read a data file.  Raises LogError, in one line, for a file that cannot be read or that holds no columns."""
+    """Read a data file.  Raises LogError for a file that cannot be read or that has no rows."""
     suffix = path.suffix.lower()
     readers: dict[str, Callable[[Path], DataFile]] = {
         ".csv": _read_csv,
@@ -70,6 +70,7 @@ def read_data_file(path: Path) -> DataFile:
 
 
 def _read_csv(path: Path) -> DataFile:
+    """Read a CSV file with a header line, which may follow remarks and precede a line with units."""
     import pandas as pd
 
     text = path.read_bytes().decode("utf-8-sig", errors="replace")
@@ -98,11 +99,14 @@ def _read_csv(path: Path) -> DataFile:
     # The names are given, so that a separator at the end of a row does not make its first cell an index.
     options = {"header": None, "names": names, "index_col": False, "skipinitialspace": True, "low_memory": False}
     table = pd.read_csv(StringIO(body), sep=separator, decimal=decimal, **options)
-    return DataFile(path, {str(name): _without_text(table[name].to_numpy()) for name in table.columns}, units)
+    return DataFile(path, {str(name): _numbers_as_float64(table[name].to_numpy()) for name in table.columns}, units)
 
 
 def _is_remark(line: str, next_lines: list[str]) -> bool:
-    """Return True for a remark; the last line with a # before the rows can be the header."""
+    """Return True if a line is a remark.
+
+    A line that begins with # or % and has as many cells as the next line is the header instead.
+    """
     if not line.lstrip().startswith(("#", "%")):
         return False
     separator = max(_SEPARATORS, key=line.count)
@@ -111,7 +115,11 @@ def _is_remark(line: str, next_lines: list[str]) -> bool:
 
 
 def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width: int) -> None:
-    """Raise LogError for rows with another number of cells than the header."""
+    """Raise LogError if a row has another number of cells than the header.
+
+    rows: number and text of each line.
+    width: number of cells in the header.
+    """
     for number, line in rows:
         cells = line.count(separator) + 1
         # A separator at the end of each row adds an empty cell; quoted cells may contain separators.
@@ -120,8 +128,8 @@ def _check_widths(path: Path, rows: list[tuple[int, str]], separator: str, width
             raise LogError(f"{path}: line {number}: {cells} cells: {allowed}", file=path, value=cells, allowed=allowed)
 
 
-def _without_text(values: Column) -> Column:
-    """Return numbers as float64, and other values as they are."""
+def _numbers_as_float64(values: Column) -> Column:
+    """Return numeric values as float64, and other values unchanged."""
     return values.astype(np.float64) if values.dtype.kind in "fiub" else values
 
 
@@ -130,6 +138,7 @@ def _without_text(values: Column) -> Column:
 
 
 def _read_mat(path: Path) -> DataFile:
+    """Read the variables of a MAT file; a file of version 7.3 is read as HDF5."""
     with path.open("rb") as file:
         head = file.read(128)
     if head.startswith(_MAT_73) or head.startswith(_HDF5):
@@ -146,7 +155,10 @@ def _read_mat(path: Path) -> DataFile:
 
 
 def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[str, Column]]:
-    """Yield the columns of a variable: of a struct, its fields; of a matrix, its columns, by their labels if known."""
+    """Yield the names and values of a variable's columns: the fields of a struct, or the columns of a matrix.
+
+    labels: names of a matrix's columns, if known.
+    """
     if hasattr(value, "_fieldnames"):
         for field_name in value._fieldnames:
             yield from _mat_columns(f"{name}.{field_name}", getattr(value, field_name))
@@ -161,7 +173,10 @@ def _mat_columns(name: str, value: Any, labels: Any = None) -> Iterator[tuple[st
 
 
 def _array_columns(name: str, array: Column, titles: list[str] | None = None) -> Iterator[tuple[str, Column]]:
-    """Yield an array of one dimension, or each column of a matrix, whose rows are along its longer axis."""
+    """Yield an array of one dimension, or each column of a matrix, with their names; ignore other arrays.
+
+    The longer axis of a matrix is taken as its rows, unless the number of titles shows which axis has the columns.
+    """
     if array.ndim < 2:
         values = np.atleast_1d(array)
         yield name, values.astype(np.float64) if values.dtype.kind in "fiub" else values
@@ -182,22 +197,25 @@ def _array_columns(name: str, array: Column, titles: list[str] | None = None) ->
 
 
 def _read_parquet(path: Path) -> DataFile:
+    """Read a Parquet file."""
     import pyarrow.parquet as pq
 
     table = pq.read_table(path)
     columns = {}
     for name in table.column_names:
         values = table[name].to_numpy()
-        columns[name] = _without_text(np.asarray(values))
+        columns[name] = _numbers_as_float64(np.asarray(values))
     return DataFile(path, columns)
 
 
 def _read_hdf5(path: Path) -> DataFile:
+    """Read all data sets of an HDF5 file or of a MAT file of version 7.3."""
     import h5py
 
     columns: dict[str, Column] = {}
 
     def visit(name: str, item: Any) -> None:
+        """Add the columns of a data set; groups and MATLAB's internal data sets are ignored."""
         if not isinstance(item, h5py.Dataset) or name.startswith("#"):
             return
         title, values = name.replace("/", "."), np.asarray(item[()])

@@ -1,4 +1,4 @@
-"""Recognise data files and tables of columns by their names, and find the table of a data file."""
+"""Recognize data files and tables of columns by their names, and find the table of a data file."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ TABLE_SUFFIX = ".columns.toml"
 
 
 def is_table(path: Path) -> bool:
-    """Return True if a file is a table of columns, by its name.
+    """Return True if a file has the name of a table of columns.
 
     >>> is_table(Path("flight.columns.toml")), is_table(Path("columns.toml")), is_table(Path("scenario.toml"))
     (True, True, False)
@@ -22,7 +22,10 @@ def is_table(path: Path) -> bool:
 
 
 def find_table(path: Path) -> Path:
-    """Return the table of columns of a data file, or of its folder.  Raises LogError if there is neither."""
+    """Return the path of the table of columns for a data file: its own table, or the table of its folder.
+
+    Raises LogError if there is neither.
+    """
     choices = (path.with_name(f"{path.stem}{TABLE_SUFFIX}"), path.with_name(FOLDER_TABLE))
     for choice in choices:
         if choice.is_file():

@@ -1,4 +1,4 @@
-"""Write a starting table of columns for data files, guessed from names and values, for a person to check."""
+"""Write a first table of columns for data files, guessed from names and values, for a person to check."""
 
 import os
 import re
@@ -15,7 +15,7 @@ from logs.importers.columns.quantities import ANGLES, QUANTITIES, QUATERNION, UN
 from world.arrays import Floats
 from world.errors import LogError
 
-# Names of columns by quantity, in lower case without other characters than letters and digits; the first one wins.
+# Names of columns by quantity, as only lower-case letters and digits; the first name that is found is used.
 NAMES: dict[str, tuple[str, ...]] = {
     "latitude": ("navlat", "lat", "latitude", "gpslat", "latitudedeg"),
     "longitude": ("navlon", "lon", "lng", "long", "longitude", "gpslon", "gpslng"),
@@ -98,7 +98,7 @@ _TIMES = (
     "motortime",
     "seconds",
 )
-# Quantities that decide by themselves what can be done with a log, for the list of what was not found.
+# Quantities that a command needs, for the list of quantities that were not found.
 _NEEDED = {
     "import": ("latitude", "longitude", "altitude"),
     "aircraft --identify": (
@@ -122,7 +122,7 @@ _SPELLINGS = {
     **{"degs": "deg/s", "dps": "deg/s", "rads": "rad/s", "mps": "m/s", "kts": "kt", "knots": "kt", "kmh": "km/h"},
     **{"mps2": "m/s2", "m/s^2": "m/s2", "c": "degC", "pct": "%", "percent": "%", "sec": "s"},
 }
-# Units to try for each dimension, the first in which the values are plausible is guessed.
+# Units to try for each dimension; the first unit in which the values are plausible is guessed.
 _TRIED = {
     "angle": ("rad", "deg", "cdeg", "degE7"),
     "angular rate": ("rad/s", "deg/s"),
@@ -139,7 +139,7 @@ _TRIED = {
 }
 # Range of usual intervals between rows, s.
 _STEPS_S = (0.001, 5.0)
-# Least median of some quantities in flight, which tells their units apart.
+# Minimum median of some quantities in flight, which distinguishes their units.
 _LEAST_MEDIANS = {"acceleration_down": 4.0, "voltage": 2.5}
 # Highest voltage that is guessed, V.
 _HIGHEST_VOLTAGE_V = 130.0
@@ -154,9 +154,11 @@ _UNIT_SUFFIX = re.compile(r"(?:\s*[\[(]\s*([^\])]*)\s*[\])]|_([a-zA-Z%]+[0-9]?))
 
 @dataclass(frozen=True, slots=True)
 class _Clock:
-    """Column of times of a group of columns: the columns of one file with one prefix and one length.
+    """Column of times for a group of columns: those of one file with the same prefix and length.
 
-    unit: of its times.  span: first and last time, s.
+    unit: unit of the times.
+    length: number of rows.
+    span: first and last time, s.
     """
 
     file: str
@@ -168,17 +170,17 @@ class _Clock:
 
     @property
     def group(self) -> tuple[str, str, int]:
-        """File, prefix and length of the columns on this clock."""
+        """File, prefix and length of the columns with this clock."""
         return self.file, self.prefix, self.length
 
     def overlap(self, other: "_Clock") -> float:
-        """Return the time that this clock has in common with another clock, s."""
+        """Return the duration that this clock has in common with another clock, s; negative without a common time."""
         return min(self.span[1], other.span[1]) - max(self.span[0], other.span[0])
 
 
 @dataclass(frozen=True, slots=True)
 class _Guess:
-    """Guessed entry of the table.  reason: remark for the person who checks it."""
+    """Guessed entry of the table.  reason: remark for the person who checks the entry."""
 
     quantity: str
     column: str
@@ -191,8 +193,10 @@ class _Guess:
 def guess_table(paths: Sequence[Path], target: Path) -> str:
     """Return the text of a table of columns for data files.
 
-    paths: the files, of which the first is the main one.  target: the table that will hold the text.
-    Raises LogError for a file that cannot be read, and if no column was recognised.
+    paths: data files, the main file first.
+    target: path of the table, to which the files' paths in the text are relative.
+
+    Raises LogError for a file that cannot be read, and if no column was recognized.
     """
     files = {_relative(path, target): read_data_file(path) for path in paths}
     times = [clock for file, data in files.items() for clock in _times(data, file)]
@@ -211,26 +215,30 @@ def guess_table(paths: Sequence[Path], target: Path) -> str:
     rivals_of_guesses: list[_Guess] = []
     for quantity in NAMES:
         # A column with the rate of the sensors is preferred.
-        found = sorted(_candidates(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
-        guesses += found[:1]
-        rivals_of_guesses += [guess for guess in found[1:] if guess.clock != found[0].clock]
+        candidates = sorted(_candidates(quantity, clocks, files), key=lambda guess: guess.clock != clocks[0])
+        guesses += candidates[:1]
+        rivals_of_guesses += [guess for guess in candidates[1:] if guess.clock != candidates[0].clock]
     if not guesses:
         names = ", ".join(list(next(iter(files.values())).columns)[:12])
-        raise LogError(f"{paths[0]}: no column was recognised among {names}; write a table by hand", file=paths[0])
+        raise LogError(f"{paths[0]}: no column was recognized among {names}; write a table by hand", file=paths[0])
     return _table_text(guesses, rivals_of_guesses, files)
 
 
 def _relative(path: Path, target: Path) -> str:
+    """Return a path relative to the folder of the table, with forward slashes."""
     return Path(os.path.relpath(path, target.parent)).as_posix()
 
 
 def _plain(name: str) -> str:
-    """Return a name in lower case without other characters than letters and digits."""
+    """Return only the letters and digits of a name, in lower case."""
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def _parts(data: DataFile, column: str) -> tuple[str, str, str]:
-    """Return the group of a column, its own name without a unit, and the unit that name or file state."""
+def _name_parts(data: DataFile, column: str) -> tuple[str, str, str]:
+    """Return the prefix of a column's name, the rest without a unit, and the unit that the name or the file states.
+
+    The unit is "" if neither states one.
+    """
     prefix, _, own = column.rpartition(".")
     unit = _SPELLINGS.get(data.units.get(column, "").strip().lower(), "")
     match = _UNIT_SUFFIX.search(own)
@@ -241,9 +249,9 @@ def _parts(data: DataFile, column: str) -> tuple[str, str, str]:
 
 
 def _times(data: DataFile, file: str) -> Iterator[_Clock]:
-    """Yield each column of rising times."""
+    """Yield a clock for each column with increasing times and the name of a time."""
     for column, values in data.columns.items():
-        prefix, own, unit = _parts(data, column)
+        prefix, own, unit = _name_parts(data, column)
         if {_plain(own), _plain(column.rpartition(".")[2])} & set(_TIMES) and (unit := _time_unit(values, unit)):
             factor = UNITS["time"][unit]
             span = (0.0, 0.0) if unit == "iso" else (float(values[0]) * factor, float(values[-1]) * factor)
@@ -251,7 +259,10 @@ def _times(data: DataFile, file: str) -> Iterator[_Clock]:
 
 
 def _time_unit(values: Column, stated: str) -> str:
-    """Return the unit in which a column holds rising times, or "" if it holds none."""
+    """Return the unit in which a column has increasing times at usual intervals; "" if the column has no such times.
+
+    stated: unit from the column's name or the file, or "".
+    """
     if values.dtype.kind == "M":
         return "iso"
     if values.dtype.kind not in "fiu":
@@ -259,28 +270,33 @@ def _time_unit(values: Column, stated: str) -> str:
     steps = np.diff(values.astype(np.float64))
     if len(steps) < 2 or not np.isfinite(steps).all() or (steps < 0.0).any() or not (steps > 0.0).any():
         return ""
-    usual = float(np.median(steps[steps > 0.0]))
+    usual_step = float(np.median(steps[steps > 0.0]))
     units = [stated] if stated in UNITS["time"] else ["s", "ms", "us", "ns"]
-    return next((unit for unit in units if _STEPS_S[0] <= usual * UNITS["time"][unit] <= _STEPS_S[1]), "")
+    return next((unit for unit in units if _STEPS_S[0] <= usual_step * UNITS["time"][unit] <= _STEPS_S[1]), "")
 
 
 def _candidates(quantity: str, clocks: Sequence[_Clock], files: dict[str, DataFile]) -> Iterator[_Guess]:
-    """Yield the columns that can hold a quantity, the best name first."""
+    """Yield a guess for each column that can hold a quantity, the best name first."""
     for name in NAMES[quantity]:
         for clock in clocks:
             data = files[clock.file]
             for column, values in data.columns.items():
-                prefix, own, unit = _parts(data, column)
-                is_here = prefix == clock.prefix and len(values) == clock.length
-                if not is_here or name not in (_plain(own), _plain(column.rpartition(".")[2])):
+                prefix, own, unit = _name_parts(data, column)
+                has_clock = prefix == clock.prefix and len(values) == clock.length
+                if not has_clock or name not in (_plain(own), _plain(column.rpartition(".")[2])):
                     continue
-                guess = _guess(quantity, column, clock, values, unit)
+                guess = _guess_unit(quantity, column, clock, values, unit)
                 if guess is not None:
                     yield guess
 
 
-def _guess(quantity: str, column: str, clock: _Clock, values: Column, stated: str) -> _Guess | None:
-    """Return the guess of unit and frame of a column; None if its values are not plausible in any unit."""
+def _guess_unit(quantity: str, column: str, clock: _Clock, values: Column, stated: str) -> _Guess | None:
+    """Guess the unit and the frame of a column.
+
+    Return None if the column is not numeric, if it is constant, or if it is implausible in every unit.
+
+    stated: unit from the column's name or the file, or "".
+    """
     entry = QUANTITIES[quantity]
     if quantity == "mode":
         return _Guess(quantity, column, clock, "", "", "")
@@ -294,24 +310,25 @@ def _guess(quantity: str, column: str, clock: _Clock, values: Column, stated: st
     if unit is None:
         return None
     reason = f": largest value {np.abs(known).max():.4g}" + (f", named {stated}" if stated and unit == stated else "")
-    return _Guess(quantity, column, clock, unit, _frame(quantity, column, known), reason)
+    return _Guess(quantity, column, clock, unit, _guess_frame(quantity, column, known), reason)
 
 
 def _plausible_unit(quantity: str, known: Floats) -> str | None:
-    """Return the first unit in which values are plausible, or None."""
+    """Return the first unit in which the finite values of a quantity are plausible, or None."""
     entry = QUANTITIES[quantity]
     for unit in _TRIED[entry.dimension]:
         values = known * UNITS[entry.dimension][unit] + UNIT_ZEROS.get(unit, 0.0)
-        inside = float(((values >= entry.low) & (values <= entry.high)).mean())
+        plausible_fraction = float(((values >= entry.low) & (values <= entry.high)).mean())
         median = float(np.median(np.abs(values)))
         is_usual = median >= _LEAST_MEDIANS.get(quantity, 0.0)
         is_usual &= quantity != "voltage" or median <= _HIGHEST_VOLTAGE_V
-        if inside >= 0.98 and is_usual:
+        if plausible_fraction >= 0.98 and is_usual:
             return unit
     return None
 
 
-def _frame(quantity: str, column: str, known: Floats) -> str:
+def _guess_frame(quantity: str, column: str, known: Floats) -> str:
+    """Guess the frame of a column from its name or the sign of its finite values; "" for a quantity without frames."""
     if quantity == "airspeed":
         return "true" if "tas" in column.lower() or "true" in column.lower() else "indicated"
     if quantity == "acceleration_down":
@@ -321,18 +338,21 @@ def _frame(quantity: str, column: str, known: Floats) -> str:
 
 
 def _clock_names(guesses: Sequence[_Guess]) -> dict[_Clock, str]:
-    """Return the names of the clocks that guesses use; the one with most guesses is the main clock."""
+    """Return the names of the clocks that the guesses use; the clock with the most guesses is the main clock."""
     counts = Counter(guess.clock for guess in guesses)
     names: dict[_Clock, str] = {}
     for clock, _ in counts.most_common():
-        own = clock.prefix.rpartition(".")[2] or Path(clock.file).stem
-        name = re.sub(r"\W", "_", own) if names else MAIN_CLOCK
+        source_name = clock.prefix.rpartition(".")[2] or Path(clock.file).stem
+        name = re.sub(r"\W", "_", source_name) if names else MAIN_CLOCK
         names[clock] = name if name not in names.values() else f"{name}_{len(names)}"
     return names
 
 
 def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict[str, DataFile]) -> str:
-    """Return the text of the table.  rivals: other columns for the same quantities, on other clocks."""
+    """Return the text of the table.
+
+    rivals: other columns for the guessed quantities, with other clocks.
+    """
     file, names = next(iter(files)), _clock_names(guesses)
     lines = [*_HEAD, f'file = "{file}"', 'program = ""']
     main = next(clock for clock, name in names.items() if name == MAIN_CLOCK)
@@ -345,7 +365,7 @@ def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict
         is_separate = clock != main and (clock.file != main.file or clock.prefix == main.prefix)
         if is_separate and partner is not None:
             pair = f'column = "{partner.column}", with = "{partner.quantity}"'
-            lines.append(f"align = {{ {pair} }}  # guess: both move together")
+            lines.append(f"align = {{ {pair} }}  # guess: both vary together")
         elif is_separate:
             lines.append('# guess: the same clock as main; otherwise add align = { column = "...", with = "..." }')
     lines += ["", "[columns]"]
@@ -358,7 +378,7 @@ def _table_text(guesses: Sequence[_Guess], rivals: Sequence[_Guess], files: dict
 
 
 def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
-    """Yield the quantities that were not found, as remarks."""
+    """Yield remarks on the quantities that were not found."""
     found = {guess.quantity for guess in guesses}
     substitutes = dict.fromkeys(ANGLES, QUATERNION[-1]) | {
         "elevator": "elevon_left",
@@ -376,7 +396,7 @@ def _missing_lines(guesses: Sequence[_Guess]) -> Iterator[str]:
 
 
 def _unused_lines(guesses: Sequence[_Guess], files: dict[str, DataFile]) -> Iterator[str]:
-    """Yield the columns that no guess uses, as remarks."""
+    """Yield remarks on the columns that no guess uses."""
     used = {(guess.clock.file, guess.column) for guess in guesses} | {
         (guess.clock.file, guess.clock.column) for guess in guesses
     }

@@ -1,4 +1,4 @@
-"""Quantities that a table of columns can name, with their units, frames and plausible ranges."""
+"""Define the quantities that a table of columns can name, with their units, frames and plausible ranges."""
 
 import math
 from typing import NamedTuple
@@ -116,7 +116,7 @@ _NEGATED_BY_FRAME = {
 
 
 def to_frame(quantity: str, frame: str) -> tuple[float, float]:
-    """Return factor and offset that convert a quantity of a frame to its first frame, SI units and radians.
+    """Return the factor and the offset that convert a quantity from a frame to its default frame, in SI units and rad.
 
     >>> to_frame("velocity_down", "ENU"), to_frame("velocity_down", "NED")
     ((-1.0, 0.0), (1.0, 0.0))
@@ -129,7 +129,9 @@ def to_frame(quantity: str, frame: str) -> tuple[float, float]:
 
 
 def better_unit(quantity: str, unit: str, size: float) -> str:
-    """Return a unit in which values of this size (in ``unit``) would be plausible; "" if there is none.
+    """Return another unit in which values of this size would be plausible; "" if there is none.
+
+    size: size of the values in ``unit``.
 
     >>> better_unit("roll", "rad", 179.0), better_unit("throttle", "fraction", 85.0), better_unit("roll", "deg", 9e9)
     ('deg', '%', '')

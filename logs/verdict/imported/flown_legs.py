@@ -1,4 +1,4 @@
-"""Find the legs of a route that were flown in each stretch of an imported log, which may contain only some."""
+"""Find the legs of a route that were flown in each stretch of an imported log; a stretch may contain only some legs."""
 
 from dataclasses import dataclass, replace
 
@@ -24,7 +24,7 @@ from world.arrays import Floats
 
 @dataclass(frozen=True, slots=True)
 class FlownLegs:
-    """Legs of one stretch.
+    """Legs of a route that were flown in one stretch of a log.
 
     stretch: times of the stretch, and how it ended.
     first, last: waypoints between which the stretch was flown.
@@ -114,7 +114,7 @@ def _earliest_lap(
         requirements = route_requirements(replace(setup, route=part_of_route(setup.route, 0, end)))
         lap_aligned = align_track(requirements, rows)
         lap_indices = waypoint_indices if lap_aligned is None else identified_waypoints(requirements, lap_aligned)
-        # Include each item once: a place that was passed once is near its waypoints in all laps.
+        # Count each item once: a position that was passed once is near the item's waypoints of all laps.
         if lap_aligned is not None and len(np.unique(items[lap_indices])) >= len(np.unique(items[waypoint_indices])):
             return lap_aligned, lap_indices
     return aligned, waypoint_indices
@@ -127,9 +127,10 @@ def rows_between(track: Track, start: float, end: float) -> Track:
 
 
 def identified_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
-    """Return the waypoints that the track passes closely enough to identify them, in order.
+    """Return the indices of the waypoints that the track passes closely enough to identify them, in order.
 
-    Waypoints at the very start or end of the track are not included.
+    At the start and the end of the track, a waypoint must be within its fly-by offset plus a tolerance, or within the
+    corridor.
     """
     edge_distance = np.maximum(requirements.fly_by_offset + FINAL_WAYPOINT_TOLERANCE_M, requirements.setup.corridor)
     is_inner = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
@@ -149,8 +150,8 @@ class PlanMismatch:
     """The reason why a flight did not follow a plan.
 
     kind: "place" if it came near none of the plan's waypoints, "order" if it passed them in another order.
-    distance: m, to the nearest waypoint, for "place".
-    order: items of the first waypoints in the order in which they were passed, for "order".
+    distance: for "place", the minimum distance of the flight from a waypoint, m.
+    order: for "order", the items of the first waypoints in the order in which they were passed.
     """
 
     kind: str
@@ -167,7 +168,7 @@ class PlanMismatch:
 
 
 def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
-    """Find the reason why a flight did not follow the setup's mission; None if its mission stretches followed it.
+    """Find the reason why a flight did not follow the setup's mission; return None if it followed the mission.
 
     >>> from dataclasses import replace
     >>> from flight.simulation.setup import ImportedLog, MissionStretch
@@ -210,7 +211,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
 
 
 def _closest_distances(points: Floats, tracks: list[Track]) -> tuple[Floats, Floats]:
-    """Return each waypoint's minimum horizontal distance from the flight, m, (w,), and its time, s, (w,)."""
+    """Return each waypoint's minimum horizontal distance from the flight, m, and the time of this minimum, s, (w,)."""
     min_distances, times = np.full(len(points), np.inf), np.zeros(len(points))
     for rows in tracks:
         for k, point in enumerate(points):

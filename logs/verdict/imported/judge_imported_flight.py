@@ -53,7 +53,10 @@ def imported_lines(
     flown_stretches: Sequence[FlownLegs],
     conditions: Conditions,
 ) -> tuple[str, ...]:
-    """Return the lines of the summary, the headline first."""
+    """Return the lines of the summary, the headline first.
+
+    own_answer: answer of the verdict at its own level, with the headline.
+    """
     source = setup.source
     if source is None:
         return (own_answer.headline,)
@@ -69,7 +72,7 @@ def imported_lines(
     wind = setup.scenario.wind
     if source.wind:
         lines.append(f"Wind: {wind.speed:.1f} m/s on average, {source.wind}")
-    lines.append(f"Rows: {rows_text(source.faults, len(source.gaps))}")
+    lines.append(f"Rows: {row_faults_text(source.faults, len(source.gaps))}")
     if source.damage.lossy or source.damage.cut:
         lines.append(f"Lost: {damage_text(source.damage)}")
     lines += [f"Note: {note}" for note in source.notes]
@@ -102,7 +105,10 @@ def _judged_lines(source: ImportedLog, flown_stretches: Sequence[FlownLegs], leg
 
 
 def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
-    """Return a line for each rule with unjudged findings: the reason, and their number if others were judged."""
+    """Return a line for each rule with unjudged findings: their number and the first reason.
+
+    The number is left out if none of the rule's findings was judged.
+    """
     lines = []
     for rule in RULE_WORDS.values():
         rule_findings = [finding for finding in findings if finding.rule == rule.name]
@@ -115,7 +121,7 @@ def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
 
 
 def heights_text(source: ImportedLog) -> str:
-    """Describe which height was used, its datum, and the offsets of the other heights at the start.
+    """Describe the height that was used, its datum, and the offsets of the log's other heights at the start.
 
     >>> from flight.simulation.setup import HeightOffset, Heights
     >>> heights_text(ImportedLog("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
@@ -126,31 +132,31 @@ def heights_text(source: ImportedLog) -> str:
     return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{offset_text}"
 
 
-def rows_text(faults: RowFaults, gaps: int) -> str:
-    """Describe the faults of a log's rows.
+def row_faults_text(faults: RowFaults, gaps: int) -> str:
+    """Describe the faults of a log's rows by their numbers.  gaps: number of pauses between the rows.
 
-    >>> rows_text(RowFaults(doubled=2, clock_jumps=(12.5,)), 1)
-    '1 gap, 2 doubled, 1 jump of the clock (at 12.5 s)'
-    >>> rows_text(RowFaults(), 0)
+    >>> row_faults_text(RowFaults(doubled=2, clock_jumps=(12.5,)), 1)
+    '1 gap, 2 duplicates, 1 clock jump (at 12.5 s)'
+    >>> row_faults_text(RowFaults(), 0)
     'in order, without gaps'
     """
     counts = (
         (gaps, "gap" if gaps == 1 else "gaps"),
-        (faults.doubled, "doubled"),
+        (faults.doubled, "duplicate" if faults.doubled == 1 else "duplicates"),
         (faults.unordered, "out of order"),
         (faults.unusable, "without a position or a time"),
-        (faults.glitches, "position glitches"),
+        (faults.glitches, "position glitch" if faults.glitches == 1 else "position glitches"),
     )
     texts = [f"{count} {name}" for count, name in counts if count]
     if faults.clock_jumps:
         count = len(faults.clock_jumps)
         times = ", ".join(f"{time:.1f} s" for time in faults.clock_jumps[:_MAX_LISTED_JUMPS])
-        texts.append(f"{count} {'jump' if count == 1 else 'jumps'} of the clock (at {times})")
+        texts.append(f"{count} clock {'jump' if count == 1 else 'jumps'} (at {times})")
     return ", ".join(texts) or "in order, without gaps"
 
 
-# Largest number of runs of items that a line lists.
-_MAX_RUNS = 6
+# Largest number of ranges of consecutive items that a line lists.
+_MAX_LISTED_RANGES = 6
 
 
 def missing_text(missing: MissingItems) -> str:
@@ -163,32 +169,32 @@ def missing_text(missing: MissingItems) -> str:
     >>> missing_text(MissingItems((1, 2, 3), total=4, first=0, last=0, end=3))
     'not judged: items 1 to 3 of 4 are not in the log or ignored'
     """
-    runs: list[list[int]] = []
+    ranges: list[list[int]] = []
     for number in missing.numbers:
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1] = [runs[-1][0], number]
+        if ranges and number == ranges[-1][-1] + 1:
+            ranges[-1] = [ranges[-1][0], number]
         else:
-            runs.append([number])
-    run_texts = [" to ".join(map(str, number_run)) for number_run in runs[:_MAX_RUNS]]
-    if len(runs) > _MAX_RUNS:
-        run_texts.append(
-            f"{len(missing.numbers) - sum(number_run[-1] - number_run[0] + 1 for number_run in runs[:_MAX_RUNS])} more"
-        )
-    numbers_text = " and ".join(filter(None, [", ".join(run_texts[:-1]), run_texts[-1]]))
+            ranges.append([number])
+    listed_ranges = ranges[:_MAX_LISTED_RANGES]
+    range_texts = [" to ".join(map(str, item_range)) for item_range in listed_ranges]
+    if len(ranges) > _MAX_LISTED_RANGES:
+        listed_count = sum(item_range[-1] - item_range[0] + 1 for item_range in listed_ranges)
+        range_texts.append(f"{len(missing.numbers) - listed_count} more")
+    numbers_text = " and ".join(filter(None, [", ".join(range_texts[:-1]), range_texts[-1]]))
     before_text = f"before item {missing.first}" if missing.first > 1 else ""
     after_text = f"beyond item {missing.last}" if missing.last and missing.beyond else ""
-    range_text = " and ".join(filter(None, [before_text, after_text]))
+    unjudged_text = " and ".join(filter(None, [before_text, after_text]))
     is_several = len(missing.numbers) > 1
     total_text = f" of {missing.total}" if missing.total else ""
     items_text = (
         f"{('items' if is_several else 'item')} {numbers_text}{total_text} "
         f"{('are' if is_several else 'is')} not in the log or ignored"
     )
-    return f"not judged{' ' if range_text else ''}{range_text}: {items_text}"
+    return f"not judged{' ' if unjudged_text else ''}{unjudged_text}: {items_text}"
 
 
 def damage_text(damage: Damage) -> str:
-    """Describe which parts of a file could not be read.
+    """Describe the parts of a file that could not be read; return "nothing" for an undamaged file.
 
     >>> damage_text(Damage(places=2, size=40, cut=True))
     '2 places in the file (40 bytes) cannot be read; it ends within a message'
@@ -207,7 +213,7 @@ def damage_text(damage: Damage) -> str:
 
 
 def _start_time_text(source: ImportedLog) -> str:
-    """Describe the date and time at which the log's time is 0; return "" if the log does not state it plausibly."""
+    """Describe the date and time at which the log's time is 0; return "" if the log states no plausible date."""
     if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
         return ""
     return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
@@ -234,7 +240,7 @@ _UNNAMED_TEXT = "the aircraft is not named (--aircraft)"
 
 
 def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: bool) -> Verdict:
-    """Judge the stretches of a flight that followed its mission, at the level "flown".
+    """Judge the stretches of an imported flight that followed its mission; the verdict has the level "flown".
 
     setup: flight setup with the source of the flight.
     log_complete: True if planfly's own log of the flight has its end.
@@ -283,7 +289,7 @@ def judge_imported_flight(setup: FlightSetup, track: Track, *, log_complete: boo
 
 
 def _missing_part_text(findings: Sequence[Finding], missing: MissingItems | None) -> str:
-    """Describe the items, or the part of the flight, that the log lacks; return "" if it lacks none."""
+    """Describe the mission items, or the part of the flight, that are missing in the log; return "" if none is."""
     if missing is not None:
         return missing_text(missing)
     parts = [finding.reason for finding in findings if finding.rule == "completion" and finding.ok is None]
@@ -304,13 +310,13 @@ def _pauses_text(flown_stretches: Sequence[FlownLegs]) -> str:
 
 
 def _stretch_times(legs: FlownLegs) -> tuple[float, float]:
-    """Return start and end of a stretch's flight on its legs, s."""
+    """Return the times of the first and the last row on a stretch's legs, s."""
     time = legs.aligned.track.time
     return float(time[0]), float(time[-1])
 
 
 def _uncertainty_text(findings: Sequence[Finding]) -> str:
-    """Describe which findings an uncertain aircraft leaves undecided; return "" if there are none."""
+    """Name the findings that are undecided because the aircraft's model is uncertain; return "" if there are none."""
     text = undecided_text(findings)
     return f"not judged in full: {text}" if text else ""
 
@@ -327,7 +333,10 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
 
 
 def _findings_without_data(setup: FlightSetup, judged_rules: set[str]) -> list[Finding]:
-    """Return findings for rules with `LogNeeds.reports_missing` that found nothing because the log lacks their data."""
+    """Return a finding for each rule that judged nothing because the log lacks its data.
+
+    Only rules with `LogNeeds.reports_missing` are reported.
+    """
     findings = []
     for rule in RULES.values():
         missing_quantities = [
@@ -369,7 +378,7 @@ def _check_data(setup: FlightSetup, legs: FlownLegs, finding: Finding) -> Findin
 
 
 def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
-    """Describe when a stretch lacks values of a quantity that the log has elsewhere; return "" if it lacks none."""
+    """Describe the rows of a stretch without a value of a quantity; return "" if every row has one."""
     values = getattr(legs.aligned.track, _TRACK_COLUMNS[quantity])
     is_missing = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
     if not is_missing.any():
@@ -382,14 +391,17 @@ def _missing_values_text(legs: FlownLegs, quantity: Quantity) -> str:
 
 
 def _mark_unjudged(finding: Finding, cause: str, *, keep_measurements: bool = False) -> Finding:
-    """Return a finding marked as not judged because of ``cause``."""
+    """Return a copy of a finding that is not judged because of ``cause``.
+
+    keep_measurements: True to keep the finding's reason and facts.
+    """
     reason = f"{cause}; {finding.reason}" if keep_measurements else cause
     facts = finding.facts if keep_measurements else ()
     return replace(finding, ok=None, reason=reason, brief=cause, placed=False, margin=None, facts=facts, suggestions=())
 
 
 def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
-    """Mark a passed finding as not judged if the log has a pause in its leg."""
+    """Mark a passed finding as not judged if the log has a pause on its leg, or on the legs at its waypoint."""
     if finding.ok is not True or finding.place.index is None or finding.place.kind not in ("leg", "waypoint"):
         return finding
     track, rows = legs.aligned.track, legs.aligned.rows
@@ -404,7 +416,10 @@ def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
 
 
 def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
-    """Mark the unreached last waypoint as not judged, and findings on the leg before it as partial."""
+    """Mark findings on the unreached last waypoint, and on the leg to it, as not judged.
+
+    On that leg only rules that need the full leg are affected, and a failure remains.
+    """
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     is_unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint
     is_last_leg = finding.place.kind == "leg" and finding.place.index == leg
@@ -432,7 +447,7 @@ def _renumber_place(finding: Finding, first: int, setup: FlightSetup) -> Finding
 
 
 def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
-    """Merge the findings of all stretches: keep one for each rule, place and check, a failure rather than a pass."""
+    """Merge the findings of all stretches: keep one for each rule, place and check, a failure before a pass."""
     merged: dict[tuple[str, Place, str], Finding] = {}
     for findings in findings_by_stretch:
         for finding in findings:
@@ -445,7 +460,7 @@ def _merge_findings(findings_by_stretch: Sequence[Sequence[Finding]]) -> tuple[F
 
 
 def _merge_precedence(finding: Finding) -> int:
-    """Return a sort key that is greatest for a failed finding, less for a passed one, least for an unjudged one."""
+    """Return a finding's precedence in a merge: 2 for a failed, 1 for a passed and 0 for an unjudged finding."""
     return {False: 2, True: 1, None: 0}[finding.ok]
 
 

@@ -1,4 +1,4 @@
-"""Compare an imported flight with the model's flight of the same mission: leg by leg, turn by turn."""
+"""Compare an imported flight with a simulated flight of the same mission: leg by leg, turn by turn."""
 
 import math
 from collections.abc import Sequence
@@ -49,8 +49,11 @@ class Profile:
 class LegPair:
     """One leg as flown and as simulated, each a pair of numbers; NaN if a flight has none.
 
-    leg: index in the whole route.  cross_track, height_error: m, the farthest from the leg, signed.
-    ground_speed: m/s, mean.  bank: deg, the largest.  energy: Wh.
+    leg: index in the whole route.
+    cross_track, height_error: signed value with the largest absolute value, m.
+    ground_speed: mean ground speed, m/s.
+    bank: maximum absolute bank, deg.
+    energy: energy used on the leg, Wh.
     """
 
     leg: int
@@ -65,7 +68,11 @@ class LegPair:
 class TurnPair:
     """One turn as flown and as simulated.
 
-    waypoint: index in the whole route.  turn: deg.  overshoot: m.  bank: deg, the largest.  passed: m, nearest to it.
+    waypoint: index in the whole route.
+    turn: planned course change, deg.
+    overshoot: m, as in `logs.verdict.measures.turns.CornerPass`.
+    bank: maximum absolute bank, deg.
+    passed: minimum distance from the waypoint, m.
     """
 
     waypoint: int
@@ -77,24 +84,30 @@ class TurnPair:
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """Difference between the flights in one quantity: median and 95th percentile of its size, in ``unit``."""
+    """Absolute difference between two flights in one quantity, in ``unit``.
+
+    median, percentile_95: median and 95th percentile of the difference over all compared points.
+    """
 
     name: str
     unit: str
     median: float
-    most: float
+    percentile_95: float
 
 
 @dataclass(frozen=True, slots=True)
 class Reflight:
     """Imported flight and simulated flight side by side.
 
-    stretch: the part of the imported flight that is compared.
-    setup: setup of the simulated flight.  simulated: its rows.  ended: how it ended.
-    distance: (n,) m along the route's legs at which they are compared.
-    ends: (legs,) m along the route at which each leg ends.
-    flown, model: profiles.
-    first: number of the first leg in the whole route.
+    stretch: part of the imported flight that is compared.
+    setup: setup of the simulated flight.
+    simulated: track of the simulated flight.
+    ended: reason for the end of the simulated flight.
+    distance: distances along the route's legs at which the flights are compared, m, (n,).
+    ends: distance along the route at which each leg ends, m, (legs,).
+    flown, model: profiles of the imported and the simulated flight.
+    first: number of the first compared leg in the whole route.
+    legs, turns, spreads: comparisons of the legs, of the turns, and of each quantity over all points.
     stands_in: True if the log's aircraft is unknown, and another aircraft's model flew.
     """
 
@@ -116,9 +129,12 @@ class Reflight:
 def compare_with_model(
     setup: FlightSetup, stretch_legs: FlownLegs, simulated: Track, end_reason: str, *, stands_in: bool = False
 ) -> Reflight:
-    """Compare an imported flight with a model's flight of the same route.
+    """Compare an imported flight with a simulated flight of the same route.
 
-    setup: setup of the model's flight.  Raises LogError if the model's flight has too few rows.
+    setup: setup of the simulated flight.
+    end_reason: reason for the end of the simulated flight.
+
+    Raises LogError if the simulated flight has too few rows.
 
     >>> from flight.simulation.setup import MissionStretch
     >>> from logs.recording.example_log import example_log
@@ -126,7 +142,7 @@ def compare_with_model(
     >>> log = example_log()
     >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
     >>> again = compare_with_model(log.setup, flown, log.track, "completed")
-    >>> [(one.name, one.most) for one in again.spreads]
+    >>> [(one.name, one.percentile_95) for one in again.spreads]
     [('cross_track', 0.0), ('height_error', 0.0), ('ground_speed', 0.0), ('bank', 0.0)]
     """
     requirements = route_requirements(setup)
@@ -139,9 +155,9 @@ def compare_with_model(
     profiles = [_flight_profile(flight_requirements, track, distances_on_legs) for flight_requirements, track in pairs]
     leg_starts = np.concatenate([[0.0], ends[:-1]])
     distance = np.concatenate(
-        [leg_start + along for leg_start, along in zip(leg_starts, distances_on_legs, strict=True)]
+        [leg_start + leg_distances for leg_start, leg_distances in zip(leg_starts, distances_on_legs, strict=True)]
     )
-    counts = np.concatenate([[0], np.cumsum([len(along) for along in distances_on_legs])])
+    counts = np.concatenate([[0], np.cumsum([len(leg_distances) for leg_distances in distances_on_legs])])
     legs = tuple(
         _leg_pair(stretch_legs.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles)
         for k in range(requirements.legs)
@@ -169,7 +185,7 @@ def compare_with_model(
 def _flight_profile(
     requirements: RouteRequirements, aligned: AlignedTrack, distances_on_legs: Sequence[Floats]
 ) -> Profile:
-    """Measure a flight at points along its legs; NaN on legs that were not flown.
+    """Measure a flight at points along its legs; all values are NaN on a leg that was not flown.
 
     distances_on_legs: for each leg, the distances of its points from the leg's start, m.
     """
@@ -181,25 +197,27 @@ def _flight_profile(
         for values in (track.attitude[:, ROLL], track.energy, track.airspeed, track.controls[:, THROTTLE])
     )
     power = SECONDS_PER_HOUR * np.gradient(energy, track.time) if len(energy) > 1 else np.full(len(energy), math.nan)
-    for leg, along_leg in enumerate(distances_on_legs):
+    for leg, leg_distances in enumerate(distances_on_legs):
         if not aligned.has_flown(leg):
-            parts.append(np.full((len(fields(Profile)), len(along_leg)), math.nan))
+            parts.append(np.full((len(fields(Profile)), len(leg_distances)), math.nan))
             continue
         rows = aligned.leg_rows(leg)
-        along, across = along_across(requirements, leg, track.position[rows])
+        distance_along, lateral_offset = along_across(requirements, leg, track.position[rows])
         # If a flight goes back, as on a loiter, the first pass applies.
-        is_forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
-        line_altitude = requirements.points[leg, 2] + along * math.tan(requirements.slopes[leg])
+        is_forward = np.concatenate([[True], distance_along[1:] > np.maximum.accumulate(distance_along)[:-1]])
+        line_altitude = requirements.points[leg, 2] + distance_along * math.tan(requirements.slopes[leg])
         height_error = track.position[rows, 2] - line_altitude
         columns = (
-            across,
+            lateral_offset,
             height_error,
             *(column[rows] for column in (speed, bank, energy, airspeed, throttle, power)),
         )
         parts.append(
             np.array(
                 [
-                    np.interp(along_leg, along[is_forward], column[is_forward], left=math.nan, right=math.nan)
+                    np.interp(
+                        leg_distances, distance_along[is_forward], column[is_forward], left=math.nan, right=math.nan
+                    )
                     for column in columns
                 ]
             )
@@ -211,13 +229,13 @@ def _flight_profile(
 
 
 def _leg_pair(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
-    """Compare one leg of the flown profile with the same leg of the model's profile.
+    """Compare one leg of two profiles: the flown one, then the simulated one.
 
     leg: number of the leg in the whole route.  rows: points of the profiles on the leg.
     """
 
     def pair(name: str, reduce: str) -> tuple[float, float]:
-        """Return one quantity of the flown leg and of the model's leg, each reduced to one number."""
+        """Return one quantity of the flown and of the simulated leg, each reduced to one number."""
         flown_value, model_value = (_reduce_values(getattr(profile, name)[rows], reduce) for profile in profiles)
         return flown_value, model_value
 
@@ -281,7 +299,7 @@ def _turn_pair(
 
 
 def _make_spreads(flown_profile: Profile, model_profile: Profile) -> tuple[Spread, ...]:
-    """Summarise the differences of both flights in each quantity, without quantities that have no common point."""
+    """Summarize the differences of both flights in each quantity; leave out quantities that are never known in both."""
     spreads = []
     for name, unit, factor in (
         ("cross_track", "m", 1.0),

@@ -1,8 +1,8 @@
-"""Find hazards within reach of a loiter that is flown wider than drawn.
+"""Find hazards near a loiter that may be flown wider than drawn.
 
 If a loiter is too tight for the bank limit, an autopilot that steers to its center and then orbits as tightly as it can
 may be anywhere within `LOITER_SWING_RADII` radii of the bank limit from the center, depending on the direction of
-arrival.  The drawn circle therefore does not tell which hazards are within reach.
+arrival.  The drawn circle alone therefore does not show which hazards the aircraft may meet.
 """
 
 import math
@@ -21,7 +21,8 @@ from world.arrays import Floats
 from world.kernels import Records
 from world.threats import threat_label
 
-# Minimum number of rings along which a disc is checked; between the limits there is one per step of the terrain raster.
+# Minimum number of rings along which a disc is checked.  Between the minimum and the maximum, the distance of two rings
+# is the spacing of the terrain raster.
 _MIN_RINGS = 24
 # Maximum number of rings along which a disc is checked.
 _MAX_RINGS = 120
@@ -34,11 +35,11 @@ _MAX_LEVELS = 12
 def find_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the hazards that are too close to a flight anywhere within a radius of a point.
+    """Describe the hazards to a flight that may lead anywhere within a distance of a center.
 
-    center: east and north of the point, m, (2,).
+    center: east and north, m, (2,).
     min_altitude, max_altitude: minimum and maximum altitude of the flight, m AMSL.
-    reach: the radius, m.
+    reach: maximum horizontal distance of the aircraft from the center, m.
     """
     return [
         *_ground_hazards(requirements, center, min_altitude, max_altitude, reach),
@@ -49,9 +50,10 @@ def find_hazards(
 
 
 def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str]] | None:
-    """Return the reach of the loiter at a mission's end, m, and descriptions of the hazards within reach.
+    """Return the reach of the loiter after a mission's last waypoint, m, and descriptions of the hazards within reach.
 
-    Return None if the autopilot does not loiter there, or if the mission continues.
+    The reach is the aircraft's maximum distance from that waypoint.  Return None if the autopilot does not loiter at
+    the last waypoint, or if the mission does not end at a plain waypoint.
     """
     setup, rules = requirements.setup, requirements.setup.autopilot.loiters
     if not rules.ends_in_circle or not ends_at_plain_waypoint(setup.route, setup.mission):
@@ -69,7 +71,7 @@ def end_loiter_hazards(requirements: RouteRequirements) -> tuple[float, list[str
 def _ground_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe ground within reach that is too close, too far below (with a maximum height), or unknown."""
+    """Describe ground within reach that is unknown, too close below the aircraft, or (with a height limit) too far."""
     terrain, limits = requirements.setup.scenario.terrain, requirements.setup.scenario.limits
     if terrain is None:
         return []
@@ -98,7 +100,7 @@ def _ground_hazards(
 def _missile_hazards(
     requirements: RouteRequirements, center: Floats, min_altitude: float, max_altitude: float, reach: float
 ) -> list[str]:
-    """Describe the missiles whose sphere overlaps the disc within reach, between both altitudes."""
+    """Describe the missiles whose sphere overlaps the disc of radius `reach` between the two altitudes."""
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
@@ -120,13 +122,13 @@ def _zone_hazards(
         return []
     terrain = requirements.setup.scenario.terrain
     rings, zone_numbers = _ring_points(center, reach, 0.0), set[int]()
-    levels = (
+    level_count = (
         1
         if max_altitude - min_altitude < ROUNDING_M
         else min(_MAX_LEVELS, 2 + int((max_altitude - min_altitude) / _STEP_M))
     )
-    for up in np.linspace(min_altitude, max_altitude, levels):
-        visits = path_zones(_straight_moves(_points_at_altitude(rings, float(up))), airspace.records, terrain)
+    for altitude in np.linspace(min_altitude, max_altitude, level_count):
+        visits = path_zones(_straight_moves(_points_at_altitude(rings, float(altitude))), airspace.records, terrain)
         zone_numbers |= {
             number
             for number in range(len(airspace.zones))
@@ -139,7 +141,7 @@ def _zone_hazards(
 
 
 def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float) -> list[str]:
-    """Report that the edge of the scenario's area lies within reach, if it does."""
+    """Return a text if the edge of the scenario's area lies within reach, otherwise []."""
     scenario = requirements.setup.scenario
     if scenario.external:
         return []
@@ -151,7 +153,10 @@ def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float)
 
 
 def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:
-    """Return points on rings around a center out to the reach, about a raster step apart, m, (n, 2)."""
+    """Return points on rings around a center out to the reach, m, (n, 2).
+
+    spacing: distance between the rings, m, within the limits on their number; 0 for the minimum number.
+    """
     count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
     # A polygon circumscribed about its circle leaves no gap between the last ring and the reach.
     last_ring = Cylinder(float(center[0]), float(center[1]), reach / math.cos(math.pi / CIRCLE_CORNERS))
@@ -164,7 +169,7 @@ def _points_at_altitude(positions: Floats, altitude: float) -> Floats:
 
 
 def _straight_moves(points: Floats) -> Records:
-    """Return the straight moves between n consecutive points, one second each, (n - 1,) of `MOVE`."""
+    """Return the n - 1 straight moves (dtype `MOVE`) between n consecutive points; each move lasts one second."""
     steps = np.diff(points, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
     moves: Records = np.zeros(len(steps), MOVE)

@@ -1,4 +1,4 @@
-"""Predict the energy that a route takes in steady flight on each leg, from the aircraft's envelope."""
+"""Predict the energy of steady flight along a route from the aircraft's envelope."""
 
 import math
 from functools import cache
@@ -26,25 +26,31 @@ def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
     if not np.isfinite(requirements.ground_speed).all():
         return [math.nan] * requirements.legs, math.nan
     energies, peak_power = [], 0.0
-    # The legs of a loiter's laps are alike.
+    # The legs of a loiter's laps are equal: compute the power of each only once.
     power_at = cache(envelope.power)
     leg_durations = np.bincount(
         requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
     )
-    for leg, seconds in enumerate(leg_durations):
-        speed, up = (
+    for leg, duration in enumerate(leg_durations):
+        speed, altitude = (
             float(route.airspeed[leg]),
             float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
         )
-        power = power_at(speed, up, air_angle(requirements, leg, speed, up))
-        energies.append(power * float(seconds) / 3600.0)
+        power = power_at(speed, altitude, air_angle(requirements, leg, speed, altitude))
+        energies.append(power * float(duration) / 3600.0)
         peak_power = max(peak_power, power) if math.isfinite(power) else math.nan
     return energies, peak_power
 
 
-def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
-    """Return the path angle relative to the air on a leg, in the mean wind at an altitude (m AMSL), rad."""
-    tailwind, crosswind = requirements.setup.scenario.wind.components_on_course(float(requirements.courses[leg]), up)
+def air_angle(requirements: RouteRequirements, leg: int, speed: float, altitude: float) -> float:
+    """Return the climb angle relative to the air on a leg in the mean wind, rad; negative in a descent.
+
+    speed: true airspeed, m/s.
+    altitude: altitude at which the wind is taken, m AMSL.
+    """
+    tailwind, crosswind = requirements.setup.scenario.wind.components_on_course(
+        float(requirements.courses[leg]), altitude
+    )
     slope, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):
         ground_track_speed = ground_speed(speed * math.cos(angle), tailwind, crosswind)

@@ -1,7 +1,8 @@
 """Split a flight that includes ground phases into take-off, airborne part and landing.
 
-The usual rules judge the airborne part.  Its route begins where the take-off ended, like the autopilot's own first leg,
-and ends at the last waypoint before the landing point.  Phases are found from only positions and altitudes.
+The usual rules judge the airborne part.  The route of this part begins where the take-off ended, like the autopilot's
+own first leg, and ends at the last waypoint before the landing point.  Only positions and times are used to find the
+phases.
 """
 
 from dataclasses import replace
@@ -19,7 +20,7 @@ _END_DELAY_S = 2.0
 
 
 def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[RouteRequirements, AlignedTrack | None]:
-    """Return the requirements of a flight's airborne part, and its track aligned with them.
+    """Return the requirements of a flight's airborne part, and the aligned track of this part (None if unusable).
 
     whole_requirements: requirements of the whole route, returned unchanged for a flight without ground phases.
     """
@@ -43,7 +44,7 @@ def flown_phases(whole_requirements: RouteRequirements, track: Track) -> tuple[R
 
 
 def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
-    """Return the row where the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
+    """Return the row at which the take-off ended; 0 without a take-off, the last row if the take-off did not end."""
     if procedures.take_off is None:
         return 0
     is_above = track.position[:, 2] > procedures.take_off.end_altitude
@@ -51,7 +52,7 @@ def _takeoff_end_row(track: Track, procedures: GroundPhases) -> int:
 
 
 def ground_phase_rows(track: Track, procedures: GroundPhases) -> Flags:
-    """Return a mask of the rows of a flown take-off or landing leg, (t,).
+    """Return a mask of the rows that belong to a flown take-off or to the landing leg, (t,).
 
     >>> from logs.recording.example_log import example_log
     >>> bool(ground_phase_rows(example_log().track, GroundPhases()).any())

@@ -22,8 +22,8 @@ from world.terrain import Terrain
 # Pairs of a distance (m from the path's start, increasing) and the altitude there (m AMSL).
 Profile = list[tuple[float, float]]
 
-# Length of the pieces in which a path's clearance is computed, m.  Pieces before a gap in the elevation data keep their
-# known ground.
+# Length of the pieces in which a path's clearance is computed, m.  A gap in the elevation data makes only the pieces
+# over the gap unknown.
 _PIECE_LENGTH_M = 100.0
 
 
@@ -34,7 +34,7 @@ class GroundPath(NamedTuple):
     distance: Floats
 
     def between(self, first: float, last: float) -> "GroundPath":
-        """Return the part between two distances, m."""
+        """Return the part of the path between two distances from its start, m."""
         inner_distances = self.distance[(self.distance > first) & (self.distance < last)]
         distances = np.concatenate([[first], inner_distances, [max(first, last)]])
         return GroundPath(
@@ -43,21 +43,21 @@ class GroundPath(NamedTuple):
 
 
 def track_path(track: Track) -> GroundPath:
-    """Return the horizontal path of a flown track."""
+    """Return the positions of a flown track with their horizontal distance from its start."""
     position = np.asarray(track.position, dtype=np.float64)
     step = np.diff(position[:, :2], axis=0)
     return GroundPath(position, np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]))
 
 
 def straight_path(start: Sequence[float] | Floats, course: float, profile: Profile) -> GroundPath:
-    """Return a path on one course (rad) from a start (east, north, m)."""
+    """Return a path on one course (rad) from a start (east and north, m), with the altitudes of a profile."""
     distance, up = np.array(profile, dtype=np.float64).T
     east, north = start[0] + distance * math.sin(course), start[1] + distance * math.cos(course)
     return GroundPath(np.stack([east, north, up], axis=1), distance)
 
 
 def min_path_clearance(terrain: Terrain, path: GroundPath) -> tuple[float, float]:
-    """Return a path's minimum height above ground and its distance along the path, m.
+    """Return a path's minimum height above ground, m, and where it occurs as a distance along the path, m.
 
     The height is NaN if part of the ground is not known, unless the path hits known ground.
     """
@@ -102,7 +102,10 @@ def first_hazard_on_path(requirements: RouteRequirements, path: GroundPath) -> s
 
 
 def has_ground_paths(requirements: RouteRequirements) -> bool:
-    """Return True if ground paths apply: known terrain, not an imported flight or an airborne plan."""
+    """Return True if the paths from and to the ground can be judged.
+
+    This needs terrain data, a mission that was not imported from a log, and, for a plan, planned ground phases.
+    """
     setup = requirements.setup
     has_ground_phases = setup.plan is None or setup.plan.ways is not None
     return setup.scenario.terrain is not None and has_ground_phases and setup.source is None
@@ -117,7 +120,7 @@ def first_item(requirements: RouteRequirements) -> tuple[int, MissionItem | None
 
 
 def landing_item(requirements: RouteRequirements) -> tuple[int, MissionItem] | None:
-    """Return the waypoint and item of the glide landing of a mission, or None if there is none."""
+    """Return the waypoint and the item of a mission's last NAV_LAND landing, or None if there is none."""
     landings = {item.seq: item for item in requirements.setup.mission.items if item.command == Command.NAV_LAND}
     landing_waypoints = [
         (k, landings[seq]) for k, seq in enumerate(requirements.setup.route.items.tolist()) if k and seq in landings

@@ -17,7 +17,7 @@ LINK_INTERVAL_S = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Outage:
-    """Stretch of a path below the fade margin.  start, end: s."""
+    """Period in which the link is below the fade margin.  start, end: s."""
 
     start: float
     end: float
@@ -30,10 +30,12 @@ class Outage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinkAlongPath:
-    """The link at points of a path.
+    """Quality of the radio link at t points of a path.
 
-    time: (t,) s.  positions: (t, 3) m.  points: the link at these points.
-    outages: stretches below the fade margin, by time; unknown margins are not part of any.
+    time: s, (t,).
+    positions: m, (t, 3).
+    points: quality of the link at these points.
+    outages: periods below the fade margin, in order of time; an outage contains no point with an unknown margin.
     """
 
     time: Floats
@@ -64,9 +66,9 @@ class LinkAlongPath:
 
 
 def station_antenna(setup: FlightSetup, link: RadioLink, terrain: Terrain) -> Floats | None:
-    """Return the position of the station's antenna, (3,) m, by default at the mission's home.
+    """Return the position of the station's antenna, m, (3,); without a stated position it stands at the mission's home.
 
-    Return None if the mission has no home or the ground there is unknown.
+    Return None if the station has neither a position nor a home, or if the ground at this position is unknown.
     """
     position = link.station
     if position is None:
@@ -83,7 +85,9 @@ def link_along_path(
 ) -> LinkAlongPath:
     """Compute the link about once a second along a path.
 
-    antenna: position of the station's antenna, (3,) m.  time: (t,) s, increasing.  positions: (t, 3) m.
+    antenna: position of the station's antenna, m, (3,).
+    time: increasing times of the path's points, s, (t,).
+    positions: points of the path, m, (t, 3).
     """
     is_usable = np.isfinite(positions).all(axis=1) & np.isfinite(time)
     time, positions = time[is_usable], positions[is_usable]
@@ -92,12 +96,12 @@ def link_along_path(
     count = max(2, math.ceil((time[-1] - time[0]) / LINK_INTERVAL_S) + 1)
     times = np.linspace(time[0], time[-1], count)
     points = np.stack([np.interp(times, time, axis_positions) for axis_positions in positions.T], axis=1)
-    along = link_points(link, terrain, antenna, points)
-    return LinkAlongPath(times, points, along, _find_outages(times, along.margin))
+    path_link_points = link_points(link, terrain, antenna, points)
+    return LinkAlongPath(times, points, path_link_points, _find_outages(times, path_link_points.margin))
 
 
 def _find_outages(time: Floats, margin: Floats) -> tuple[Outage, ...]:
-    """Find the stretches with a negative margin; the margin is taken as linear between two known points."""
+    """Find the periods with a negative margin, with linear interpolation between two known margins."""
     outages: list[Outage] = []
     for k in range(len(time) - 1):
         first, last = float(margin[k]), float(margin[k + 1])

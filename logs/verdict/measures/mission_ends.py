@@ -9,9 +9,9 @@ from logs.verdict.tolerances import FINAL_WAYPOINT_TOLERANCE_M
 
 
 def returns_after_last_item(setup: FlightSetup) -> bool:
-    """Return True if ArduPlane's own return to launch after the mission's last item is judged.
+    """Return True if the return to launch that ArduPlane begins by itself after the last item is judged.
 
-    A mission that ends at the destination of its scenario is judged up to there.
+    A mission that ends at its scenario's destination is judged only up to the destination.
     """
     return _begins_return(setup) and not _ends_at_destination(setup)
 
@@ -19,8 +19,9 @@ def returns_after_last_item(setup: FlightSetup) -> bool:
 def _begins_return(setup: FlightSetup) -> bool:
     """Return True if ArduPlane returns to launch by itself after the mission's last item.
 
-    It does (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return, a landing, a
-    loiter without end or a jump without end.
+    ArduPlane returns (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return, a
+    landing, an endless loiter or an endless jump.  Return False also for an imported flight, and for a mission without
+    a home.
     """
     route, mission = setup.route, setup.mission
     ends_in_flight = route.rtl_start < 0 and route.endless_jump < 0 and mission.home is not None
@@ -35,7 +36,7 @@ def _begins_return(setup: FlightSetup) -> bool:
 
 
 def _last_seq(setup: FlightSetup) -> int:
-    """Return the number of the last item on the route; -1 without one."""
+    """Return the number of the last mission item on the route; -1 if no waypoint belongs to an item."""
     return next((seq for seq in reversed(setup.route.items.tolist()) if seq >= 0), -1)
 
 
@@ -46,15 +47,15 @@ def _distance_to_destination(setup: FlightSetup) -> float:
 
 
 def _ends_at_destination(setup: FlightSetup) -> bool:
-    """Return True if a mission ends at the destination of its scenario.
+    """Return True if a mission ends at its scenario's destination, within `FINAL_WAYPOINT_TOLERANCE_M`.
 
-    The tolerance is that within which a flight reaches its last waypoint.
+    Within this tolerance a flight also reaches its last waypoint.
     """
     return not setup.scenario.external and _distance_to_destination(setup) <= FINAL_WAYPOINT_TOLERANCE_M
 
 
 def unjudged_return_text(setup: FlightSetup) -> str:
-    """Explain why a return after the last item is not judged; "" if there is none, or if it is judged."""
+    """Explain why a return after the last item is not judged; return "" if it is judged or does not occur."""
     if not _begins_return(setup) or not _ends_at_destination(setup):
         return ""
     return f"the mission ends at the scenario's destination; {setup.autopilot.title} then returns to launch"
@@ -71,7 +72,7 @@ def judged_return_text(setup: FlightSetup) -> str:
     )
 
 
-# What each value of MIS_TKO_LAND_REQ requires.
+# Text on the items that each value of MIS_TKO_LAND_REQ requires.
 _REQUIRED = {1: "a takeoff", 2: "a landing", 3: "a takeoff and a landing", 4: "both or neither", 5: "both or neither"}
 
 
@@ -95,6 +96,6 @@ def missing_ends_text(mission: Mission, limits: FeasibilityLimits) -> str:
 
 
 def _present_ends(has_takeoff: bool, has_landing: bool) -> str:
-    """Name the takeoff and the landing that a mission has."""
+    """Return a text such as "a takeoff and a landing" on the ends that a mission has."""
     present = [name for name, is_present in (("a takeoff", has_takeoff), ("a landing", has_landing)) if is_present]
     return " and ".join(present) or "neither a takeoff nor a landing"

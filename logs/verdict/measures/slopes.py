@@ -1,4 +1,4 @@
-"""Measure how each leg was climbed or descended: slope, height, throttle, and the ability shown."""
+"""Measure how each leg was climbed or descended: slope, altitude error, throttle, and climb and sink ability."""
 
 import math
 from dataclasses import dataclass
@@ -44,9 +44,9 @@ from world.arrays import Flags, Floats
 
 @dataclass(frozen=True, slots=True)
 class LegFit:
-    """A measured course or slope of a leg.
+    """Measured course or slope of a leg.
 
-    value, tolerance: rad.
+    value, tolerance: course or slope, and its tolerance, rad.
     length: distance over which it was measured, m.
     is_fitted: True if fitted by least squares over a long enough piece; the value of a short leg is rough.
     """
@@ -67,7 +67,7 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
 def straight_span(
     requirements: RouteRequirements, leg: int, clearance: float, *, excludes_blends: bool = False
 ) -> tuple[float, float]:
-    """Return the span of a leg (m from its start) that lies clear of the turns at its ends.
+    """Return the start and end of the part of a leg between the turns at its ends, m from the leg's start.
 
     clearance: distance kept from the turns, m.
     excludes_blends: True to exclude the slope blends as well.
@@ -84,16 +84,19 @@ def straight_span(
 
 
 def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Return a leg's flown course, or None if too little of the leg was flown."""
+    """Return a leg's flown course, or None if the leg was not flown.
+
+    The course of a leg that is too short for a fit is the mean course over at least a second, with a larger tolerance.
+    """
     if not aligned.has_flown(leg):
         return None
     rows = aligned.leg_rows(leg)
-    along, across = along_across(requirements, leg, aligned.track.position[rows])
+    distance_along, lateral_offset = along_across(requirements, leg, aligned.track.position[rows])
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M)
-    is_inside = (along >= span_start) & (along <= span_end)
-    if is_inside.sum() >= 20 and np.ptp(along[is_inside]) >= MIN_COURSE_STRETCH_M:
-        cross_slope, residual = fit_line(along[is_inside], across[is_inside])
-        distance = float(np.ptp(along[is_inside]))
+    is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_COURSE_STRETCH_M:
+        cross_slope, residual = fit_line(distance_along[is_inside], lateral_offset[is_inside])
+        distance = float(np.ptp(distance_along[is_inside]))
         return LegFit(
             requirements.courses[leg] + math.atan(cross_slope),
             _angle_tolerance(COURSE_ERROR_FLOOR_RAD, residual, distance),
@@ -102,64 +105,73 @@ def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int)
         )
     # A short leg: the mean course between its turns, over at least a second.
     span_start, span_end = straight_span(requirements, leg, 0.0)
-    indices = np.flatnonzero((along >= span_start) & (along <= span_end))
+    indices = np.flatnonzero((distance_along >= span_start) & (distance_along <= span_end))
     if not indices.size:
         midpoint = (
             0.5 * (span_start + span_end)
             if math.isfinite(span_start) and math.isfinite(span_end)
             else 0.5 * float(requirements.runs[leg])
         )
-        indices = np.array([np.argmin(np.abs(along - midpoint))])
+        indices = np.array([np.argmin(np.abs(distance_along - midpoint))])
     first, last = rows.start + int(indices[0]), rows.start + int(indices[-1])
     if aligned.track.time[last] - aligned.track.time[first] < 1.0:
         rows_around = aligned.rows_around(first, last, 0.5)
         first, last = rows_around.start, rows_around.stop - 1
-    # In the frame of the course column, which is unwrapped, so that a full circle shows.
-    return LegFit(float(aligned.course[first : last + 1].mean()), ROUGH_COURSE_ERROR_RAD, float(np.ptp(along)), False)
+    # The course column is unwrapped, so a full circle shows as a course change of 360 degrees.
+    return LegFit(
+        float(aligned.course[first : last + 1].mean()), ROUGH_COURSE_ERROR_RAD, float(np.ptp(distance_along)), False
+    )
 
 
 def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
-    """Return a leg's flown slope, or None if less than a second of the leg was flown."""
+    """Return a leg's flown slope, or None if less than a second of the leg was flown.
+
+    The slope of a leg that is too short for a fit between its blends is rough, with a larger tolerance.
+    """
     if not aligned.has_flown(leg):
         return None
     rows = aligned.leg_rows(leg)
     position = aligned.track.position[rows]
-    along, _ = along_across(requirements, leg, position)
+    distance_along, _ = along_across(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
-    is_inside = (along >= span_start) & (along <= span_end)
-    if is_inside.sum() >= 20 and np.ptp(along[is_inside]) >= MIN_SLOPE_STRETCH_M:
-        slope, residual = fit_line(along[is_inside], position[is_inside, 2])
-        distance = float(np.ptp(along[is_inside]))
+    is_inside = (distance_along >= span_start) & (distance_along <= span_end)
+    if is_inside.sum() >= 20 and np.ptp(distance_along[is_inside]) >= MIN_SLOPE_STRETCH_M:
+        slope, residual = fit_line(distance_along[is_inside], position[is_inside, 2])
+        distance = float(np.ptp(distance_along[is_inside]))
         return LegFit(math.atan(slope), _angle_tolerance(SLOPE_ERROR_FLOOR_RAD, residual, distance), distance, True)
     time = aligned.track.time[rows]
     if time[-1] - time[0] < 1.0:
         return None
     # A short leg: the least-squares slope of at least four seconds about its midpoint, or of the whole leg if shorter.
-    middle_time = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(along), time))
+    middle_time = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(distance_along), time))
     start = min(
         max(middle_time - 0.5 * MIN_STRETCH_TIME_S, float(time[0])),
         max(float(time[0]), float(time[-1]) - MIN_STRETCH_TIME_S),
     )
-    in_window = (time >= start) & (time <= start + MIN_STRETCH_TIME_S)
-    distance_run = aligned.distance_run[rows][in_window]
+    is_in_window = (time >= start) & (time <= start + MIN_STRETCH_TIME_S)
+    distance_run = aligned.distance_run[rows][is_in_window]
     if distance_run.size < 2 or np.ptp(distance_run) < 1.0:
         return None
-    slope, _ = fit_line(distance_run, position[in_window, 2])
+    slope, _ = fit_line(distance_run, position[is_in_window, 2])
     return LegFit(math.atan(slope), ROUGH_SLOPE_ERROR_RAD, float(np.ptp(distance_run)), False)
 
 
 def _angle_tolerance(floor: float, residual: float, distance: float) -> float:
-    """Return the tolerance of a fitted angle: residuals at the ends of the run rotate the line."""
+    """Return the tolerance of an angle fitted over a distance (m) with an RMS residual (m), rad.
+
+    Residuals of twice the RMS at the ends would rotate the line by the second term.
+    """
     return min(floor + math.atan2(2.0 * residual, distance), MAX_UNSTEADINESS_RAD)
 
 
 @dataclass(frozen=True, slots=True)
 class Ability:
-    """Steepest climb, or dive, that the aircraft showed at a throttle limit.
+    """Steepest climb or descent that the aircraft showed at a throttle limit.
 
-    slope: over the ground, at the leg's commanded airspeed in the mean wind, rad, positive in the direction of the leg.
+    slope: slope over the ground at the leg's commanded airspeed in the mean wind, rad; positive in the direction that
+        the leg needs, up or down.
     error: standard error of the slope, rad.
-    duration: duration over which it was seen.
+    duration: time at the throttle limit over which the slope was measured, s.
     """
 
     slope: float
@@ -173,16 +185,16 @@ class Ability:
 
 @dataclass(frozen=True, slots=True)
 class SlopeMeasure:
-    """Measured climb or descent of one leg; None in a field if the leg was not flown.
+    """Measured climb or descent of one leg; a field is None if it could not be measured.
 
-    slope: as fitted.
-    height_error: m, largest distance above (negative: below) the leg's line.
+    slope: measured slope over the ground.
+    height_error: largest distance above the leg's line, m; negative below the line.
     is_short: True if no part of the leg is clear of the blends.
     full_throttle_time, idle_throttle_time: time with the throttle at its limits, s.
     speed_loss, speed_gain: largest mean airspeed error below and above the command over `SATURATED_TIME_S` seconds at
         these limits, m/s, without the part that a gust explains.
     ability: the aircraft's ability at the throttle limit that the leg needs, if the flight reached that limit.
-    is_finished: the leg was flown to its end.
+    is_finished: True if the leg was flown to its end.
     """
 
     slope: LegFit | None = None
@@ -197,7 +209,7 @@ class SlopeMeasure:
 
 
 def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> SlopeMeasure:
-    """Measure the slope of a leg as flown."""
+    """Measure how a leg was climbed or descended; all fields are at their defaults if the leg was not flown."""
     if not aligned.has_flown(leg):
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
@@ -217,23 +229,27 @@ def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: i
 
 
 def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Return the largest signed height error from the leg's line, m, and True if no part is clear of blends."""
-    along, _ = along_across(requirements, leg, position)
+    """Return the largest signed altitude error from the leg's line, m, and True if the leg is too short for blends.
+
+    On a leg without any part clear of the slope blends, the error is taken between the turns; it is None if no row lies
+    between the turns.
+    """
+    distance_along, _ = along_across(requirements, leg, position)
     span_start, span_end = straight_span(requirements, leg, TURN_EXCLUSION_M, excludes_blends=True)
-    is_inside = (along >= span_start) & (along <= span_end)
+    is_inside = (distance_along >= span_start) & (distance_along <= span_end)
     is_short = not is_inside.any()
     if is_short:
         span_start, span_end = straight_span(requirements, leg, 0.0)
-        is_inside = (along >= span_start) & (along <= span_end)
+        is_inside = (distance_along >= span_start) & (distance_along <= span_end)
         if not is_inside.any():
             return None, True
-    line_altitudes = requirements.points[leg, 2] + along[is_inside] * math.tan(requirements.slopes[leg])
+    line_altitudes = requirements.points[leg, 2] + distance_along[is_inside] * math.tan(requirements.slopes[leg])
     height_errors = position[is_inside, 2] - line_altitudes
     return float(height_errors[np.argmax(np.abs(height_errors))]), is_short
 
 
 def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
-    """Return the rows of a leg from when its commanded speed can be reached; may be empty."""
+    """Return the rows of a leg from the time at which its commanded airspeed can be reached; the slice may be empty."""
     rows = aligned.leg_rows(leg)
     speeds = requirements.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
@@ -244,7 +260,7 @@ def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 def _saturation_times(
     requirements: RouteRequirements, aligned: AlignedTrack, leg: int
 ) -> tuple[float, float, float, float]:
-    """Return seconds at full and idle throttle, and the speed lost and gained, as in `SlopeMeasure`."""
+    """Return the times at full and at idle throttle, s, and the speed loss and gain, m/s, as in `SlopeMeasure`."""
     rows = steady_rows(requirements, aligned, leg)
     track = aligned.track
     if rows.stop - rows.start < 2:
@@ -253,7 +269,7 @@ def _saturation_times(
     is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
     commanded = float(requirements.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
-    # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
+    # A gust along the track changes the airspeed but not the energy: the airspeed without the gust must be off, too.
     gust_free_error = _speed_in_mean_wind(requirements, aligned, rows) - commanded
     row_count = max(1, round(SATURATED_TIME_S / tick))
     lift_gain = aligned.lift_gain[rows]
@@ -279,12 +295,13 @@ def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows
 
 
 def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> Ability | None:
-    """Measure the aircraft's ability at the throttle limit that a leg needs: full to climb, idle to dive.
+    """Measure the aircraft's ability at the throttle limit that a leg needs: full to climb, idle to descend.
 
-    Thrust less drag gives an aircraft the climb rate v_up + v . a / g, where v is its velocity relative to the air and
-    a its acceleration over the ground.  This is exact in any gust, because lift does no work.  The climb rate is fitted
-    by a least-squares plane over airspeed and altitude, and evaluated at the commanded airspeed and the greatest
-    measured altitude, where an aircraft climbs least.
+    The excess of thrust over drag corresponds to the climb rate v_up + v . a / g, where v is the velocity relative to
+    the air and a the acceleration over the ground.  This is exact in any gust, because lift does no work.  The climb
+    rate is fitted by a least-squares plane over airspeed and altitude, and evaluated at the commanded airspeed and the
+    highest measured altitude, where an aircraft climbs least.  Return None if the throttle was at the limit for too
+    short a time, or if the standard error is too large.
     """
     rows = steady_rows(requirements, aligned, leg)
     track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
@@ -292,10 +309,10 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         return None
     is_at_full, is_at_idle = _rows_at_limits(requirements, aligned, rows)
     is_at_full &= track.controls[rows, THROTTLE] >= SATURATED_THROTTLE_FRACTION
-    along, _ = along_across(requirements, leg, track.position[rows])
+    distance_along, _ = along_across(requirements, leg, track.position[rows])
     span_start, span_end = straight_span(requirements, leg, 0.0)
     is_measured = _rows_after_run(is_at_full if sign > 0.0 else is_at_idle, round(ABILITY_SETTLING_S / aligned.tick))
-    is_measured &= (along >= span_start) & (along <= span_end)
+    is_measured &= (distance_along >= span_start) & (distance_along <= span_end)
     velocity = track.velocity[rows].astype(np.float64)
     air_velocity = velocity - track.wind[rows]
     # A log may lack the wind at some rows.
@@ -321,18 +338,21 @@ def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg:
         for value in (fit[0], fit[0] + fit[1])
     ]
     error = abs(slopes[1] - slopes[0])
-    # Written so that NaN gives None.
+    # The comparison with a NaN error is False, so the result is then None.
     return Ability(sign * slopes[0], error, duration) if error <= MAX_ABILITY_STD_ERROR_RAD else None
 
 
 def _rows_after_run(mask: Flags, count: int) -> Flags:
-    """Return the rows of ``mask`` that follow ``count`` consecutive rows of the mask."""
+    """Return a mask of the rows in ``mask`` whose ``count`` previous rows are in ``mask``, too."""
     rows = np.arange(mask.size)
     return np.asarray(rows - np.maximum.accumulate(np.where(mask, -1, rows)) > count)
 
 
 def _plane_at_origin(value: Floats, x: Floats, y: Floats, sample_count: float) -> tuple[float, float] | None:
-    """Return the least-squares plane's value at x = y = 0 and its standard error, or None if singular."""
+    """Fit a plane value(x, y) by least squares, and return its value at x = y = 0 and the standard error of this value.
+
+    Return None if the plane is not determined.  If y hardly varies, the fit does not depend on it.
+    """
     columns = [np.ones_like(x), x] + ([y] if np.ptp(y) > 1e-3 else [])
     design_matrix = np.column_stack(columns)
     moments = design_matrix.T @ design_matrix / len(x)
@@ -355,7 +375,10 @@ def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, 
 
 
 def _max_mean_within(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Return the largest mean of ``value`` over ``width`` rows mostly in ``mask``; 0 if there are none."""
+    """Return the largest mean of ``value`` over ``width`` consecutive rows of which most are in ``mask``.
+
+    Return 0 if there are no such rows, or if the mean is negative.
+    """
     if mask.size < width:
         return 0.0
     sums = np.concatenate([[0.0], np.cumsum(value)])

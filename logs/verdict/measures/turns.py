@@ -14,7 +14,7 @@ from logs.verdict.tolerances import SETTLING_WATCH_TIME_S
 from world.arrays import Floats
 
 # ----------------------------------------------------------------------
-# Corners of an imported flight: the nearest pass, and how far past the new leg the flight went.
+# Corners of an imported flight: closest approach to the waypoint, and overshoot beyond the next leg.
 #
 # The autopilot of an imported flight knows nothing of planfly's arcs: it turns where it considers the waypoint reached.
 # So its corners are measured against known quantities: the waypoint and the next leg.
@@ -27,10 +27,11 @@ NEXT_LEG_FRACTION = 0.7
 class CornerPass:
     """Measured pass of one waypoint.
 
-    time: time of the nearest pass, s.  distance: horizontal distance from the waypoint at that time, m.
-    overshoot: distance past the next leg, m, on the outside of the turn, up to `NEXT_LEG_FRACTION` of that leg or the
-        next waypoint's pass, whichever is sooner; None if the next leg was not joined.
-    overrun: distance past the next leg's end at the nearest pass, m, if the leg was not joined.
+    time: time of the closest approach, s.
+    distance: horizontal distance from the waypoint at that time, m.
+    overshoot: maximum distance from the next leg on the outside of the turn, m, up to `NEXT_LEG_FRACTION` of that leg
+        or the closest approach to the next waypoint, whichever is sooner; None if the next leg was not joined.
+    overrun: distance past the next leg's end at the closest approach, m, if the leg was not joined; otherwise 0.
     """
 
     time: float
@@ -40,7 +41,7 @@ class CornerPass:
 
 
 def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[CornerPass, ...]:
-    """Measure the pass of each waypoint of a route, each later than the pass before it.
+    """Measure the pass of each waypoint of a route, in order of time.
 
     >>> from logs.recording.example_log import example_log
     >>> from logs.verdict.measures.route_requirements import route_requirements
@@ -66,7 +67,7 @@ def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tup
 
 
 def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
-    """Return the time (s) and distance (m) of each waypoint's closest pass, in order of time."""
+    """Return the time (s) and the distance (m) of the closest approach to each waypoint; the times never decrease."""
     time, rows = aligned.track.time, aligned.rows
     passes: list[tuple[float, float]] = []
     start_time = float(time[0])
@@ -84,7 +85,7 @@ def _nearest_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> l
 
 
 def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Floats]:
-    """Return times between `start` and `end`, s, (n,), and the positions of the flight at these times, m, (n, 3)."""
+    """Return the track between two times (s), with interpolated ends: times, s, (n,), and positions, m, (n, 3)."""
     time = aligned.track.time
     times = np.concatenate([[start], time[(time > start) & (time < end)], [end]])
     return times, np.column_stack([np.interp(times, time, aligned.track.position[:, j]) for j in range(3)])
@@ -93,17 +94,22 @@ def _track_between(aligned: AlignedTrack, start: float, end: float) -> tuple[Flo
 def _corner_overshoot(
     requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
-    """Return the overshoot at a waypoint (or None), and the distance past the next leg's end, m."""
+    """Return the overshoot at waypoint `k`, m, and the overrun, m, as in `CornerPass`.
+
+    start, end: times of the closest approach to this waypoint and to the next waypoint, s.
+    """
     leg_length = float(requirements.runs[k])
-    along, across = along_across(requirements, k, _track_between(aligned, start, end)[1])
-    if along[0] > leg_length:
-        return None, float(along[0]) - leg_length
-    outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * across
-    rows_past = np.flatnonzero(along >= NEXT_LEG_FRACTION * leg_length)
-    end_row = int(rows_past[0]) if rows_past.size else len(along)
-    if 0 < end_row < len(along):
+    distance_along, lateral_offset = along_across(requirements, k, _track_between(aligned, start, end)[1])
+    if distance_along[0] > leg_length:
+        return None, float(distance_along[0]) - leg_length
+    outside_offset = -math.copysign(1.0, float(requirements.turns[k])) * lateral_offset
+    rows_past = np.flatnonzero(distance_along >= NEXT_LEG_FRACTION * leg_length)
+    end_row = int(rows_past[0]) if rows_past.size else len(distance_along)
+    if 0 < end_row < len(distance_along):
         # Interpolate to the exact end: rows may be a second apart.
-        fraction = (NEXT_LEG_FRACTION * leg_length - along[end_row - 1]) / (along[end_row] - along[end_row - 1])
+        fraction = (NEXT_LEG_FRACTION * leg_length - distance_along[end_row - 1]) / (
+            distance_along[end_row] - distance_along[end_row - 1]
+        )
         end_offset = outside_offset[end_row - 1] + fraction * (outside_offset[end_row] - outside_offset[end_row - 1])
         return max(0.0, float(end_offset), float(outside_offset[:end_row].max())), 0.0
     return max(0.0, float(outside_offset[: max(1, end_row)].max())), 0.0
@@ -111,20 +117,20 @@ def _corner_overshoot(
 
 @dataclass(frozen=True, slots=True)
 class TurnMeasure:
-    """Measured turn; None in a field if the turn was not flown, or there is nothing to measure.
+    """Measured turn; a field is None if the turn was not flown, or if there is nothing to measure.
 
-    angle, tolerance: rad, of the course change.
-    is_fitted: the courses of both legs are fits.
-    peak_bank: rad.
-    held_bank: rad, the largest mean over a second.
-    radius: m, the least over a second.
-    overshoot: m past the arc, on its outside.
+    angle, tolerance: course change and its tolerance, rad.
+    is_fitted: True if the courses of both legs are least-squares fits.
+    peak_bank: maximum bank, rad.
+    held_bank: maximum one-second mean of the bank, rad.
+    radius: minimum radius over one second, m.
+    overshoot: maximum distance outside the arc, and after the arc outside the next leg, m.
     settled_distance: mean distance from the next leg in the last second before its end, m.
     min_distance: minimum distance from the waypoint, m.
     full_circles: number of full circles flown in addition to the corner's turn.
-    is_complete: True if the flight got past the turn.
-    corner: for an imported flight, the measured pass of the waypoint, from which ``overshoot`` and ``min_distance`` are
-        then taken.
+    is_complete: True if the flight went on after the turn.
+    corner: for an imported flight, the measured pass of the waypoint; ``overshoot`` and ``min_distance`` are taken from
+        it.
     """
 
     angle: float | None = None
@@ -154,40 +160,47 @@ def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> lis
 
 
 def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> TurnMeasure:
-    """Measure the turn at inner waypoint i."""
+    """Measure the turn at inner waypoint `i`; all fields are at their defaults if one of its legs was not flown."""
     if not aligned.has_flown(i - 1) or not aligned.has_flown(i):
         return TurnMeasure()
     track = aligned.track
     first, middle, last = (int(aligned.rows[k]) for k in (i - 1, i, i + 1))
     position = track.position[first : last + 1]
-    along_before, _ = along_across(requirements, i - 1, position)
-    along, across = along_across(requirements, i, position)
-    entry_row = _first_row(along_before >= requirements.runs[i - 1] - requirements.length_before[i], middle - first)
+    distance_along_before, _ = along_across(requirements, i - 1, position)
+    distance_along, lateral_offset = along_across(requirements, i, position)
+    entry_row = _first_row(
+        distance_along_before >= requirements.runs[i - 1] - requirements.length_before[i], middle - first
+    )
     is_after_waypoint = np.arange(first, last + 1) >= middle
-    exit_row = _first_row(is_after_waypoint & (along >= requirements.length_after[i]), last - first)
-    # A next turn that needs more than the rest of the leg gets half of the leg: it is at fault, not this turn.
+    exit_row = _first_row(is_after_waypoint & (distance_along >= requirements.length_after[i]), last - first)
+    # If the next turn needs more than the rest of the leg, it gets half of the leg: the next turn is then at fault.
     next_turn_length = min(
         float(requirements.length_before[i + 1]),
         max(0.5 * requirements.runs[i], requirements.runs[i] - requirements.length_after[i]),
     )
-    end_row = _first_row(is_after_waypoint & (along >= requirements.runs[i] - next_turn_length), last - first)
+    end_row = _first_row(is_after_waypoint & (distance_along >= requirements.runs[i] - next_turn_length), last - first)
     rows_around = aligned.rows_around(first + entry_row, first + max(entry_row, exit_row), 1.0)
     held_bank, radius = _bank_and_radius(aligned, rows_around)
-    angle, tolerance, fitted = _course_change(requirements, aligned, i)
+    angle, tolerance, is_fitted = _course_change(requirements, aligned, i)
     is_watched = np.arange(position.shape[0]) <= max(exit_row, end_row)
     is_watched &= track.time[first : last + 1] <= track.time[first + exit_row] + SETTLING_WATCH_TIME_S
     course_change = abs(float(aligned.course[first + exit_row] - aligned.course[first + entry_row]))
     return TurnMeasure(
         angle=angle,
         tolerance=tolerance,
-        is_fitted=fitted,
+        is_fitted=is_fitted,
         peak_bank=None if math.isnan(held_bank) else float(np.abs(track.attitude[rows_around, ROLL]).max()),
         held_bank=None if math.isnan(held_bank) else held_bank,
         radius=radius,
         overshoot=_arc_overshoot(
-            requirements, i, position[is_watched], along_before[is_watched], along[is_watched], across[is_watched]
+            requirements,
+            i,
+            position[is_watched],
+            distance_along_before[is_watched],
+            distance_along[is_watched],
+            lateral_offset[is_watched],
         ),
-        settled_distance=_settled_distance(requirements, aligned, i, first, end_row, along, across),
+        settled_distance=_settled_distance(requirements, aligned, i, first, end_row, distance_along, lateral_offset),
         min_distance=float(approaches(position, requirements.points[i])[0].min()),
         full_circles=max(0, round((course_change - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
         is_complete=bool(aligned.passed[i + 1] or end_row < last - first or exit_row < last - first),
@@ -195,7 +208,7 @@ def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int)
 
 
 def _first_row(mask: NDArray[np.bool_], default: int) -> int:
-    """Return the first row of a mask, or `default` if the mask is empty."""
+    """Return the first row at which a mask is True, or `default` if there is none."""
     row = int(np.argmax(mask))
     return row if mask[row] else default
 
@@ -203,7 +216,7 @@ def _first_row(mask: NDArray[np.bool_], default: int) -> int:
 def _course_change(
     requirements: RouteRequirements, aligned: AlignedTrack, i: int
 ) -> tuple[float | None, float | None, bool]:
-    """Return the flown course change at waypoint i and its tolerance, rad, and True if both courses are fits.
+    """Return the flown course change at waypoint `i` and its tolerance, rad, and True if both courses are fitted.
 
     Return None, None, False if either leg was flown too little.
     """
@@ -215,7 +228,10 @@ def _course_change(
 
 
 def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
-    """Return the maximum mean bank, rad, and the minimum radius, m (inf without a turn), over one second."""
+    """Return the maximum one-second mean of the bank, rad, and the minimum radius over one second, m.
+
+    The radius is inf without a turn, or if the rows span less than a second.
+    """
     time = aligned.track.time[rows]
     bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
     ticks = int(np.searchsorted(time, time[0] + 1.0))
@@ -232,9 +248,17 @@ def _bank_and_radius(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
 
 
 def _arc_overshoot(
-    requirements: RouteRequirements, i: int, position: Floats, along_before: Floats, along: Floats, across: Floats
+    requirements: RouteRequirements,
+    i: int,
+    position: Floats,
+    distance_along_before: Floats,
+    distance_along: Floats,
+    lateral_offset: Floats,
 ) -> float | None:
-    """Return the maximum distance outside the arc, and then outside the next leg, m; 0 if never outside."""
+    """Return the maximum distance outside the arc, and after the arc outside the next leg, m; 0 if never outside.
+
+    Return None if the turn has no fly-by arc.
+    """
     if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.length_before[i]):
         return None
     turn_sign = math.copysign(1.0, requirements.turns[i])
@@ -244,9 +268,11 @@ def _arc_overshoot(
         - requirements.length_before[i] * np.array([ux, uy])
         + turn_sign * requirements.radius[i] * np.array([uy, -ux])
     )
-    has_started = np.maximum.accumulate(along_before >= requirements.runs[i - 1] - requirements.length_before[i])
-    is_in_arc = has_started & (along < requirements.length_after[i])
-    distance_outside = np.where(has_started & ~is_in_arc, -turn_sign * across, 0.0)
+    has_started = np.maximum.accumulate(
+        distance_along_before >= requirements.runs[i - 1] - requirements.length_before[i]
+    )
+    is_in_arc = has_started & (distance_along < requirements.length_after[i])
+    distance_outside = np.where(has_started & ~is_in_arc, -turn_sign * lateral_offset, 0.0)
     center_offset = position[is_in_arc, :2] - center
     distance_outside[is_in_arc] = np.hypot(center_offset[:, 0], center_offset[:, 1]) - requirements.radius[i]
     return max(0.0, float(distance_outside.max())) if distance_outside.size else 0.0
@@ -258,17 +284,17 @@ def _settled_distance(
     i: int,
     first_row: int,
     end_row: int,
-    along: Floats,
-    across: Floats,
+    distance_along: Floats,
+    lateral_offset: Floats,
 ) -> float:
     """Return the mean distance from the next leg's line in the last second before the next turn, m.
 
-    If the turn uses the whole leg, return the distance at the end of the leg.
+    If no row of this second lies past the turn at waypoint `i`, return the distance in the last row.
     """
     time = aligned.track.time[first_row : first_row + end_row + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))
     rows = np.arange(start, end_row + 1)
-    rows = rows[along[rows] >= requirements.length_after[i]]
+    rows = rows[distance_along[rows] >= requirements.length_after[i]]
     if rows.size:
-        return float(np.abs(across[rows]).mean())
-    return float(abs(across[end_row]))
+        return float(np.abs(lateral_offset[rows]).mean())
+    return float(abs(lateral_offset[end_row]))

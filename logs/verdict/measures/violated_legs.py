@@ -1,4 +1,4 @@
-"""Find the legs that violate a threat, a zone or the area: their findings name only the violated object."""
+"""Find the legs on which a plan violates a threat, a zone or the area; findings name only the violated object."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,10 @@ from world.threats import Threats
 
 
 def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[int, ...]:
-    """Return the legs of the planned path that violate the threat, zone or area of a failed finding."""
+    """Return the legs of the planned path that violate the threat, zone or area of a failed finding.
+
+    Return () for a finding of another rule.
+    """
     path, place = requirements.path, finding.place
     scenario = requirements.setup.scenario
     if place.kind in ("missile", "radar") and place.index is not None:
@@ -31,7 +34,11 @@ def violated_legs(requirements: RouteRequirements, finding: Finding) -> tuple[in
 
 
 def _sphere_segments(points: Floats, threats: Threats, number: int, *, is_missile: bool) -> NDArray[np.bool_]:
-    """Return True for each segment of a path that enters the sphere of a threat, (n - 1,).  points: (n, 3) m."""
+    """Return a mask of the path segments that enter the sphere of a threat, (n - 1,).
+
+    points: points of the path, m, (n, 3).
+    number: index of the threat.
+    """
     radius = float((threats.kill_radius if is_missile else threats.detection_radius)[number])
     start, step = points[:-1] - threats.position[number], np.diff(points, axis=0)
     length_square = (step**2).sum(axis=1)

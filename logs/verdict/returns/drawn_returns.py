@@ -1,6 +1,6 @@
 """Prepare returns for drawing: the worst paths, and the lowest altitude from which a return is safe.
 
-Neither is needed to judge returns, and both take as long as judging: they are computed only for a picture.
+Neither is needed to judge returns, and each takes as long as judging them, so they are computed only for a drawing.
 """
 
 import math
@@ -28,22 +28,23 @@ from world.arrays import Flags, Floats
 
 # Largest number of return paths that are drawn.
 MAX_DRAWN_PATHS = 3
-# Largest number of places at which the least safe altitude is searched.
-_MAX_PLACES = 40
+# Largest number of starts at which the lowest safe altitude is searched.
+_MAX_STARTS = 40
 # Step of that search above or below the flight's altitude, m.
 _STEP_M = 80.0
 # Number of steps in one direction.
 _MAX_STEPS = 15
-# Number of times that the last step is halved.
+# Number of bisections of the last step.
 _HALVING_COUNT = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WorstReturn:
-    """Return to draw: the worst return of its time range.
+    """Worst return of a time range, to be drawn.
 
-    return_range: the time range.  path: (t, 3) positions a second apart, m.
-    marked_position: position at which it fails, or is lowest, (3,) m.
+    return_range: the time range.
+    path: positions at intervals of one second, m, (t, 3).
+    marked_position: position at which the return fails, or at which it is lowest, m, (3,).
     """
 
     return_range: ReturnRange
@@ -52,18 +53,18 @@ class WorstReturn:
 
     @property
     def simulated(self) -> SimulatedReturn:
-        """The return itself."""
+        """The simulated return."""
         return self.return_range.worst
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MinSafeAltitudes:
-    """Least altitude from which a return by RTL is safe, at places on the path.
+    """Lowest altitude from which a return to launch is safe, at n starts on the path.
 
-    time: (n,) s.
-    altitude: (n,) m AMSL: if the return from the flight's own altitude is unsafe, the nearest higher altitude from
-        which it is safe; otherwise the lowest altitude at which it stays safe.  NaN if no altitude was found.
-    search_range: range of the search above the flight, m.
+    time: flight times of the starts, s, (n,).
+    altitude: lowest safe altitudes, m AMSL, (n,); NaN if none was found.  If the return from the flight's own altitude
+        is unsafe, this is the nearest higher altitude from which the return is safe.
+    search_range: range of the search above and below the flight, m.
     """
 
     time: Floats
@@ -75,7 +76,8 @@ class MinSafeAltitudes:
 class DrawnReturns:
     """Returns with the data for drawing them.
 
-    worst: the returns to draw, the worst first.  glides: from the same places; empty if they are not drawn.
+    worst: the returns to draw, the worst first.
+    glides: glides from the same starts; empty if they are not drawn.
     """
 
     returns: Returns
@@ -85,7 +87,10 @@ class DrawnReturns:
 
     @property
     def segments_by_outcome(self) -> list[tuple[Kind, list[SimulatedReturn]]]:
-        """Segments of the path with the same outcome of their returns; of two returns the worse one applies."""
+        """Segments of the path with the same outcome of their returns.
+
+        If a start has several returns, the worst of them applies.
+        """
         by_time = sorted(self.returns.each, key=lambda ret: ret.time)
         worst_by_time = [min(group, key=badness) for _, group in groupby(by_time, lambda ret: ret.time)]
         return group_segments(worst_by_time, lambda ret: ret.kind)
@@ -117,7 +122,7 @@ def drawn_returns(
 ) -> DrawnReturns:
     """Add all data for drawing to judged returns.
 
-    starts: the places from which they were judged.
+    starts: the starts of the judged returns.
     """
     min_altitudes = min_safe_altitudes(world, starts if returns.each else starts.subset(np.zeros(0, dtype=np.intp)))
     return DrawnReturns(returns, worst_returns(world, starts, returns), min_altitudes, glides)
@@ -169,26 +174,26 @@ def _marked_position(world: ReturnWorld, ret: SimulatedReturn, path: Floats) -> 
 
 
 def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltitudes:
-    """Find the minimum safe altitude at up to `_MAX_PLACES` of the starts; NaN if the ground is unknown."""
+    """Find the lowest safe altitude at up to `_MAX_STARTS` of the starts; NaN if the ground is unknown."""
     if not len(starts):
         return MinSafeAltitudes(np.zeros(0), np.zeros(0))
-    rows = np.unique(np.linspace(0, len(starts) - 1, _MAX_PLACES).round().astype(np.intp))
+    rows = np.unique(np.linspace(0, len(starts) - 1, _MAX_STARTS).round().astype(np.intp))
     selected_starts = starts.subset(rows)
     start_heights = heights_above_ground(world, selected_starts)
     min_offset = np.where(np.isfinite(start_heights), np.minimum(0.0, world.limit - start_heights), math.nan)
     is_safe = meets_return_limits(world, selected_starts)
-    # Offsets from the flight's altitude, m: the last safe one and the last unsafe one.
+    # Last safe and last unsafe offset from the flight's altitude, m.
     last_safe_offset, last_unsafe_offset = np.where(is_safe, 0.0, math.nan), np.where(is_safe, math.nan, 0.0)
     search_direction = np.where(is_safe, -1.0, 1.0)
-    is_searching = np.isfinite(min_offset)
+    is_unfinished = np.isfinite(min_offset)
     for step in range(1, _MAX_STEPS + 1):
         offsets = np.maximum(search_direction * step * _STEP_M, min_offset)
-        is_offset_safe = _are_safe_at_offset(world, selected_starts, offsets, is_searching)
+        is_offset_safe = _are_safe_at_offset(world, selected_starts, offsets, is_unfinished)
         last_safe_offset, last_unsafe_offset = (
-            np.where(is_searching & is_offset_safe, offsets, last_safe_offset),
-            np.where(is_searching & ~is_offset_safe, offsets, last_unsafe_offset),
+            np.where(is_unfinished & is_offset_safe, offsets, last_safe_offset),
+            np.where(is_unfinished & ~is_offset_safe, offsets, last_unsafe_offset),
         )
-        is_searching &= (is_offset_safe == is_safe) & (offsets > min_offset)
+        is_unfinished &= (is_offset_safe == is_safe) & (offsets > min_offset)
     for _ in range(_HALVING_COUNT):
         is_bracketed = np.isfinite(last_safe_offset) & np.isfinite(last_unsafe_offset)
         midpoints = np.where(is_bracketed, 0.5 * (last_safe_offset + last_unsafe_offset), 0.0)
@@ -203,7 +208,11 @@ def min_safe_altitudes(world: ReturnWorld, starts: ReturnStarts) -> MinSafeAltit
 
 
 def _are_safe_at_offset(world: ReturnWorld, starts: ReturnStarts, offsets: Floats, is_simulated: Flags) -> Flags:
-    """Flag each return that is safe from a start ``offsets`` m higher, (n,); simulate only ``is_simulated`` ones."""
+    """Return a mask of the starts from which a return is safe at an offset from the start's altitude, (n,).
+
+    offsets: altitude offsets, m, (n,).
+    is_simulated: mask of the starts to simulate; the result is False for all others.
+    """
     is_safe = np.zeros(len(starts), dtype=np.bool_)
     if is_simulated.any():
         rows = starts.rows[is_simulated].copy()

@@ -1,7 +1,7 @@
-"""Map the glide footprint: the least height above ground from which a place can be reached engine-out.
+"""Map the glide footprint: the minimum height above ground from which a site can be reached after an engine failure.
 
-The backward search from the chosen places (`logs.verdict.returns.glide_map`) gives the least altitude for every cell.
-This module converts it to a height above the cell's ground, in bands, with the outlines of each band.
+The backward search from the sites (`logs.verdict.returns.glide_map`) gives the minimum altitude for every cell.  This
+module converts it to a height above the cell's ground, and outlines the areas in each band of these heights.
 """
 
 import math
@@ -15,7 +15,7 @@ from shapely.geometry.polygon import orient
 from logs.verdict.returns.glide_map import GlideMap
 from world.arrays import Flags, Floats
 
-# An outline (k, 2) in m, closed, and its holes.
+# Closed outline of an area, m, (k, 2), followed by the outlines of its holes.
 Part = tuple[Floats, ...]
 
 # Upper limits of the bands, m above ground.
@@ -28,7 +28,10 @@ _MAX_BLOCKS = 200
 
 
 class Band(NamedTuple):
-    """Area where the required height above ground lies between two heights, m.  parts: outlines on the map."""
+    """Area in which the required height above ground lies between two heights, m.
+
+    parts: outlines of the area's parts on the map.
+    """
 
     min_height: float
     max_height: float
@@ -37,12 +40,12 @@ class Band(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GlideFootprint:
-    """Map on which glides were looked up.
+    """Map of the minimum altitudes for glides.
 
-    grid: its cells.
-    min_altitude: (n, e) minimum altitude, m AMSL, from which home, a rally point or a landing place is reached; inf if
-        none is.
-    is_landable: (n, e) True for a cell on which a landing is possible.
+    grid: cells of the map.
+    min_altitude: minimum altitude from which home, a rally point or a landing place is reached, m AMSL, (n, e); inf if
+        none is reached.
+    is_landable: True for a cell on which a landing is possible, (n, e).
     """
 
     grid: GlideMap
@@ -52,7 +55,10 @@ class GlideFootprint:
     def bands(
         self, east: tuple[float, float] = _WHOLE_RANGE, north: tuple[float, float] = _WHOLE_RANGE
     ) -> tuple[Band, ...]:
-        """Return the bands of needed height above ground, lowest first, within ranges of the map, m."""
+        """Return the bands of required height above ground, the lowest first.
+
+        east, north: ranges of the map, m; by default the whole map.
+        """
         grid = self.grid
         needed_heights = np.where(np.isfinite(grid.ground), self.min_altitude - grid.ground, math.inf)
         blocks = _CellBlocks.from_map(grid, east, north)
@@ -67,16 +73,19 @@ class GlideFootprint:
     def landings(
         self, east: tuple[float, float] = _WHOLE_RANGE, north: tuple[float, float] = _WHOLE_RANGE
     ) -> tuple[Part, ...]:
-        """Return the outlines of ground that is flat according to the elevation file, within ranges of the map, m."""
+        """Return the outlines of ground on which a landing is possible, within ranges of the map, m."""
         blocks = _CellBlocks.from_map(self.grid, east, north)
         return blocks.outlines(blocks.max_by_block(self.is_landable.astype(np.float64)) > 0.0)
 
 
 class _CellBlocks(NamedTuple):
-    """Square blocks of map cells, in rows to the north.
+    """Square blocks of map cells, in rows from south to north.
 
-    west, south: corner of the first block, m.  side: side of a block, m.  cells_per_side: number of cells along a side.
-    first_cell: row and column of the first cell.  shape: rows and columns of blocks.
+    west, south: south-western corner of the first block, m.
+    side: side of a block, m.
+    cells_per_side: number of cells along a side of a block.
+    first_cell: row and column of the first cell.
+    shape: numbers of rows and columns of blocks.
     """
 
     west: float
@@ -88,7 +97,7 @@ class _CellBlocks(NamedTuple):
 
     @classmethod
     def from_map(cls, grid: GlideMap, east: tuple[float, float], north: tuple[float, float]) -> "_CellBlocks":
-        """Return the blocks of a map that lie within ranges, m."""
+        """Return the blocks of a map within ranges to the east and north, m."""
         rows, columns = grid.floor.shape
         axes = ((north, grid.south, rows), (east, grid.west, columns))
         first_cell = [math.floor(max(0.0, (limits[0] - origin) / grid.cell)) for limits, origin, _ in axes]
@@ -106,14 +115,14 @@ class _CellBlocks(NamedTuple):
         )
 
     def max_by_block(self, values: Floats) -> Floats:
-        """Return the maximum of the cells in each block."""
+        """Return the maximum of the cells' values in each block, with the shape of the blocks."""
         (row, column), (rows, columns) = self.first_cell, self.shape
         cell_values = values[row : row + rows * self.cells_per_side, column : column + columns * self.cells_per_side]
         block_values = cell_values.reshape(rows, self.cells_per_side, columns, self.cells_per_side)
         return np.asarray(block_values.max(axis=(1, 3)))
 
     def outlines(self, is_chosen: Flags) -> tuple[Part, ...]:
-        """Return the outlines of chosen blocks, with their holes."""
+        """Return the outlines of the areas of chosen blocks, with their holes; neighbouring blocks are joined."""
         if not is_chosen.any():
             return ()
         edges = np.diff(np.pad(is_chosen.astype(np.int8), ((0, 0), (1, 1))), axis=1)

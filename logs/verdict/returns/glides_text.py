@@ -1,4 +1,4 @@
-"""Describe glides without an engine in words."""
+"""Describe glides after an engine failure in words."""
 
 import math
 
@@ -27,7 +27,7 @@ _REACH_TEXTS: dict[Reach, str] = {
 
 
 def reached_text(reach: Reach) -> str:
-    """Describe the best destination in reach without an engine.
+    """Describe the kind of the best destination in reach after an engine failure.
 
     >>> reached_text("home")
     'home is in reach'
@@ -36,7 +36,7 @@ def reached_text(reach: Reach) -> str:
 
 
 def glides_headline(glides: Glides) -> str:
-    """Summarise in one line what can be reached without an engine.
+    """Summarize in one line the destinations in reach after an engine failure.
 
     >>> glides_headline(Glides((), (), 18.0, not_judged="terrain"))
     'not judged: there is no elevation file'
@@ -73,7 +73,7 @@ def site_text(site: GlideSite) -> str:
 
 
 def glide_range_text(glide_range: GlideRange, glides: Glides) -> str:
-    """Describe a time range: what is in reach, the altitude to spare, and ArduPlane's own return."""
+    """Describe a time range: the best destination in reach, the altitude to spare, and ArduPlane's own return."""
     time_text = (
         f"{glide_range.first:.0f} s"
         if glide_range.count == 1

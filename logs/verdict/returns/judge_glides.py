@@ -1,8 +1,8 @@
-"""Judge which places are in reach after an engine failure, by ArduPlane's own RTL and by the best path.
+"""Judge which destinations are in reach after an engine failure, by ArduPlane's own RTL and by the best path.
 
-ArduPlane does not know that its engine has stopped: its return to launch is simulated without thrust by its control law
-(`flight.autopilots.arduplane.rtl_point_mass`), straight at its target and onto its slope.  What can be reached at all
-is found by backward searches from home, the rally points and the landing places of the mission, and from all ground
+ArduPlane does not detect an engine failure: its return to launch is simulated without thrust by its control law
+(`flight.autopilots.arduplane.rtl_point_mass`), straight to its target and onto its slope.  All destinations in reach
+are found by backward searches from home, the rally points and the landing places of the mission, and from all ground
 that is flat by the elevation file (`logs.verdict.returns.glide_map`).  Both keep `MARGIN` above ground on the whole
 path, and stay out of kill spheres.
 """
@@ -49,16 +49,16 @@ REACHES: tuple[Reach, ...] = ("home", "site", "flat", "nothing", "unknown")
 # Outcome of ArduPlane's own return without thrust: at its target; at its target, but lower above ground than `MARGIN`;
 # ground impact; in a kill sphere; off the elevation data; or not simulated, because it would follow the terrain.
 EngineOutEnd = Literal["arrives", "low", "ground", "threat", "unknown", "not flown"]
-# Reason why nothing is judged: there is no elevation file; the model has no trim with the throttle closed; or the
+# Reason why no glide is judged: there is no elevation file; the model has no trim with the throttle closed; or the
 # mission is too large for a map.
 NotJudged = Literal["", "terrain", "trim", "far"]
 
 
 class GlideSite(NamedTuple):
-    """Chosen place to glide to.
+    """Home, a rally point or a landing place of the mission, as the destination of a glide.
 
     number: number of the rally point, or the mission item that lands; 0 for home.
-    east, north: m.
+    east, north: position, m.
     """
 
     kind: SiteKind
@@ -69,13 +69,14 @@ class GlideSite(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class EngineOutReturn:
-    """ArduPlane's return without thrust.
+    """ArduPlane's return to launch without thrust.
 
-    target: its destination.  end: its outcome.
-    arrival_height: height above ground on arrival over its target, m; NaN if it does not arrive.
+    target: destination of the return.
+    end: outcome.
+    arrival_height: height above ground over the target, m; NaN if the aircraft does not arrive.
     clearance: minimum height above ground on the path, m.
-    impact: east, north, up of the ground impact, m; NaN without one.
-    shortfall: distance from the ground impact to its target, m; NaN without one.
+    impact: east, north and up of the ground impact, m; NaN without an impact.
+    shortfall: distance from the ground impact to the target, m; NaN without an impact.
     """
 
     target: ReturnTarget
@@ -88,9 +89,10 @@ class EngineOutReturn:
 
 @dataclass(frozen=True, slots=True)
 class Glide:
-    """Destinations in reach from one place.
+    """Destinations in reach from one start.
 
-    time: s of the flight.  start: (3,) m.
+    time: flight time at the start, s.
+    start: position of the start, m, (3,).
     own_return: outcome of ArduPlane's return.
     home_altitude_left: altitude left on arrival at home, m; negative if the altitude is too low, -inf without a path.
     site_altitude_left: the same for the best rally point or landing place; -inf if there is none.
@@ -113,10 +115,12 @@ class Glide:
 
 @dataclass(frozen=True, slots=True)
 class GlideRange:
-    """Time range with the same destination in reach and the same outcome of ArduPlane's return.
+    """Time range of the flight with the same best destination and the same outcome of ArduPlane's return.
 
-    first, last: s.  count: number of glides.  site: index of the site in `Glides.sites` with most altitude left, or -1.
-    lowest_glide: the glide with the least altitude to spare at its best destination.
+    first, last: times of the first and the last start, s.
+    count: number of glides.
+    site: index of the best site in `Glides.sites`, or -1.
+    lowest_glide: glide with the least altitude to spare at its best destination.
     """
 
     first: float
@@ -128,15 +132,15 @@ class GlideRange:
 
 @dataclass(frozen=True, slots=True)
 class Glides:
-    """Glides from all places on the path.
+    """Glides from all starts on the path.
 
-    each: by time; empty if nothing is judged.
+    each: the glides in order of time; empty if no glide is judged.
     sites: home first, then rally points and landing places.
     airspeed: equivalent airspeed of the glides, m/s.
     cell: side of the map's cells, m.
-    fuel: True if the engine burns fuel: the drag of the stopped engine is unknown.
-    not_judged: reason why nothing is judged; "" if glides are judged.
-    footprint: the map used for the glides; None if nothing is judged.
+    fuel: True if the engine burns fuel; the drag of the stopped engine is then unknown.
+    not_judged: reason why no glide is judged; "" if glides are judged.
+    footprint: the map used for the glides; None if no glide is judged.
     """
 
     each: tuple[Glide, ...]
@@ -148,7 +152,7 @@ class Glides:
     footprint: GlideFootprint | None = field(default=None, repr=False, compare=False)
 
     def count(self, reach: Reach) -> int:
-        """Count the starts with this best destination."""
+        """Return the number of starts with this best destination."""
         return sum(glide.reach == reach for glide in self.each)
 
     @property
@@ -164,14 +168,14 @@ class Glides:
         return None if not self.each or self.count("unknown") else True
 
     def best_site(self, glide: Glide) -> int:
-        """Return the index of the best site: home if in reach, or else the one with most altitude left; -1 if none."""
+        """Return the index of the best site in reach: home, or else the one with the most altitude left; -1 if none."""
         if glide.reach == "home":
             return 0
         return glide.site if glide.reach == "site" else -1
 
     @property
     def ranges(self) -> tuple[GlideRange, ...]:
-        """All glides in time ranges, by time."""
+        """Time ranges of consecutive glides with the same result, in order of time."""
         ranges = []
         for (site, *_), group in groupby(
             self.each, lambda glide: (self.best_site(glide), glide.reach, glide.own_return.end)
@@ -189,9 +193,9 @@ class Glides:
         return tuple(ranges)
 
     def altitude_left(self, glide: Glide) -> float:
-        """Return the altitude left at the best destination, m.
+        """Return the altitude left on arrival at the best destination, m.
 
-        Below 0 if none is in reach, -inf without a path.
+        It is negative if no destination is in reach, and -inf without a path.
         """
         altitudes_left = {
             "home": glide.home_altitude_left,
@@ -206,9 +210,9 @@ NO_GLIDES = Glides((), (), math.nan)
 
 
 def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
-    """Judge the places that each start can reach without an engine.
+    """Judge the destinations that each start can reach after an engine failure.
 
-    Low starts in take-offs and landings are omitted: from them the aircraft descends straight ahead.
+    Low starts in take-offs and landings are omitted, because from them the aircraft descends straight ahead.
     """
     starts = starts.subset(np.flatnonzero(~starts.is_low))
     parameters = world.parameters
@@ -231,20 +235,26 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
     slopes = glide_slopes(world.aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
 
-    def search_from_cells(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        glides = search_glide_altitudes(grid, cells, slopes, max_altitude)
-        result = glide_altitudes_left(rows, glides, world.aircraft, environment, airspeed, bank)
-        return *result, glides.min_altitude
+    def search_glides_to(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
+        """Search the glides to destination cells.
 
-    # One search for home, and one for all other sites: it leads each start to the site that is best for it.
+        Returns for each start the altitude left (m) and the cell that is reached, and the map of minimum altitudes, m.
+        """
+        glide_altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
+        altitudes_left, reached_cells = glide_altitudes_left(
+            rows, glide_altitudes, world.aircraft, environment, airspeed, bank
+        )
+        return altitudes_left, reached_cells, glide_altitudes.min_altitude
+
+    # One search for home, and one for all other sites, which finds the best of them for each start.
     site_cells = np.array([grid.cell_at(site.east, site.north) for site in sites])
-    home_altitudes_left, _, home_min_altitudes = search_from_cells(site_cells[:1])
-    site_altitudes_left, reached_cells, site_min_altitudes = search_from_cells(site_cells[1:])
+    home_altitudes_left, _, home_min_altitudes = search_glides_to(site_cells[:1])
+    site_altitudes_left, reached_cells, site_min_altitudes = search_glides_to(site_cells[1:])
     site_by_cell = {
         int(np.ravel_multi_index(tuple(cell), grid.floor.shape)): k for k, cell in enumerate(site_cells) if k
     }
     is_landable = _flat_ground(world, grid)
-    flat_altitudes_left, flat_cells, _ = search_from_cells(np.argwhere(is_landable))
+    flat_altitudes_left, flat_cells, _ = search_glides_to(np.argwhere(is_landable))
     is_known = np.isfinite(terrain.height(rows["east"], rows["north"]))
     glides = []
     for k, row in enumerate(rows):
@@ -267,6 +277,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
 
 
 def _best_reach(home_altitude_left: float, site_altitude_left: float, flat_altitude_left: float) -> Reach:
+    """Return the best kind of destination with an altitude left (m) of at least 0."""
     if home_altitude_left >= 0.0:
         return "home"
     if site_altitude_left >= 0.0:
@@ -275,7 +286,7 @@ def _best_reach(home_altitude_left: float, site_altitude_left: float, flat_altit
 
 
 def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
-    """Return home, rally points, and the mission's landing places."""
+    """Return home, the rally points and the mission's landing places, in this order."""
     mission, origin = world.setup.mission, world.scenario.origin
     return (
         GlideSite("home", 0, world.home.east, world.home.north),
@@ -285,7 +296,10 @@ def _glide_sites(world: ReturnWorld) -> tuple[GlideSite, ...]:
 
 
 def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
-    """Return a mask of the cells for landing, (n, e): flat, and in no exclusion zone that reaches the ground."""
+    """Return a mask of the cells on which a landing is possible, (n, e).
+
+    They are flat, and in no exclusion zone that reaches down to `MARGIN` above the ground.
+    """
     is_flat = landable_cells(grid)
     exclude_zones(grid, is_flat, world.airspace.records, MARGIN)
     return is_flat
@@ -296,9 +310,10 @@ def _flat_ground(world: ReturnWorld, grid: GlideMap) -> Flags:
 
 
 def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> list[EngineOutReturn]:
-    """Simulate ArduPlane's own return from each start without thrust.
+    """Simulate ArduPlane's own return without thrust from each start.
 
-    A return that continues with a landing is simulated only up to its loiter.
+    A return that continues with a landing is simulated only up to its loiter.  If returns follow the terrain, none is
+    simulated, and each has the outcome "not flown".
     """
     targets = [world.target(row) for row in starts.rows]
     if "terrain" in world.unjudged_parts:
@@ -323,6 +338,7 @@ def _simulate_engine_out_returns(world: ReturnWorld, starts: ReturnStarts) -> li
 
 
 def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record) -> EngineOutReturn:
+    """Return the outcome of a simulated return without thrust.  result: record of dtype `RETURN_RESULT`."""
     clearance = float(result["clearance_before"])
     arrival_height, shortfall, impact = math.nan, math.nan, _NO_POSITION
     if result["ended"] == RETURN_ARRIVED and world.scenario.terrain is not None:
@@ -336,6 +352,7 @@ def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record)
 
 
 def _engine_out_end(result: Record, clearance: float, arrival_height: float) -> EngineOutEnd:
+    """Classify the outcome of a simulated return without thrust by its record and its heights above ground, m."""
     if result["ended"] == RETURN_GROUND_IMPACT:
         return "ground"
     if result["outside"] <= 0.0:

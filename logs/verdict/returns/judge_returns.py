@@ -1,10 +1,10 @@
 """Judge whether every return to launch (RTL) is safe: simulate ArduPlane's RTL from each start.
 
-If RTL_AUTOLAND, or a battery failsafe, leads to a landing sequence of the mission, the path to it is judged.
+If RTL_AUTOLAND, or a battery failsafe, leads to a landing sequence of the mission, the path to the sequence is judged.
 
 A return is simulated with a point mass (`flight.autopilots.arduplane.rtl_point_mass`), in the mean wind.  Returns whose
-simulation could be wrong are flown again in JSBSim if the caller provides that.  The JSBSim result replaces the result
-of the point mass for that return, and if it is worse, for all similar returns.
+simulation could be wrong are flown again in JSBSim if the caller provides a function for it.  The JSBSim result
+replaces the result of the point mass for that return and, if it is worse, for all similar returns.
 """
 
 import math
@@ -73,15 +73,15 @@ UnjudgedPart = Literal["terrain", "law", "autoland", "return path", "landing"]
 POINT_MASS_ERROR_M = 10.0
 # Distance to a limit within which the difference between point mass and JSBSim matters, m.
 _DECISIVE_MARGIN_M = 50.0
-# Height that the turn of a return costs, m.  A return that begins below the least height above ground, as after a
-# take-off, has to keep its starting height less this.
+# Height lost in the turn of a return, m.  A return that begins below the required height above ground, as after a
+# take-off, has to keep its starting height minus this loss.
 TURN_HEIGHT_LOSS_M = 2.0
 # Fraction of its starting height that a return from a flown take-off or landing has to keep: it may be sinking.
 _LOW_START_FRACTION = 0.5
-# Least height above ground from which returns in a take-off or a landing are judged, m: nothing turns below it.
+# Minimum height above ground from which returns in a take-off or a landing are judged, m: no autopilot turns below it.
 MIN_JUDGED_HEIGHT_M = 10.0
-# A return from a greater height is omitted if, within this horizontal distance, m, it hits the ground or gets low, and
-# loses more than that fraction of its starting height.
+# A return from a greater height is omitted if it hits the ground or gets low within this horizontal distance, m, after
+# losing the remaining fraction of its starting height.
 _SINK_DISTANCE_M = 500.0
 # Bank beyond which a JSBSim flight cannot begin at a start, rad, because it approaches the start straight.
 _MAX_START_BANK_RAD = math.radians(10.0)
@@ -91,19 +91,20 @@ _MAX_START_BANK_RAD = math.radians(10.0)
 class SimulatedReturn:
     """One simulated return.
 
-    time: flight time at its start, s.  start: position of its start, (3,) m.
-    target: its destination, and the reason for it.
-    kind: its outcome.
+    time: flight time at the start, s.
+    start: position of the start, m, (3,).
+    target: destination, and the reason for its choice.
+    kind: outcome.
     clearance: minimum height above ground, m; NaN if unknown.
-    lowest_position: position of that minimum, (3,) m.
+    lowest_position: position of the minimum height above ground, m, (3,).
     sphere_distance: minimum distance outside a kill sphere, m; inf without spheres.
     threat: index of that sphere; -1 for none.
-    zone: index in `Returns.airspace` of the zone that it violates; -1 for none.
-    energy: energy that it uses, Wh.
-    energy_left: energy left at its end, Wh; NaN if unknown.
-    time_to_loiter: time until it reaches its loiter, s; NaN if it does not.
-    required_height: required height above ground, m: the minimum height, or the starting height if that is less.
-    energy_used: energy used before it begins, Wh; NaN if unknown.
+    zone: index in `Returns.airspace` of the violated zone; -1 for none.
+    energy: energy used in the return, Wh.
+    energy_left: energy left at the end of the return, Wh; NaN if unknown.
+    time_to_loiter: time from the start to the return's loiter, s; NaN if the loiter is not reached.
+    required_height: required height above ground, m; see `required_heights`.
+    energy_used: energy used before the return, Wh; NaN if unknown.
     """
 
     time: float
@@ -129,9 +130,11 @@ class SimulatedReturn:
 
 @dataclass(frozen=True, slots=True)
 class ReturnRange:
-    """Time range from which returns go to the same place with the same outcome.
+    """Time range whose returns have the same destination and the same outcome.
 
-    first, last: s.  count: number of returns.  worst: the worst of them.
+    first, last: times of the first and the last start, s.
+    count: number of returns.
+    worst: the worst return.
     """
 
     first: float
@@ -140,18 +143,18 @@ class ReturnRange:
     worst: SimulatedReturn
 
 
-# Point of no return by energy: none; after some place; before the first place; or unknown, because the battery or the
-# energy used is unknown, because the aircraft's power is too uncertain, or because no return arrives.
+# Kind of the point of no return by energy: none ("never"); after some start ("later"); before the first start ("at
+# once"); or unknown, because the battery is unknown, because the energy used is unknown, because the aircraft's power
+# is too uncertain, or because no return arrives.
 NoReturnKind = Literal["never", "later", "at once", "battery", "used", "power", "arrives"]
 
 
 class PointOfNoReturn(NamedTuple):
-    """Last place from which a return leaves the energy reserve, in the given wind.
+    """Last start from which a return leaves the energy reserve, in the given wind.
 
     kind: kind of the point, or the reason why it is unknown.
-    time: time of that place, s; NaN if there is no point of no return, or it is unknown.
-    remaining_energy: energy left after the return from that place, or without such a place the minimum after any
-        return, Wh.
+    time: time of that start, s; NaN if there is no point of no return, or if it is unknown.
+    remaining_energy: minimum energy left after the returns up to that start, Wh.
     skipped_count: number of earlier returns that do not arrive, so that their energy is unknown.
     """
 
@@ -165,7 +168,8 @@ class PointOfNoReturn(NamedTuple):
 class Returns:
     """Returns from all starts on the path.
 
-    each: the returns in order of time.  interval: time between two starts, s.
+    each: the returns in order of time.
+    interval: time between two starts, s.
     causes: events that can take the aircraft off its mission, and the action on each.
     limit: required minimum height above ground, m.
     airspace: the zones.
@@ -216,7 +220,7 @@ class Returns:
         return tuple(ret for ret in self.each if ret.kind in UNSAFE)
 
     def count(self, kind: Kind) -> int:
-        """Count the returns with this outcome."""
+        """Return the number of returns with this outcome."""
         return sum(ret.kind == kind for ret in self.each)
 
     @property
@@ -229,7 +233,7 @@ class Returns:
             return PointOfNoReturn("power")
         for k, ret in enumerate(self.each):
             if k and ret.time <= self.each[k - 1].time:
-                # From here on the returns end differently.
+                # The following returns begin at the first start again, with another ending.
                 break
             if math.isnan(ret.energy_used):
                 return PointOfNoReturn("used")
@@ -247,7 +251,7 @@ class Returns:
 
     @property
     def ranges(self) -> tuple[ReturnRange, ...]:
-        """All returns in time ranges, the worst first."""
+        """Time ranges of consecutive returns with the same destination and outcome, the worst first."""
         ranges = []
         for _, group in groupby(self.each, _report_key):
             returns = list(group)
@@ -271,9 +275,12 @@ def badness(ret: SimulatedReturn) -> tuple[int, float]:
 class ReturnWorld:
     """Data that determine the outcome of returns, except their starts.
 
-    parameters: ArduPlane's parameters.  home, rally: places on the map.
-    aircraft: point-mass model.  environment: ground and spheres.
-    stands_in: as in `Returns`.  has_other_law: True if ArduPlane replaces an autopilot with its own return law.
+    parameters: ArduPlane's parameters.
+    home, rally: positions on the map.
+    aircraft: point-mass model.
+    environment: ground and spheres.
+    stands_in: as in `Returns`.
+    has_other_law: True if ArduPlane's return replaces the return of an autopilot with its own return law.
     landings: the mission's landing sequences.
     """
 
@@ -354,7 +361,7 @@ class ReturnWorld:
         return self.with_landing(target) if ending == "on to land" else target
 
     def with_landing(self, target: ReturnTarget) -> ReturnTarget:
-        """Add the landing sequence that follows the loiter of an RTL to its target, if there is one."""
+        """Return an RTL's target with the landing sequence that follows its loiter; unchanged if there is none."""
         landing = nearest_landing_sequence(target.position, self.landings) if self.ending == "on to land" else None
         if landing is None:
             return target
@@ -363,7 +370,7 @@ class ReturnWorld:
         return target._replace(name=name, reason=", ".join(reasons), landing=landing)
 
     def _choice_reason(self, landing: LandingStart) -> str:
-        """Return the reason for choosing a landing sequence."""
+        """Return a text on why a landing sequence was chosen; "" if the mission has only one."""
         return f"item {landing.item} is of the nearest of {len(self.landings)}" if len(self.landings) > 1 else ""
 
     def with_parameters(self, **values: float) -> "ReturnWorld":
@@ -481,13 +488,13 @@ def judge_returns(
 def sinks_to_ground(ret: SimulatedReturn, height: float) -> bool:
     """Return True if an RTL from a low start in a take-off or landing sinks to the ground before it can return.
 
-    Its path is then not at fault.
+    The path of the return is then not at fault.
 
-    height: its starting height above ground, m.
+    height: height of the start above ground, m.
 
-    Below `MIN_JUDGED_HEIGHT_M` this applies to any return that hits the ground or gets low near its start; above, only
-    to one that loses half of its height by then.  A return that flies into rising ground, or hits a hill later, is
-    judged.
+    Below `MIN_JUDGED_HEIGHT_M` this applies to any return that hits the ground or gets low near its start; above this
+    height, only to a return that also loses half of its height.  A return that flies into rising ground, or hits a hill
+    later, is judged.
     """
     distance = math.dist(ret.start[:2], ret.lowest_position[:2])
     is_sinking = (
@@ -507,7 +514,9 @@ def simulate_returns(
     *,
     keep_paths: bool = False,
 ) -> tuple[Records, tuple[Floats, ...]]:
-    """Simulate returns from starts to their targets: (n,) of `RETURN_RESULT`, and their paths if there are zones.
+    """Simulate returns from n starts to their targets.
+
+    Returns the results, (n,) of dtype `RETURN_RESULT`, and the paths; the paths are empty without zones.
 
     limits: the argument ``least`` of `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
     keep_paths: True to return the paths also without zones.
@@ -516,7 +525,7 @@ def simulate_returns(
     circles = [
         None if target.straight else ReturnCircle(*target.position, radius, target.slope_base) for target in targets
     ]
-    # A landing is not simulated: a return that would begin with the landing ends where it would go on to it.
+    # A landing is not simulated: a return whose landing sequence begins with the landing ends at its loiter.
     landings = [target.landing if target.landing and not target.landing.is_landing else None for target in targets]
     keep_paths = keep_paths or bool(world.airspace.zones)
     result = fly_returns(
@@ -533,7 +542,10 @@ def simulate_returns(
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
-    """Return the required height above ground of the RTL from each start, m, (n,)."""
+    """Return the required height above ground of the RTL from each start, m, (n,).
+
+    This is the limit, or a height that depends on the start if the start is lower.
+    """
     start_heights = heights_above_ground(world, starts)
     air_heights = np.where(start_heights < world.limit, start_heights - TURN_HEIGHT_LOSS_M, world.limit)
     return np.where(starts.is_low, np.minimum(_LOW_START_FRACTION * start_heights, world.limit), air_heights)
@@ -550,7 +562,9 @@ def heights_above_ground(world: ReturnWorld, starts: ReturnStarts) -> Floats:
 def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: float, required_height: float) -> Kind:
     """Classify the outcome of a simulated return.
 
-    zone: the zone that it violates, -1 for none.  energy_left: energy left at the end, Wh; NaN if unknown.
+    result: record of dtype `RETURN_RESULT`.
+    zone: index of the violated zone, -1 for none.
+    energy_left: energy left at the end, Wh; NaN if unknown.
     required_height: required height above ground, m.
     """
     if result["ended"] == RETURN_GROUND_IMPACT:
@@ -564,7 +578,7 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
     if energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery:
         return "energy"
     if result["clearance"] < required_height - CLEARANCE_TOLERANCE_M:
-        # Applies wherever the return goes after that.
+        # A return that was too low is not judged better by an unknown rest of its path.
         return "low"
     if result["ended"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
         return "unknown"
@@ -582,6 +596,10 @@ def _judge_return(
     path: Floats,
     required_height: float,
 ) -> SimulatedReturn:
+    """Judge the return from start number `k`.
+
+    path: positions of the return, m, (t, 3); empty without zones.
+    """
     zone = most_violated_zone(world, path) if len(path) > 1 else -1
     energy_used = 0.0 if math.isnan(starts.energy_used[k]) else float(starts.energy_used[k])
     energy_left = float(world.setup.battery - energy_used - result["energy"]) if world.is_battery_known else math.nan
@@ -609,7 +627,7 @@ def _judge_return(
 
 
 def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
-    """Return the index of the zone that a path (t, 3) violates most, or -1 if it violates none."""
+    """Return the index of the zone that a path violates most, or -1 if it violates none.  path: m, (t, 3)."""
     steps = np.diff(path, axis=0)
     moves: Records = np.zeros(len(steps), MOVE)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -625,7 +643,7 @@ def most_violated_zone(world: ReturnWorld, path: Floats) -> int:
 
 
 # ----------------------------------------------------------------------
-# Returns that the point mass could have wrong, flown again in JSBSim.
+# Returns whose point-mass simulation could be wrong, flown again in JSBSim.
 
 
 def _recheck_in_jsbsim(
@@ -636,7 +654,10 @@ def _recheck_in_jsbsim(
     fly_again: FlyAgain,
     max_flights: int,
 ) -> tuple[list[SimulatedReturn], list[float]]:
-    """Fly the most doubtful return of each group of successive doubtful returns in JSBSim, and correct the group."""
+    """Fly the most doubtful return of each group of successive doubtful returns in JSBSim, and correct the group.
+
+    Returns the returns with their corrections, and the differences in clearance, m.
+    """
     corrected_returns, differences = list(returns), []
     doubtful_groups = groupby(range(len(returns)), lambda k: distance_to_limit(returns[k]) < POINT_MASS_ERROR_M)
     groups = [
@@ -675,7 +696,7 @@ def _recheck_in_jsbsim(
             if j != k and simulations_disagree and returns[j].kind in ("low", "safe"):
                 corrected_returns[j] = replace(returns[j], kind="unsure")
             elif j != k and not simulations_disagree:
-                # The flight of one return never improves another one.
+                # A JSBSim flight that is better than the point mass does not improve other returns.
                 corrected_returns[j] = _with_offsets(
                     world, returns[j], results[j], min(0.0, height_offset), min(0.0, distance_offset)
                 )
@@ -704,7 +725,7 @@ def _with_offsets(
 
 
 def is_reachable_start(world: ReturnWorld, row: Record) -> bool:
-    """Return True if a JSBSim flight can be brought to a start: the bank is small, and the airspeed high enough."""
+    """Return True if a JSBSim flight can begin at a start: the bank is small, and the airspeed is high enough."""
     wind = world.scenario.wind
     wind_speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, float(row["up"]))
     east = float(row["velocity_east"]) + wind_speed * math.sin(wind.from_course)
@@ -716,7 +737,7 @@ def is_reachable_start(world: ReturnWorld, row: Record) -> bool:
 def distance_to_limit(ret: SimulatedReturn) -> float:
     """Return a return's distance to the nearest limit (ground, required height or kill sphere), m."""
     if ret.kind in ("zone", "unknown"):
-        # Neither depends on a distance.
+        # These outcomes do not depend on a distance.
         return math.inf
     distances = [abs(ret.clearance)]
     if ret.kind != "ground":

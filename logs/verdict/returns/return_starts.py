@@ -20,7 +20,7 @@ from world.kernels import Records
 
 # Time over which velocities are computed for a track without velocities, s.
 _VELOCITY_WINDOW_S = 1.0
-# Height that a return from a final approach with its motor off loses before it climbs, m.
+# Height lost at the beginning of a return from a final approach with the motor off, before the aircraft climbs, m.
 SINK_HEIGHT_LOSS_M = 10.0
 
 
@@ -28,12 +28,13 @@ SINK_HEIGHT_LOSS_M = 10.0
 class ReturnStarts:
     """Positions and velocities at which returns begin.
 
-    time: (n,) s.  rows: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    energy_used: (n,) energy used before the return, Wh; NaN if unknown.
+    time: flight times, s, (n,).
+    rows: states, (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
+    energy_used: energy used before the return, Wh, (n,); NaN if unknown.
     is_flown: True for a flown track, False for the planned path.
-    is_low: (n,) True for a place in a flown take-off or landing that is lower above ground than the required clearance
-        plus `SINK_HEIGHT_LOSS_M`.
-    grounded_count: number of further places where the aircraft is too slow to fly: on its launch, or landed.
+    is_low: True for a start in a flown take-off or landing that is lower above ground than the required clearance plus
+        `SINK_HEIGHT_LOSS_M`, (n,).
+    grounded_count: number of omitted samples where the aircraft is too slow to fly: at its launch, or after landing.
     """
 
     time: Floats
@@ -54,9 +55,9 @@ class ReturnStarts:
 
 
 def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnStarts:
-    """Sample a flown track up to its own return to launch, while the aircraft flies.
+    """Sample a flown track up to its own return to launch; samples on the ground are left out.
 
-    interval: s.
+    interval: time between samples, s.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -84,12 +85,12 @@ def flown_starts(setup: FlightSetup, track: Track, interval: float) -> ReturnSta
 
 
 def _empty_starts(*, is_flown: bool) -> ReturnStarts:
-    """Return a set of no starts."""
+    """Return a `ReturnStarts` without any start."""
     return ReturnStarts(np.zeros(0), np.zeros(0, RETURN_START), np.zeros(0), is_flown, np.zeros(0, dtype=np.bool_))
 
 
 def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp]) -> tuple[Flags, Flags]:
-    """Flag the rows that are low in a flown take-off or landing, and the low rows too slow to fly, (n,) each."""
+    """Return masks of the rows that are low in a flown take-off or landing, and of those too slow to fly, (n,) each."""
     procedures, terrain = setup.ground_phases, setup.scenario.terrain
     is_ground_phase = ground_phase_rows(track, procedures)[rows]
     position = np.asarray(track.position[rows], dtype=np.float64)
@@ -102,7 +103,7 @@ def _low_and_slow_rows(setup: FlightSetup, track: Track, rows: NDArray[np.intp])
 
 
 def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
-    """Return ground velocities at some rows, m/s, (n, 3), computed from positions where the track has none."""
+    """Return the ground velocities at some rows, m/s, (n, 3); missing ones are computed from the positions."""
     velocity = track.velocity[rows].astype(np.float64)
     for k in np.flatnonzero(~np.isfinite(velocity).all(axis=1)):
         window_rows = np.flatnonzero(np.abs(track.time - track.time[rows[k]]) <= _VELOCITY_WINDOW_S)
@@ -113,9 +114,9 @@ def _ground_velocities(track: Track, rows: NDArray[np.intp]) -> Floats:
 
 
 def planned_starts(setup: FlightSetup, interval: float) -> ReturnStarts:
-    """Sample the planned path up to its own return to launch, with unknown energy used.
+    """Sample the planned path up to its own return to launch; the energy used before is unknown.
 
-    interval: s.
+    interval: time between samples, s.
 
     >>> from logs.recording.example_log import example_log
     >>> starts = planned_starts(example_log().setup, 1.0)
@@ -189,7 +190,12 @@ def _ground_speeds(setup: FlightSetup) -> Floats:
 
 
 def _start_records(position: Floats, velocity: Floats, roll: Floats) -> Records:
-    """Return records of dtype `RETURN_START` from positions (n, 3) m, velocities (n, 3) m/s and banks (n,) rad."""
+    """Return n records of dtype `RETURN_START`.
+
+    position: m, (n, 3).
+    velocity: ground velocity, m/s, (n, 3).
+    roll: rad, (n,).
+    """
     rows: Records = np.zeros(len(position), RETURN_START)
     for k, name in enumerate(("east", "north", "up")):
         rows[name], rows[f"velocity_{name}"] = position[:, k], velocity[:, k]

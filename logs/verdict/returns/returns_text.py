@@ -18,7 +18,7 @@ from logs.verdict.returns.suggest_returns import Remedy
 from world.frames import to_geo
 from world.scenario import Scenario
 
-# Outcome of one return, and of several.
+# Texts for the outcome of one return, and of several returns.
 _SINGULAR_TEXTS: dict[Kind, str] = {
     "ground": "hits the ground",
     "threat": "enters a missile's sphere",
@@ -41,7 +41,7 @@ _PLURAL_TEXTS: dict[Kind, str] = {
     "unsure": "cannot be judged because the point mass and JSBSim disagree",
     "low": "come lower than {limit:.0f} m above ground",
 }
-# Name of the path segment from which returns have this outcome.
+# Legend text of a path segment from which returns have this outcome.
 _SEGMENT_NAMES: dict[Kind, str] = {
     "ground": "a return hits the ground",
     "threat": "a return enters a missile's sphere",
@@ -92,7 +92,7 @@ def outcome_text(ret: SimulatedReturn, limit: float) -> str:
 
 
 def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str:
-    """Describe one return: destination, outcome, and distances from ground and spheres.
+    """Describe one return: destination, outcome, minimum height above ground, and distance from missile spheres.
 
     limit: required minimum height above ground, m.
     """
@@ -111,7 +111,7 @@ def measured_text(ret: SimulatedReturn, limit: float, scenario: Scenario) -> str
 
 
 def counts_text(returns: Returns) -> str:
-    """State the number of returns with each outcome, the worst first; "" if all are safe."""
+    """Return a text with the number of returns by outcome, the worst first; "" if all are safe."""
     counts = {kind: returns.count(kind) for kind in KINDS if kind != "safe"}
     texts = {
         kind: (_SINGULAR_TEXTS if count == 1 else _PLURAL_TEXTS)[kind].format(limit=returns.limit)
@@ -121,7 +121,7 @@ def counts_text(returns: Returns) -> str:
 
 
 def headline(returns: Returns) -> str:
-    """Summarise all returns in one line.
+    """Summarize all returns in one line.
 
     >>> from logs.verdict.measures.route_requirements import Airspace
     >>> headline(Returns((), 1.0, (), 60.0, None, 0.0, True))
@@ -144,12 +144,15 @@ def headline(returns: Returns) -> str:
 
 
 def _judged_text(returns: Returns) -> str:
-    """Count the outcomes of the judged returns; if all are safe, state the lowest height and the least energy left."""
+    """Return a text on the outcomes of the judged returns.
+
+    If all are safe, the text states their minimum height above ground and the minimum energy left.
+    """
     total, failure_counts = len(returns.each), counts_text(returns)
     if failure_counts:
         safe_count = returns.count("safe")
         return f"of {total} returns {failure_counts}; {safe_count} {'is' if safe_count == 1 else 'are'} safe"
-    # Returns that begin below the limit, as after a take-off, say nothing about the path home.
+    # Leave out returns that begin below the limit, as after a take-off: their lowest point is the start.
     high_returns = [ret for ret in returns.each if not ret.required_height < returns.limit] or returns.each
     lowest_return = min(high_returns, key=lambda ret: ret.clearance)
     min_energy_left = min(
@@ -191,7 +194,7 @@ def point_of_no_return_text(returns: Returns) -> str:
 
 
 def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
-    """List the events that make the aircraft return, and those that do not, in one line each.
+    """List the events that make the aircraft return, that make it land, and that do neither, in up to three lines.
 
     >>> from flight.autopilots.arduplane.failsafes import failsafe_causes
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
@@ -219,9 +222,9 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
 
 
 def describe_landing(returns: Returns) -> list[str]:
-    """Describe the effect of RTL_AUTOLAND and the landing sequence, in lines.
+    """Describe in lines how a return ends with this RTL_AUTOLAND and the mission's landing sequences.
 
-    Return [] for another autopilot.
+    Return [] for an autopilot other than ArduPlane.
 
     >>> describe_landing(Returns((), 1.0, (), 60.0, None, 0.0, True, autoland=0))
     ['RTL_AUTOLAND 0: a return keeps circling at its target']
@@ -300,8 +303,8 @@ def _range_outcome_text(
             return f"{prefix}flies where the terrain is unknown"
         case "unsure":
             return (
-                f"{prefix}{height_text} by the point mass, but JSBSim's flight of this return, or of one near"
-                f" it, differs by more than {POINT_MASS_ERROR_M:.0f} m"
+                f"{prefix}{height_text} by the point mass, but JSBSim's flight of this return, or of a similar"
+                f" return, differs by more than {POINT_MASS_ERROR_M:.0f} m"
             )
     if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: the return begins below the required height)"
@@ -315,7 +318,7 @@ def _range_outcome_text(
 
 
 def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
-    """Describe a remedy and the outcome of the returns with it."""
+    """Describe a remedy and the outcome of the returns after the change."""
     changes = [f"{name} {value:g}" for name, value in remedy.parameters.items()]
     if remedy.rally is not None:
         noun = "rally point" if len(remedy.rally) == 1 else "rally points"
@@ -324,7 +327,7 @@ def remedy_text(remedy: Remedy, returns: Returns, scenario: Scenario) -> str:
 
 
 def rally_texts(rally: Sequence[ReturnPoint], scenario: Scenario) -> list[str]:
-    """Return latitude, longitude and height above home of rally points, for entry in a ground station."""
+    """Return the latitude, longitude and height above home of each rally point as text for a ground station."""
     texts = []
     for point in rally:
         lat, lon = (float(value) for value in to_geo(scenario.origin, point.east, point.north))

@@ -1,8 +1,9 @@
-"""Suggest what makes every return safe: RTL_ALTITUDE, a climb before the turn, or rally points.
+"""Suggest changes that make every return safe: RTL_ALTITUDE, a climb before the turn, or rally points.
 
-The altitude is the lowest one, and the rally points are the fewest.  Each suggestion is simulated from all places, like
-judged returns.  Plain set cover does not work for rally points: the autopilot goes to the nearest point and not to the
-best, so a set is rated by the autopilot's choice, and an added point may take returns away from a better point.
+The suggested altitude is the lowest, and the number of rally points the smallest that was found.  Each suggestion is
+simulated from all starts, like judged returns.  Plain set cover does not work for rally points: the autopilot goes to
+the nearest point and not to the best, so a set is rated by the autopilot's choice, and an added point may take returns
+away from a better point.
 """
 
 import math
@@ -41,7 +42,7 @@ _CLIMBS_M = (20.0, 50.0, 100.0, 200.0)
 
 @dataclass(frozen=True, slots=True)
 class Remedy:
-    """Suggested change.
+    """Suggested change of parameters or rally points.
 
     parameters: changed parameters, by ArduPlane's names and in its units.
     rally: rally points that replace the mission's; None keeps the mission's.
@@ -72,7 +73,7 @@ def is_improvement(before: Returns, after: Returns) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class _ReturnLimits:
-    """Required clearance and distance outside spheres of the return from each start, (n,) m."""
+    """Required height above ground and required distance outside spheres of the return from each start, m, (n,)."""
 
     clearance: Floats
     sphere_distance: Floats
@@ -83,7 +84,10 @@ class _ReturnLimits:
 
 
 def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MARGIN) -> _ReturnLimits:
-    """Return the limits plus a margin, or each start's own values minus the turn's height loss if they are smaller."""
+    """Return the limits of the return from each start, with a margin, m.
+
+    A start that is itself lower or closer to a sphere has its own value, minus the turn's height loss, as its limit.
+    """
     rows = starts.rows
     sphere_distances = np.full(len(starts), math.inf)
     start_heights = np.nan_to_num(heights_above_ground(world, starts), nan=math.inf)
@@ -103,17 +107,17 @@ def _return_limits(world: ReturnWorld, starts: ReturnStarts, margin: float = MAR
 
 
 def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
-    """Flag each RTL return that keeps within the limits, without margin, in the point-mass simulation, (n,)."""
+    """Return a mask of the starts whose RTL keeps the limits, without margin, in the point-mass simulation, (n,)."""
     return _rtls_meet_criterion(world, starts, _return_limits(world, starts, 0.0), _meets_all)
 
 
 def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
-    """Flag each return that stays above its required height above ground, and arrives, (n,)."""
+    """Return a mask of the returns that arrive and keep the required height above ground, (n,)."""
     return np.asarray((results["ended"] == RETURN_ARRIVED) & (results["clearance"] >= limits.clearance))
 
 
 def _meets_all(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
-    """Flag each return that stays above its required height, arrives, and stays outside spheres, (n,).
+    """Return a mask of the returns that arrive, keep the required height, and stay outside spheres, (n,).
 
     `_meets_criterion` checks zones and energy.
     """
@@ -126,7 +130,7 @@ Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]
 def _rtls_meet_criterion(
     world: ReturnWorld, starts: ReturnStarts, limits: _ReturnLimits, criterion: Criterion
 ) -> Flags:
-    """Flag each return that meets the requirements, (n,); with `_meets_all`, check zones and energy too."""
+    """Return a mask of the starts whose RTL meets a criterion, (n,); `_meets_all` includes zones and energy."""
     return _meets_criterion(world, starts, [world.target(row) for row in starts.rows], limits, criterion)
 
 
@@ -137,7 +141,7 @@ def _meets_criterion(
     limits: _ReturnLimits,
     criterion: Criterion,
 ) -> Flags:
-    """Flag each return from a start to its target that meets a criterion, (n,).
+    """Return a mask of the returns to the given targets that meet a criterion, (n,).
 
     With `_meets_all`, zones and energy are checked too.
     """
@@ -155,7 +159,7 @@ def _meets_criterion(
 
 
 class _ReturnTrial:
-    """Trial of returns from all starts, beginning with the starts that failed before."""
+    """Tests returns from all starts, beginning with the starts that failed in earlier tests."""
 
     def __init__(self, starts: ReturnStarts, limits: _ReturnLimits) -> None:
         self._starts, self._limits = starts, limits
@@ -217,7 +221,10 @@ def suggest_parameters(world: ReturnWorld, starts: ReturnStarts) -> list[Remedy]
 
 
 def _suggest_climbs(world: ReturnWorld, trial: _ReturnTrial, altitude: float | None) -> list[Remedy]:
-    """Suggest a climb before the turn, with or without an altitude, with which all returns meet the requirements."""
+    """Suggest a climb before the turn with which all returns meet the requirements; return [] if none does.
+
+    altitude: RTL_ALTITUDE to try in addition, m; None for no change of it.
+    """
     options = float(int(world.parameters.flight_options) | CLIMB_BEFORE_TURN)
     candidates = [{"RTL_CLIMB_MIN": climb} for climb in _CLIMBS_M] + [{"FLIGHT_OPTIONS": options}]
     if altitude is not None:
@@ -321,7 +328,7 @@ def _search_in_rounds(
 def _rally_candidates(
     world: ReturnWorld, starts: ReturnStarts, spacing: float, max_distance: float
 ) -> list[ReturnPoint]:
-    """Return candidate rally points near the path, at two altitudes, with loiters clear of ground and spheres.
+    """Return candidate rally points on a grid near the path, at two altitudes, with loiters clear of spheres.
 
     spacing: grid spacing, m, increased if there are too many candidates.
     max_distance: maximum distance from the path, m.
@@ -354,7 +361,7 @@ def _rally_candidates(
 
 
 def _highest_ground(world: ReturnWorld, east: float, north: float) -> float:
-    """Return the highest ground within the loiter around a point, m AMSL; NaN if part of the ground is unknown."""
+    """Return the altitude of the highest ground within the loiter around a point, m AMSL; NaN if any is unknown."""
     if world.scenario.terrain is None:
         return world.home.up
     angles = np.arange(16) * (math.pi / 8.0)
@@ -403,7 +410,10 @@ class _RallySearch:
         self._is_simulated = np.zeros(len(starts), dtype=np.bool_)
 
     def find(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Find the set of candidates that is good for most searched starts.  point_set: the initial set."""
+        """Find a set of candidates with as many good returns from the searched starts as possible.
+
+        point_set: initial set, as indices of candidates.
+        """
         self._simulate_candidates(searched_starts[~self._is_simulated[searched_starts]])
         while len(point_set) < _MAX_POINTS and self._count_good(searched_starts, point_set) < len(searched_starts):
             extended_set = self._with_best_addition(searched_starts, point_set)
@@ -413,7 +423,7 @@ class _RallySearch:
         return self._without_superfluous_points(searched_starts, point_set)
 
     def _with_best_addition(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Add the best point to a set, or the best pair if no single point is an improvement."""
+        """Return a set extended by the best point, or by the best pair if no single point is an improvement."""
         candidates = range(len(self.candidates))
         counts = [self._count_good(searched_starts, [*point_set, candidate]) for candidate in candidates]
         if max(counts) > self._count_good(searched_starts, point_set):
@@ -425,7 +435,7 @@ class _RallySearch:
         )
 
     def _simulate_candidates(self, searched_starts: NDArray[np.intp]) -> None:
-        """Simulate returns from starts to their nearest candidates; all other candidates are rated as bad."""
+        """Simulate the returns from starts to their nearest candidates; returns to others are rated as unsafe."""
         pairs = [
             (start, int(candidate))
             for start in searched_starts
@@ -446,7 +456,7 @@ class _RallySearch:
         )
 
     def _count_good(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> int:
-        """Count the good returns with these rally points, each to the point that the autopilot chooses."""
+        """Return the number of good returns with these rally points, each to the point that the autopilot chooses."""
         if not point_set:
             return int(self._is_good_from_home[searched_starts].sum())
         distances = self._distances[np.ix_(searched_starts, np.array(point_set))]
@@ -463,7 +473,7 @@ class _RallySearch:
         return int(is_good.sum())
 
     def _with_swaps(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Swap points for better ones until no swap is an improvement."""
+        """Return a set in which points were swapped for better ones until no swap is an improvement."""
         best_count, has_improved = self._count_good(searched_starts, point_set), True
         while has_improved:
             has_improved = False
@@ -476,7 +486,7 @@ class _RallySearch:
         return point_set
 
     def _without_superfluous_points(self, searched_starts: NDArray[np.intp], point_set: list[int]) -> list[int]:
-        """Remove superfluous points from a set."""
+        """Return a set without the points whose removal makes no return unsafe."""
         for candidate in list(point_set):
             smaller_set = [other for other in point_set if other != candidate]
             if self._count_good(searched_starts, smaller_set) >= self._count_good(searched_starts, point_set):

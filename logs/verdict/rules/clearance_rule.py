@@ -28,7 +28,7 @@ from world.terrain import Terrain
 def clearance_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the minimum height above ground on each leg."""
+    """Judge the minimum height above ground on each leg; without terrain data, return one unjudged finding."""
     terrain = requirements.setup.scenario.terrain
     limit = requirements.limits.min_clearance
     if terrain is None:
@@ -54,20 +54,20 @@ def clearance_findings(
         planned_height, required_height = requirement.worst_height(heights[segments], points[segments])
         if geometric:
             findings.append(
-                _planned_clearance(requirements, leg, planned_height, required_height, terrain.vertical_error)
+                _planned_finding(requirements, leg, planned_height, required_height, terrain.vertical_error)
             )
         else:
             is_short = planned_height < required_height - CLEARANCE_TOLERANCE_M
             findings.append(
-                _flown_clearance(requirements, aligned, leg, planned_height, requirement, is_planned_short=is_short)
+                _flown_finding(requirements, aligned, leg, planned_height, requirement, is_planned_short=is_short)
             )
     return [*_home_above_ground_findings(requirements, terrain, findings), *findings]
 
 
 def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
-    """Report a route that goes below home as undecided.
+    """Report a route with a waypoint clearly below home as undecided; otherwise return [].
 
-    Without terrain the ground is assumed at home's altitude.
+    This applies without terrain data, where the ground is assumed to be at home's altitude.
     """
     home = requirements.setup.mission.home
     if home is None:
@@ -87,11 +87,11 @@ def _below_home_findings(requirements: RouteRequirements) -> list[Finding]:
 def _home_above_ground_findings(
     requirements: RouteRequirements, terrain: Terrain, leg_findings: list[Finding]
 ) -> list[Finding]:
-    """Report a route with heights above home as undecided if it would be too low with home on the ground.
+    """Report a mission whose home lies above the ground as undecided if a leg would be too low with home on the ground.
 
-    An autopilot sets home on the ground when it is armed there.
+    An autopilot sets home to its own position when it is armed, and all heights above home are lowered with it.
 
-    leg_findings: the findings of the legs.
+    leg_findings: findings on the legs with the mission's own home.
     """
     setup = requirements.setup
     home = setup.mission.home
@@ -99,7 +99,7 @@ def _home_above_ground_findings(
         return []
     east, north = to_map(setup.scenario.origin, home.lat_deg, home.lon_deg)
     height = home.alt - float(terrain.height(float(east), float(north)))
-    # NaN, where the terrain does not reach, decides nothing.
+    # The height is NaN outside the terrain data; then nothing is reported.
     if not height > HOME_ERROR_M or not any(
         finding.margin is not None and 0.0 <= finding.margin < height for finding in leg_findings
     ):
@@ -109,8 +109,8 @@ def _home_above_ground_findings(
     )
     brief = f"the mission's home is {height:.0f} m above the ground there"
     explanation = (
-        f": if it is armed on that ground, the whole flight is lower by that height, and at its lowest"
-        f" {min_height:.0f} m above ground"
+        f": if the aircraft is armed on that ground, the whole flight is lower by this height, and only"
+        f" {min_height:.0f} m above ground at its lowest point"
     )
     fault = message(brief, explanation)
     return [make_finding("clearance", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=GROUND_PATH)]
@@ -119,15 +119,15 @@ def _home_above_ground_findings(
 class _Requirement(NamedTuple):
     """Required height above ground on a leg, which is reduced near a flown take-off or landing.
 
-    limit: required height outside these fields, m.
-    fields: east and north of nearby homes and landing points, m.
+    limit: required height away from home and landing points, m.
+    fields: positions (east, north) of home or landing points near which less height is required, m.
     """
 
     limit: float
     fields: tuple[tuple[float, float], ...]
 
     def required_heights(self, points: Floats) -> Floats:
-        """Return the required height above ground at points (n, 3), (n,) m."""
+        """Return the required heights above ground, m: an array (n,) for `points` (n, 3)."""
         requirement = np.full(len(points), self.limit)
         for east, north in self.fields:
             distances = np.hypot(points[:, 0] - east, points[:, 1] - north)
@@ -135,9 +135,10 @@ class _Requirement(NamedTuple):
         return requirement
 
     def worst_height(self, heights: Floats, points: Floats) -> tuple[float, float]:
-        """Return the height above ground with the smallest margin, and the required height there, m.
+        """Return the height above ground with the smallest margin, and the height required at the same point, m.
 
-        heights: heights above ground at `points` (n, 3), m, (n,).
+        heights: heights above ground at `points`, m, (n,).
+        points: positions, m, (n, 3).
 
         The returned height is NaN if any height is unknown, or if `heights` is empty.
         """
@@ -147,7 +148,7 @@ class _Requirement(NamedTuple):
         return float(heights[k]), requirement
 
     def smallest_margin(self, heights: Floats, points: Floats) -> tuple[int, float]:
-        """Return the index of the known height with the smallest margin, and the required height there, m."""
+        """Return the index of the known height with the smallest margin, and the height (m) required at this point."""
         if not self.fields:
             return int(np.nanargmin(heights)), self.limit
         requirement = self.required_heights(points)
@@ -156,11 +157,11 @@ class _Requirement(NamedTuple):
 
 
 def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[float, float], ...]]:
-    """Return the fields (east, north), m, near which each leg needs less height above ground, by leg number.
+    """Return the positions near which a leg needs less height above ground, by leg number: east and north, m.
 
-    The field of the leg after a flown take-off is the home; that of the legs before a flown landing is the landing
-    point.  The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no such item.
-    Of these, only the final and the legs after the last waypoint that meets the limit on height above ground count.
+    The leg after a flown take-off has the position of home, and the legs before a flown landing have the landing point.
+    The legs before a landing begin at DO_LAND_START, or are the last two legs if the mission has no such item.  Only
+    the final approach is included, and the legs after the last waypoint that keeps the required height above ground.
     """
     setup, ground = requirements.setup, requirements.ground_phases
     procedures = setup.ground_phases if ground is None else ground.procedures
@@ -184,17 +185,17 @@ def _fields_by_leg(requirements: RouteRequirements) -> dict[int, tuple[tuple[flo
     return fields_of_leg
 
 
-def _last_clear_waypoint(requirements: RouteRequirements, final: int) -> int:
-    """Return the last waypoint before the final that meets the limit on height above ground.
+def _last_clear_waypoint(requirements: RouteRequirements, final_leg: int) -> int:
+    """Return the last waypoint up to the start of the final approach that keeps the required height above ground.
 
-    Return the start of the final if no waypoint meets the limit.
+    Return the start of the final approach if no waypoint keeps this height, or if the terrain is unknown.
     """
-    terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final + 1]
+    terrain, waypoints = requirements.setup.scenario.terrain, requirements.setup.route.waypoints[: final_leg + 1]
     if terrain is None:
-        return final
+        return final_leg
     heights = waypoints[:, 2] - terrain.height(waypoints[:, 0], waypoints[:, 1])
     clear_waypoints = np.flatnonzero(heights >= requirements.limits.min_clearance - CLEARANCE_TOLERANCE_M)
-    return int(clear_waypoints[-1]) if clear_waypoints.size else final
+    return int(clear_waypoints[-1]) if clear_waypoints.size else final_leg
 
 
 def _limit_source(requirements: RouteRequirements, limit: float) -> str:
@@ -212,12 +213,13 @@ def _terrain_error_text(clearance: float, limit: float, error: float | None) -> 
     return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{shortfall_text}"
 
 
-def _planned_clearance(
+def _planned_finding(
     requirements: RouteRequirements, leg: int, planned_height: float, limit: float, error: float | None
 ) -> Finding:
     """Judge the minimum height above ground of a leg's planned path.
 
-    planned_height: m; NaN if the leg leaves the terrain data.  limit: required height, m.
+    planned_height: minimum height above ground, m; NaN if the leg leaves the terrain data.
+    limit: required height, m.
     error: the terrain's stated error, m; None if not stated.
     """
     reason = f"{planned_height:.1f} m above ground at the lowest"
@@ -241,7 +243,7 @@ def _planned_clearance(
     )
 
 
-def _flown_clearance(
+def _flown_finding(
     requirements: RouteRequirements,
     aligned: AlignedTrack | None,
     leg: int,
@@ -256,7 +258,7 @@ def _flown_clearance(
     """
     min_clearance, ok, reason, limit = math.nan, None, "the leg was not flown", requirement.limit
     if aligned is not None and aligned.has_flown(leg):
-        # The first leg includes what came before it, the last leg what came after.
+        # The first leg includes the track before it, the last leg the track after it.
         first = 0 if leg == 0 else int(aligned.rows[leg])
         last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
         clearances = aligned.clearance[first:last]

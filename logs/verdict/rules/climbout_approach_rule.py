@@ -48,7 +48,7 @@ from logs.verdict.wording import place_text
 from world.frames import to_map
 from world.geometry import wrap
 
-# Step between the launch courses that `_free_courses_text` tries, deg.
+# Step between the launch courses that `_clear_courses_text` tries, deg.
 _COURSE_STEP_DEG = 10
 
 
@@ -69,7 +69,7 @@ class _Obstacles(NamedTuple):
     entered_hazard: str
 
     @property
-    def is_free(self) -> bool:
+    def is_clear(self) -> bool:
         """True if the path hits neither ground nor sphere nor zone; False if the ground is unknown."""
         return self.clearance >= 0.0 and not self.entered_hazard
 
@@ -82,11 +82,14 @@ class _Obstacles(NamedTuple):
         )
 
 
-def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, amsl: float) -> tuple[float, float]:
-    """Return the nominal and the certain maximum climb slope on a course (rad) at an altitude (m AMSL), m per m."""
+def _climb_slopes(requirements: RouteRequirements, leg: int, course: float, altitude: float) -> tuple[float, float]:
+    """Return the maximum climb slope on a course (rad) at an altitude (m AMSL), m per m.
+
+    The first value is the nominal slope, the second the slope reduced by the uncertainty of the aircraft's model.
+    """
     speed, limits = float(requirements.route.airspeed[leg]), requirements.limits
     max_slope, certain_slope = (
-        limit_set.slopes(course, amsl, speed)[0] for limit_set in (limits, limits.with_margin())
+        limit_set.slopes(course, altitude, speed)[0] for limit_set in (limits, limits.with_margin())
     )
     return math.tan(max_slope), math.tan(certain_slope)
 
@@ -100,7 +103,8 @@ def climbout_findings(
 ) -> list[Finding]:
     """Judge the climb from home to the first waypoint.
 
-    Return [] if that waypoint is over home, if the mission has no home, or if the aircraft takes off vertically.
+    Return [] if that waypoint is over home, if the mission has no home, if there is no terrain, if the aircraft takes
+    off vertically, or if the take-off was flown.
     """
     home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not has_ground_paths(requirements) or home is None or terrain is None:
@@ -160,7 +164,10 @@ def climbout_findings(
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str, *, is_undecided: bool) -> Finding:
-    """Return a finding on an unjudged path.  is_undecided: True if it leaves the verdict undecided."""
+    """Return a finding that a climb-out or an approach is not judged.
+
+    is_undecided: True if this finding leaves the verdict undecided.
+    """
     title = "climb-out" if rule == "climbout" else rule
     fault = message(f"the {title} at {place_text(place)} is not judged: {reason}")
     return make_finding(
@@ -174,7 +181,7 @@ class _Launch(NamedTuple):
     course: rad.
     leg_length: length of the leg on the course, m.
     slope: slope of the leg, m per m.
-    course_text: description of the course, "" along the first leg.
+    course_text: description of the course, "" if the scenario states no course.
     """
 
     course: float
@@ -186,7 +193,7 @@ class _Launch(NamedTuple):
 def _find_launch(requirements: RouteRequirements) -> _Launch:
     """Return the launch on the scenario's course, or along the first leg if the scenario states no course.
 
-    The first leg's run and slope apply if the leg is on the launch course.
+    The length and slope are those of the first leg if it lies on the launch course, otherwise inf and 0.
     """
     stated_launch = requirements.setup.scenario.launch
     first_leg = _Launch(
@@ -234,7 +241,7 @@ def _takeoff_profile(
 
 
 def _find_obstacles(requirements: RouteRequirements, path: GroundPath) -> _Obstacles:
-    """Return the obstacles on a path from home; the first `LAUNCH_RUN_M` of the path may be close to the ground."""
+    """Return the obstacles on a path from home.  Height above ground is not checked on the first `LAUNCH_RUN_M`."""
     terrain, end = requirements.setup.scenario.terrain, float(path.distance[-1])
     entered_hazard = first_hazard_on_path(requirements, path)
     if terrain is None or end <= LAUNCH_RUN_M:
@@ -247,7 +254,7 @@ def _air_start_finding(place: Place, obstacles: _Obstacles) -> Finding:
     subject = f"the climb from home to {_item_text(place)}"
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason, check, ok = f"the terrain below {subject} is unknown", "", None
-    elif obstacles.is_free:
+    elif obstacles.is_clear:
         reason, check, ok = (
             f"straight from home: {_clearance_text(obstacles)}; not flown, because the flight begins in the air",
             "",
@@ -266,15 +273,15 @@ def _launch_finding(
     obstacles: _Obstacles,
     obstacles_at_min_climb: _Obstacles,
     launch: tuple[tuple[float, float], float, float],
-    is_known: bool,
+    is_climb_certain: bool,
 ) -> Finding:
     """Judge the climb of a mission that takes off, towards its next waypoint or on a launch course.
 
-    course_text: description of the launch course, "" along the first leg.
+    course_text: description of the launch course, "" if the scenario states no course.
     obstacles: obstacles at the steepest climb.
     obstacles_at_min_climb: obstacles at the minimum climb.
     launch: launch position (east, north, m), ground altitude there and altitude at the end of the climb (m AMSL).
-    is_known: True if the aircraft's climb is certain.
+    is_climb_certain: True if the aircraft's maximum climb slope has no uncertainty.
     """
     to_item = requirements.leg(0).to_item
     direction_text = f"towards {('the next waypoint' if to_item is None else f'item {to_item}')}"
@@ -282,19 +289,24 @@ def _launch_finding(
     if math.isnan(obstacles.clearance) and not obstacles.entered_hazard:
         reason = message(f"the terrain below {subject} is unknown")
         return _path_finding("climbout", place, obstacles, None, reason)
-    if not obstacles.is_free:
+    if not obstacles.is_clear:
         fault = obstacles.obstacle_message(subject, "from home, even at the steepest climb")
-        other_courses_text = _free_courses_text(requirements, *launch)
+        other_courses_text = _clear_courses_text(requirements, *launch)
         fault = message(fault.brief, fault.text[len(fault.brief) :] + other_courses_text)
         return _path_finding(
-            "climbout", place, obstacles, False if is_known else None, fault, "" if is_known else GROUND_PATH
+            "climbout",
+            place,
+            obstacles,
+            False if is_climb_certain else None,
+            fault,
+            "" if is_climb_certain else GROUND_PATH,
         )
     min_climb_text = f"{subject}, at {100.0 * MIN_CLIMB_FRACTION:.0f} % of the steepest climb,"
     if math.isnan(obstacles_at_min_climb.clearance) and not obstacles_at_min_climb.entered_hazard:
         return _path_finding(
             "climbout", place, obstacles, None, message(f"{min_climb_text} leads to where the terrain is unknown")
         )
-    if not obstacles_at_min_climb.is_free:
+    if not obstacles_at_min_climb.is_clear:
         return _path_finding(
             "climbout",
             place,
@@ -312,12 +324,12 @@ def _launch_finding(
     )
 
 
-def _free_courses_text(
+def _clear_courses_text(
     requirements: RouteRequirements, home_position: tuple[float, float], ground_altitude: float, top_altitude: float
 ) -> str:
     """Describe the widest range of courses on which a launch climbs to the take-off's altitude without obstacles."""
 
-    def is_free(course: float) -> bool:
+    def is_clear(course: float) -> bool:
         """Return True if a launch on a course (rad) climbs to the take-off's altitude without obstacles."""
         climb, _ = _climb_slopes(requirements, 0, course, ground_altitude)
         if not climb > 0.0:
@@ -329,21 +341,21 @@ def _free_courses_text(
                 course,
                 [(0.0, ground_altitude), ((top_altitude - ground_altitude) / climb, top_altitude)],
             ),
-        ).is_free
+        ).is_clear
 
     courses = list(range(0, 360, _COURSE_STEP_DEG))
-    is_course_free = [is_free(math.radians(course)) for course in courses]
-    if not any(is_course_free):
+    is_course_clear = [is_clear(math.radians(course)) for course in courses]
+    if not any(is_course_clear):
         return "; no launch course is clear of obstacles"
     # Begin after a course with obstacles, so that no range is cut at north.
-    start = is_course_free.index(False) if False in is_course_free else 0
+    start = is_course_clear.index(False) if False in is_course_clear else 0
     courses_from_start = [
-        (courses[k % len(courses)], is_course_free[k % len(courses)]) for k in range(start, start + len(courses))
+        (courses[k % len(courses)], is_course_clear[k % len(courses)]) for k in range(start, start + len(courses))
     ]
     ranges = [
         [course for course, _ in group]
-        for is_free_range, group in groupby(courses_from_start, key=lambda entry: entry[1])
-        if is_free_range
+        for is_clear_range, group in groupby(courses_from_start, key=lambda entry: entry[1])
+        if is_clear_range
     ]
     widest_range = max(ranges, key=len)
     if len(widest_range) == 1:
@@ -358,7 +370,10 @@ def _free_courses_text(
 def approach_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the glide from the last waypoint to the landing point; return [] if the mission does not land."""
+    """Judge the glide from the last waypoint to the landing point.
+
+    Return [] if the mission does not land, if the terrain is unknown, or if the landing was flown.
+    """
     landing, terrain, setup = landing_item(requirements), requirements.setup.scenario.terrain, requirements.setup
     if landing is None or terrain is None or not has_ground_paths(requirements):
         return []
@@ -428,7 +443,7 @@ def approach_findings(
         reason += (
             f", flares {glide.flare_height:.1f} m above the landing point and {glide.flare_distance:.0f} m before it"
         )
-    reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before it"
+    reason += f"; {_clearance_text(obstacles)} until {EARLY_TOUCHDOWN_DISTANCE_M:.0f} m before the landing point"
     reason += "" if setup.ground_phases.approach is not None else "; not flown, because the flight ends in the air"
     return [_path_finding("approach", place, obstacles, True, message(reason))]
 
@@ -442,7 +457,7 @@ def _item_text(place: Place) -> str:
 
 
 def _clearance_text(obstacles: _Obstacles) -> str:
-    """Describe the minimum height above ground on a free path, if it leads over ground that is judged."""
+    """Describe the minimum height above ground on a path without obstacles; "no obstacle" if no height was checked."""
     return (
         "no obstacle" if math.isinf(obstacles.clearance) else f"{obstacles.clearance:.0f} m above ground at the lowest"
     )
@@ -465,7 +480,7 @@ def _path_finding(
         tolerance=0.0,
         margin=None if obstacles.entered_hazard else obstacles.clearance,
         unit="m",
-        method="laid out from the mission's items, exact over the elevation file",
+        method="computed from the mission's items, without sampling error over the terrain data",
         check=check,
     )
 

@@ -19,7 +19,7 @@ from logs.verdict.wording import place_text_within
 def completion_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge whether a feasible plan was flown to its last waypoint and recorded completely and consistently."""
+    """Judge whether a flight followed a feasible plan to the last waypoint, and whether its log is complete."""
     plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
@@ -70,7 +70,7 @@ def _ending_place_text(requirements: RouteRequirements, aligned: AlignedTrack | 
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:
-    """Return faults for gaps in the record, and for contradictions between position and velocity."""
+    """Return faults for the longest gap between the log's rows, and for positions that contradict the velocities."""
     track, faults = aligned.track, []
     steps = np.diff(track.time)
     gap = int(np.argmax(steps))
@@ -95,7 +95,7 @@ _RETURN_MODE = "RTL"
 
 
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
-    """Judge the part of the mission that the log shows; a log that ends en route leaves the other legs undecided."""
+    """Judge whether an imported flight completed its mission; a log that ends en route leaves the rest undecided."""
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
     flown_legs = {
         leg for stretch_legs in stretches for leg in range(stretch_legs.first, stretch_legs.last - stretch_legs.partial)
@@ -106,10 +106,14 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
     if not log_complete:
         faults.append(message("the log is damaged or unfinished"))
     if not stretches:
-        followed = () if setup.source is None else setup.source.stretches
-        reason = "none of the mission's legs was flown" if followed else "no part of the flight followed the mission"
+        followed_stretches = () if setup.source is None else setup.source.stretches
+        reason = (
+            "none of the mission's legs was flown"
+            if followed_stretches
+            else "no part of the flight followed the mission"
+        )
         # The flight may have included legs that the log does not contain.
-        if missing_items is not None and followed:
+        if missing_items is not None and followed_stretches:
             unknown_texts.append(f"none of the legs in the log was flown: {_missing_items_text(missing_items)}")
         else:
             faults.append(message(reason))
@@ -141,7 +145,7 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
     unknown_texts += [
         f"the path to item {stop.item} is not judged, because it is not laid out" for stop in setup.route.unjoined_stops
     ]
-    notes += _gaps_text(stretches)
+    notes += _gap_notes(stretches)
     return make_finding(
         "completion",
         FLIGHT,
@@ -180,8 +184,8 @@ def _unflown_legs(
     return [leg for leg in unflown_legs if leg not in unseen_legs and leg not in partly_flown_legs], doubt_texts
 
 
-def _gaps_text(flown_stretches: Sequence[FlownLegs]) -> list[str]:
-    """Describe the gaps between the rows of the judged stretches in one line; return [] without gaps."""
+def _gap_notes(flown_stretches: Sequence[FlownLegs]) -> list[str]:
+    """Return one note on the gaps between the log's rows in the judged stretches, or [] without gaps."""
     gaps = [gap for legs in flown_stretches for gap in gaps_between(legs, legs.stretch.start, legs.stretch.end)]
     if not gaps:
         return []
@@ -211,13 +215,12 @@ def _legs_text(setup: FlightSetup, legs: Iterable[int]) -> str:
 
 def _missing_items_text(missing: MissingItems) -> str:
     """State the number of mission items that are not in the log."""
-    return (
-        f"{len(missing.numbers)} {'item' if len(missing.numbers) == 1 else 'items'} of the mission are not in the log"
-    )
+    count = len(missing.numbers)
+    return f"{count} {'item of the mission is' if count == 1 else 'items of the mission are'} not in the log"
 
 
 def _ends_in_return(setup: FlightSetup, legs: FlownLegs) -> bool:
-    """Return True if a stretch ended in the return mode and the mission's next item is that return."""
+    """Return True if a stretch ended in the return mode and the mission's next item is a return to launch."""
     item = int(setup.route.items[_next_waypoint(setup, legs)])
     commands = {mission_item.seq: mission_item.command for mission_item in setup.mission.items}
     return legs.stretch.next_mode == _RETURN_MODE and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH

@@ -36,8 +36,8 @@ def energy_findings(
 ) -> list[Finding]:
     """Compare the energy used with the battery's energy without its reserve.
 
-    An endless jump exceeds any battery.  A guessed battery is not judged.  If the aircraft's power is uncertain, energy
-    that may exceed the limit is undecided, except in an imported log, which contains measured energy.
+    A mission with an endless jump fails.  A guessed battery is not judged.  If the power of the aircraft's model is
+    uncertain, an energy that may exceed the limit is undecided, except in an imported log, which has measured energy.
     """
     setup = requirements.setup
     limit = (1.0 - ENERGY_RESERVE_FRACTION) * setup.battery
@@ -52,7 +52,7 @@ def energy_findings(
     max_energy = energy * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * setup.envelope.power_sd)
     is_uncertain = not faults and not is_guessed and energy <= limit < max_energy
     if energy == 0.0 and planned_energy == 0.0:
-        # A model without a reading of power reads as 0 W.
+        # A model without power data gives 0 W.
         energy, planned_energy = math.nan, math.nan
         reason = "the aircraft's model states no power, so the energy is unknown"
     elif math.isnan(energy):
@@ -94,13 +94,13 @@ def energy_findings(
 
 
 def _endless_jump_message(requirements: RouteRequirements, usable_energy: float) -> Message:
-    """Report an endless jump and the number of rounds for which the usable energy (Wh) lasts."""
+    """Return a message on an endless jump, with the number of rounds for which the usable energy (Wh) lasts."""
     route = requirements.setup.route
     last_waypoint = len(route.items) - 1
     start = last_waypoint
     while start > 0 and route.items[start] == route.items[last_waypoint]:
         start -= 1
-    # Find the start of the last round, at the item with which the route ends.
+    # Find the start of the last round: the previous waypoint of the item with which the route ends.
     while start > 0 and route.items[start] != route.items[last_waypoint]:
         start -= 1
     round_energy = (
@@ -111,7 +111,7 @@ def _endless_jump_message(requirements: RouteRequirements, usable_energy: float)
 
 
 def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None) -> tuple[float, float]:
-    """Return energy (Wh) and peak current (A) of a flight, its take-off and landing included; NaN without a flight."""
+    """Return the energy (Wh) and the peak current (A) of a flight with its take-off and landing; NaN if not flown."""
     track = None if aligned is None else aligned.track
     if requirements.ground_phases is not None:
         track = requirements.ground_phases.track
@@ -120,11 +120,12 @@ def _flown_energy(requirements: RouteRequirements, aligned: AlignedTrack | None)
     return float(track.energy.max()), float(track.current.max())
 
 
-class _FailsafeAnswer(NamedTuple):
-    """Answer to whether a battery failsafe leaves the mission.
+class _FailsafeMessages(NamedTuple):
+    """Messages on the battery failsafes that abort the mission.
 
-    faults: messages on failsafes that do.  undecided: messages on failsafes that may.
-    unjudged_text: clause on failsafes by a voltage that a healthy battery does not reach, which is not simulated.
+    faults: messages on failsafes that will abort it.
+    undecided: messages on failsafes that may abort it.
+    unjudged_text: clause on voltage failsafes that a healthy battery does not trigger; the voltage is not simulated.
     """
 
     faults: list[Message]
@@ -132,44 +133,44 @@ class _FailsafeAnswer(NamedTuple):
     unjudged_text: str = ""
 
 
-def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float) -> _FailsafeAnswer:
-    """Judge whether a battery failsafe leaves the mission.
+def _judge_battery_failsafes(requirements: RouteRequirements, energy_used: float) -> _FailsafeMessages:
+    """Judge whether a battery failsafe aborts the mission; return no messages for an imported flight.
 
-    energy_used: energy of the flight, Wh.  A log of an imported flight shows what its failsafes did.
+    energy_used: energy of the flight, Wh; NaN if unknown, and then no failsafe is judged.
     """
     setup, volts = requirements.setup, requirements.setup.envelope.volts
-    answer, unjudged = _FailsafeAnswer([], []), []
+    messages, unjudged = _FailsafeMessages([], []), []
     if setup.source is not None or math.isnan(energy_used):
-        return answer
+        return messages
     charge_used = energy_used / volts * _MAH_PER_AH if volts else math.nan
     for failsafe in setup.autopilot.checks.battery_failsafes:
         name = f"{failsafe.parameter} {failsafe.threshold:g}"
         if math.isnan(failsafe.used_charge):
             if voltage_text := _reachable_voltage_text(requirements, failsafe, energy_used):
-                answer.undecided.append(message(f"{name} may leave the mission", f": {voltage_text}"))
+                messages.undecided.append(message(f"{name} may leave the mission", f": {voltage_text}"))
             else:
                 unjudged.append(name)
         elif charge_used > failsafe.used_charge:
             limit_text = f"leaves the mission after {max(0.0, failsafe.used_charge):.0f} mAh"
             if failsafe.shares_charge:
                 share_text = f", of {charge_used:.0f} mAh from several monitored batteries"
-                answer.undecided.append(message(f"{name} {limit_text}{share_text}"))
+                messages.undecided.append(message(f"{name} {limit_text}{share_text}"))
             else:
-                answer.faults.append(message(f"{name} {limit_text}, and it needs {charge_used:.0f} mAh"))
+                messages.faults.append(message(f"{name} {limit_text}, and the flight needs {charge_used:.0f} mAh"))
     clause = f"; whether the battery falls below {' or '.join(unjudged)}, which leaves the mission, is not judged"
-    return answer._replace(unjudged_text=clause if unjudged else "")
+    return messages._replace(unjudged_text=clause if unjudged else "")
 
 
 def _reachable_voltage_text(requirements: RouteRequirements, failsafe: BatteryFailsafe, energy_used: float) -> str:
-    """Explain why a failsafe by the voltage may act before the reserve is reached; return "" if it does not.
+    """Explain why a voltage failsafe may act before the battery is down to its reserve; return "" if it does not.
 
     The voltage of a battery under load is not simulated.  A healthy battery with its reserve left has more than
-    `EMPTY_CELL_VOLTAGE_V` in each cell; its cells are counted by `NOMINAL_CELL_VOLTAGE_V`.
+    `EMPTY_CELL_VOLTAGE_V` in each cell; the number of cells follows from `NOMINAL_CELL_VOLTAGE_V`.
     """
     setup = requirements.setup
     if math.isfinite(failsafe.remaining_fraction):
         left = 1.0 - energy_used / setup.battery
-        return f"{left:.0%} of the battery are left" if left < failsafe.remaining_fraction else ""
+        return f"{left:.0%} of the battery is left" if left < failsafe.remaining_fraction else ""
     cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
     if not cells or failsafe.threshold / cells <= EMPTY_CELL_VOLTAGE_V + _VOLTAGE_ROUNDING_V:
         return ""

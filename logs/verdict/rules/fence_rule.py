@@ -24,11 +24,11 @@ from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
 from world.kernels import Record, Records
 
-_METHOD = "every point of each piece, arc and row"
+_METHOD = "every point of the path's straight segments and arcs, and of the segments between the log's rows"
 
 
 def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
-    """Make a function that returns True if the setup's planned path violates a zone by more than rounding.
+    """Return a function that returns True if the setup's planned path violates a zone by more than `ROUNDING_M`.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
@@ -47,7 +47,10 @@ def make_zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
 def fence_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each zone that plan or flight touches; if no zone is violated, report it.  Return [] without zones."""
+    """Judge each zone that the planned path or the flight touches; return [] without zones.
+
+    If no zone is violated, the first finding says so.
+    """
     airspace = requirements.airspace
     findings = []
     if airspace.fence_fault:
@@ -128,9 +131,9 @@ def _compliance_finding(
 def _zone_finding(
     requirements: RouteRequirements, zone_number: int, planned_visit: Record, flown_visit: Record | None
 ) -> Finding:
-    """Judge the depth of the flight in a violation of one zone, or of the planned path if nothing was flown.
+    """Judge how deep the flight violates one zone, or the planned path if nothing was flown.
 
-    The finding is not judged if no violation is known and the terrain below the zone is unknown in places.
+    The finding is undecided if no violation is known and the terrain below the zone is unknown in places.
     """
     airspace = requirements.airspace
     zone = airspace.zones[zone_number]
@@ -180,7 +183,7 @@ def _zone_finding(
 
 
 def _visit_facts(visit: Record) -> list[Fact]:
-    """Return time, position and leg of the path's first entry into a violation and of its exit."""
+    """Return the violation's duration, its number of entries, and time, position and leg of entry and exit."""
     facts = [Fact("time beyond", visit.beyond, "s"), Fact("entries", float(visit.entries), "1")]
     for event in ("entry", "exit"):
         for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):

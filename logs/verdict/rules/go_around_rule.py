@@ -3,9 +3,9 @@
 A go-around is not an item of the mission; it can be commanded anywhere on the glide.  The rule therefore simulates it
 from several places on the glide that the autopilot lays out, with ArduPlane's law on a point mass
 (`flight.autopilots.arduplane.go_around_point_mass`), back to the last waypoint before the glide, and judges the
-simulated path.  A go-around that never gets back fails; one whose path is not fully known is undecided.  It climbs
-on the landing course to a height above home, regardless of the altitude of the field, and only then turns.  From a
-field higher than home it may therefore turn into a hill at once.
+simulated path.  A go-around that never gets back fails; one whose path is not fully known is undecided.  The aircraft
+climbs on the landing course to a height above home, regardless of the altitude of the field, and only then turns.  From
+a field higher than home it may therefore turn into a hill at once.
 """
 
 import math
@@ -51,10 +51,10 @@ from world.terrain import Terrain
 _HEIGHT_STEP_M = 5.0
 # Maximum climb height above home that `_next_sufficient_height` tries, m.
 _MAX_HEIGHT_M = 1000.0
-# Distance between the simulated abort places on a glide, m.
+# Distance between the simulated abort points on a glide, m.
 _ABORT_SPACING_M = 50.0
-# Maximum number of simulated abort places.
-_MAX_ABORT_PLACES = 12
+# Maximum number of simulated abort points.
+_MAX_ABORT_POINTS = 12
 _NO_HEIGHT_TEXT = f"no climb up to {_MAX_HEIGHT_M:.0f} m above home would be sufficient"
 # Pitch of the climb if the mission has no take-off, rad (`Plane::do_land`, ArduPlane/commands_logic.cpp).
 _CLIMB_PITCH_RAD = math.radians(10.0)
@@ -132,8 +132,8 @@ class _GoAround(NamedTuple):
     unknown_part_text: str = ""
 
     @property
-    def is_free(self) -> bool:
-        """True if no fault is known."""
+    def is_clear(self) -> bool:
+        """True if the go-around hits nothing, gets back, and keeps the required height, as far as its path is known."""
         return (
             math.isnan(self.impact_time)
             and not self.entered_hazard
@@ -157,8 +157,8 @@ def go_around_findings(
 ) -> list[Finding]:
     """Judge the go-around of a mission that lands and has a home.
 
-    A go-around that is too low is a warning.  If the scenario requires go-arounds, it fails, and an unjudged go-around
-    leaves the verdict undecided.
+    A go-around with a fault is only a warning, unless the scenario requires go-arounds: then it fails, and an unjudged
+    go-around leaves the verdict undecided.  Return [] if there is nothing to judge and no requirement.
     """
     requirements = requirements if requirements.ground_phases is None else requirements.ground_phases.whole_route
     setup = requirements.setup
@@ -184,7 +184,7 @@ def go_around_findings(
 def _find_landing(
     requirements: RouteRequirements, terrain: Terrain, waypoint: int, item: MissionItem
 ) -> _Landing | None:
-    """Return the landing at a waypoint, or None if its glide or the height of its go-around is not known."""
+    """Return the landing at a waypoint, or None if its glide or the climb height of its go-around is not known."""
     setup, leg = requirements.setup, waypoint - 1
     glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
     leg_length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
@@ -192,41 +192,43 @@ def _find_landing(
     home_altitude = math.nan if home_position is None else home_position.up
     first, takeoff = first_item(requirements)
     takeoff_climb = 0.0 if takeoff is None else float(requirements.points[first, 2]) - home_altitude
-    height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
-    landings = _go_around_destinations(requirements, waypoint)
+    climb_height = setup.autopilot.ground.go_around_height(item.params[0], takeoff_climb)
+    destinations = _go_around_destinations(requirements, waypoint)
     ground_altitude, terrain_altitude = (
         setup.route.landing_ground,
         float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
     )
     if (
-        height is None
+        climb_height is None
         or math.isnan(home_altitude + ground_altitude + terrain_altitude)
         or leg_length < MIN_LEG_LENGTH_M
         or glide_start[2] <= ground_altitude
     ):
         return None
-    wind = setup.scenario.wind.components_on_course(course, ground_altitude)[0]
+    tailwind = setup.scenario.wind.components_on_course(course, ground_altitude)[0]
     point = np.array([landing_point[0], landing_point[1], ground_altitude])
     return _Landing(
-        glide=setup.autopilot.ground.glide(float(glide_start[2]) - ground_altitude, leg_length, wind, ground_altitude),
+        glide=setup.autopilot.ground.glide(
+            float(glide_start[2]) - ground_altitude, leg_length, tailwind, ground_altitude
+        ),
         waypoint=waypoint,
         point=point,
         ground_altitude=terrain_altitude,
         course=course,
         leg_length=leg_length,
         glide_start_altitude=float(glide_start[2]),
-        airspeed=setup.autopilot.ground.airspeed(setup.airspeed, wind, ground_altitude),
+        airspeed=setup.autopilot.ground.airspeed(setup.airspeed, tailwind, ground_altitude),
         pitch=_CLIMB_PITCH_RAD if takeoff is None else climb_pitch(takeoff),
         home_altitude=home_altitude,
-        climb_height=height,
-        destinations=landings,
+        climb_height=climb_height,
+        destinations=destinations,
         item=item,
-        unknown_path_text=_unknown_path_text(requirements, item, landings),
+        unknown_path_text=_unknown_path_text(requirements, item, destinations),
     )
 
 
 def _go_around_destinations(requirements: RouteRequirements, waypoint: int) -> tuple[LandingStart, ...]:
-    """Return the landing sequences to which a go-around may fly, or else the waypoint before the landing."""
+    """Return the landing sequences to which a go-around may fly; without any, the waypoint before the landing."""
     setup = requirements.setup
     mission, origin, terrain = setup.mission, setup.scenario.origin, setup.scenario.terrain
     previous_item = int(setup.route.items[waypoint - 1])
@@ -234,19 +236,21 @@ def _go_around_destinations(requirements: RouteRequirements, waypoint: int) -> t
     return landing_starts(mission, origin, terrain) or previous_place
 
 
-def _unknown_path_text(requirements: RouteRequirements, item: MissionItem, landings: tuple[LandingStart, ...]) -> str:
-    """Explain why the path of a go-around is not known; return "" if it is known."""
+def _unknown_path_text(
+    requirements: RouteRequirements, item: MissionItem, destinations: tuple[LandingStart, ...]
+) -> str:
+    """Explain why the path of a go-around from a landing item is not known; return "" if it is known."""
     next_item = next(
         (mission_item for mission_item in requirements.setup.mission.items if mission_item.seq == item.seq + 1), None
     )
-    # This takes precedence over landing sequences (`AP_Landing::restart_landing_sequence`).
+    # This command takes precedence over landing sequences (`AP_Landing::restart_landing_sequence`).
     if (
         next_item is not None
         and next_item.command == Command.NAV_CONTINUE_AND_CHANGE_ALT
         and int(next_item.params[0]) in (0, 1)
     ):
         return f"{command_name(next_item.command)} (item {next_item.seq}) follows the landing, and is flown instead"
-    return "" if landings else "no waypoint before the landing is known to fly back to"
+    return "" if destinations else "no waypoint before the landing is known to fly back to"
 
 
 def _go_around_finding(
@@ -263,7 +267,7 @@ def _go_around_finding(
     go_arounds = (
         []
         if landing.unknown_path_text
-        else _simulate_go_arounds(requirements, terrain, world, landing, height, _abort_places(landing))
+        else _simulate_go_arounds(requirements, terrain, world, landing, height, _abort_distances(landing))
     )
     worst = max(go_arounds, key=lambda go_around: go_around.badness, default=None)
     unknown_text = landing.unknown_path_text or next(
@@ -272,14 +276,14 @@ def _go_around_finding(
     climb = Fact(
         "climb above ground", min((go_around.min_climb_height for go_around in go_arounds), default=math.inf), "m"
     )
-    if worst is None or (unknown_text and worst.is_free):
+    if worst is None or (unknown_text and worst.is_clear):
         unknown_text = unknown_text or "the glide is below the ground, or the terrain below the glide is unknown"
         unjudged = message("a go-around is not judged", f": {climb_text}; {unknown_text}")
         check = GROUND_PATH if is_required else ""
         return make_finding(
             "go_around", place, ok=None, reason=unjudged.text, faults=[unjudged], unit="m", check=check, facts=[climb]
         )
-    if worst.is_free:
+    if worst.is_clear:
         fault = message(f"{climb_text}; at least {worst.lowest_height:.0f} m above ground on the way back")
     else:
         sufficient_height = _next_sufficient_height(requirements, terrain, world, landing, worst.abort_distance)
@@ -292,7 +296,7 @@ def _go_around_finding(
             f": {climb_text}, and {_outcome_text(worst)};"
             f" {remedy_text if sufficient_height > 0.0 else _NO_HEIGHT_TEXT}",
         )
-    ok = worst.is_free or (False if is_required else None)
+    ok = worst.is_clear or (False if is_required else None)
     return make_finding(
         "go_around",
         place,
@@ -306,16 +310,16 @@ def _go_around_finding(
         tolerance=0.0,
         margin=None if worst.entered_hazard or worst.is_lost else worst.lowest_height - worst.required_height,
         unit="m",
-        method=f"flown by the simulated ArduPlane on a point mass from {len(go_arounds)} positions on the glide",
+        method=f"simulated ArduPlane flying a point-mass model from {len(go_arounds)} positions on the glide",
         facts=[climb],
     )
 
 
-def _abort_places(landing: _Landing) -> Floats:
-    """Return the distances before the landing point at which aborts are simulated, m, (n,), down to the flare."""
+def _abort_distances(landing: _Landing) -> Floats:
+    """Return the abort points from the glide's start to its flare, as distances before the landing point, m, (n,)."""
     last_distance = min(landing.leg_length, max(landing.glide.flare_distance, EARLY_TOUCHDOWN_DISTANCE_M))
-    place_count = min(_MAX_ABORT_PLACES, max(2, math.ceil((landing.leg_length - last_distance) / _ABORT_SPACING_M) + 1))
-    return np.linspace(landing.leg_length, last_distance, place_count)
+    point_count = min(_MAX_ABORT_POINTS, max(2, math.ceil((landing.leg_length - last_distance) / _ABORT_SPACING_M) + 1))
+    return np.linspace(landing.leg_length, last_distance, point_count)
 
 
 def _simulate_go_arounds(
@@ -326,7 +330,7 @@ def _simulate_go_arounds(
     climb_height: float,
     abort_distances: Sequence[float] | Floats,
 ) -> list[_GoAround]:
-    """Simulate and judge go-arounds from the abort points that are above the ground.
+    """Simulate and judge go-arounds from the abort points that are above ground; return [] if none is.
 
     climb_height: height above home at which the climb ends, m.
     abort_distances: distances of the abort points before the landing point, m.
@@ -383,27 +387,27 @@ def _judge_go_around(
     destination: LandingStart,
     top_altitude: float,
 ) -> _GoAround:
-    """Fill in the outcome of a go-around from its simulated path.
+    """Return the go-around with the outcome of its simulated path filled in.
 
     result: record of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
     positions: one point a second, m, (n, 3).
     destination: destination of the go-around.
     top_altitude: altitude above which the climb is over, m AMSL.
     """
-    rows, end_status = climb_rows(positions, top_altitude), int(result["ended"])
+    climb_end, end_status = climb_rows(positions, top_altitude), int(result["ended"])
     go_around = go_around._replace(
         is_lost=end_status == RETURN_TIMEOUT,
-        unknown_part_text=_unknown_part_text(end_status, has_climbed=rows < len(positions)),
+        unknown_part_text=_unknown_part_text(end_status, has_climbed=climb_end < len(positions)),
     )
-    if destination.is_landing and rows < len(positions):
-        # Its path on a glide that may begin anywhere is unknown; the path before the glide is known.
-        positions, end_status = positions[: rows + 1], 0
+    if destination.is_landing and climb_end < len(positions):
+        # Where the aircraft joins the glide is unknown: judge only the climb.
+        positions, end_status = positions[: climb_end + 1], 0
         go_around = go_around._replace(
             is_lost=False,
             unknown_part_text=f"the landing sequence begins with the landing itself (item {destination.item})",
         )
     if len(positions) < 2:
-        # It was aborted at its destination, or above the end of its climb.
+        # The landing was aborted at the destination, or above the end of the climb.
         return go_around._replace(lowest_height=go_around.abort_height)
     steps = np.diff(positions[:, :2], axis=0)
     path = GroundPath(positions, np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))]))
@@ -414,22 +418,22 @@ def _judge_go_around(
         return go_around._replace(lowest_height=min(min_height, 0.0), impact_time=float(result["clearance_time"]))
     landing_direction = math.sin(landing.course), math.cos(landing.course)
     is_beyond_point = (positions[:-1, :2] - landing.point[:2]) @ landing_direction > 0.0
-    climb = float(np.nanmin(heights[:rows][is_beyond_point[:rows]], initial=math.inf))
-    if climb < GO_AROUND_MODEL_ERROR_M and not go_around.unknown_part_text:
+    min_climb_height = float(np.nanmin(heights[:climb_end][is_beyond_point[:climb_end]], initial=math.inf))
+    if min_climb_height < GO_AROUND_MODEL_ERROR_M and not go_around.unknown_part_text:
         passing_text = (
-            f"aborted {go_around.abort_distance:.0f} m before the landing point, its climb clears "
-            f"the ground by {climb:.0f} m"
+            f"if the landing is aborted {go_around.abort_distance:.0f} m before the landing point, the climb clears "
+            f"the ground by {min_climb_height:.0f} m"
         )
         go_around = go_around._replace(
             unknown_part_text=f"{passing_text}, and may be flown {GO_AROUND_MODEL_ERROR_M:.0f} m lower"
         )
-    required = _required_heights(terrain, destination, 0.5 * (positions[:-1] + positions[1:]))[rows:]
-    return_heights = np.where(np.isnan(heights[rows:]), math.inf, heights[rows:])
+    required = _required_heights(terrain, destination, 0.5 * (positions[:-1] + positions[1:]))[climb_end:]
+    return_heights = np.where(np.isnan(heights[climb_end:]), math.inf, heights[climb_end:])
     if not return_heights.size:
-        return go_around._replace(min_climb_height=climb)
+        return go_around._replace(min_climb_height=min_climb_height)
     lowest_row = int(np.argmin(return_heights - required))
     return go_around._replace(
-        min_climb_height=climb,
+        min_climb_height=min_climb_height,
         lowest_height=float(return_heights[lowest_row]),
         required_height=float(required[lowest_row]),
     )
@@ -451,7 +455,7 @@ def _unknown_part_text(end_status: int, *, has_climbed: bool) -> str:
 
 
 def _required_heights(terrain: Terrain, destination: LandingStart, points: Floats) -> Floats:
-    """Return the required height above ground at points (n, 3) of the path back, m, (n,).
+    """Return the required heights above ground on the path back, m: an array (n,) for `points` (n, 3).
 
     Near a destination that is lower than `GO_AROUND_CLEARANCE_M`, the destination's own height is required.
     """
@@ -467,18 +471,18 @@ def _required_heights(terrain: Terrain, destination: LandingStart, points: Float
 def _next_sufficient_height(
     requirements: RouteRequirements, terrain: Terrain, world: ReturnWorld, landing: _Landing, worst_distance: float
 ) -> float:
-    """Return the next greater climb height above home with which all go-arounds are free, m; NaN if there is none.
+    """Return the next higher climb height above home at which every go-around is clear of obstacles, m; NaN if none is.
 
-    worst_distance: distance before the landing point of the abort to try first, m.
+    worst_distance: abort point to try first, as a distance before the landing point, m.
 
     Heights are tried in steps of `_HEIGHT_STEP_M` up to `_MAX_HEIGHT_M`.
     """
     first = _HEIGHT_STEP_M * math.ceil(landing.climb_height / _HEIGHT_STEP_M + 1e-9)
-    distances = [worst_distance, *_abort_places(landing).tolist()]
+    distances = [worst_distance, *_abort_distances(landing).tolist()]
     for height in np.arange(first, _MAX_HEIGHT_M + 1.0, _HEIGHT_STEP_M).tolist():
         for distance in distances:
             go_arounds = _simulate_go_arounds(requirements, terrain, world, landing, height, [distance])
-            if not all(go_around.is_free and not go_around.unknown_part_text for go_around in go_arounds):
+            if not all(go_around.is_clear and not go_around.unknown_part_text for go_around in go_arounds):
                 # Try the next height first at the distance at which this height was not enough.
                 distances[0] = distance
                 break
@@ -503,7 +507,8 @@ def _brief_outcome(worst: _GoAround) -> str:
 def _outcome_text(worst: _GoAround) -> str:
     """Describe the abort and the outcome of the worst go-around."""
     abort_text = (
-        f"aborted {worst.abort_distance:.0f} m before the landing point, {worst.abort_height:.0f} m above ground,"
+        f"after an abort {worst.abort_distance:.0f} m before the landing point,"
+        f" {worst.abort_height:.0f} m above ground,"
     )
     turn_text = " is already above this height, turns at once and" if worst.turns_at_once else ""
     if not math.isnan(worst.impact_time):

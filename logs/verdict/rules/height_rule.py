@@ -59,9 +59,9 @@ def height_findings(
 
 
 def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
-    """Return each segment's maximum height above ground, m, and its fraction of the segment, (n - 1,).
+    """Return each segment's maximum height above ground, m, and its position as a fraction of the segment, (n - 1,).
 
-    points: east, north and up, m, (n, 3).
+    points: ends of the segments as east, north and up, m, (n, 3).
 
     The maximum is exact for bilinear ground, because it is the minimum height in the inverted world.  It is NaN if a
     segment leaves the raster or its data.
@@ -73,7 +73,13 @@ def max_segment_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Float
 
 @dataclass(frozen=True, slots=True)
 class _Path:
-    """Points, m, (n, 3), and times, s, (n,); maximum height above ground of each segment, m, and its fraction."""
+    """Path with the maximum height above ground of each of its n - 1 segments.
+
+    points: m, (n, 3).
+    times: s, (n,).
+    max_heights: m, (n - 1,).
+    fraction: position of each maximum as a fraction of its segment, (n - 1,).
+    """
 
     points: Floats
     times: Floats
@@ -96,7 +102,7 @@ class _LegMaxima:
 
 
 def _max_heights(path: _Path, segments: NDArray[np.intp]) -> _LegMaxima | None:
-    """Return the maximum heights on some segments of a path, or None without segments."""
+    """Return the maximum height above ground and the maximum altitude on some segments of a path; None without any."""
     if not segments.size:
         return None
     amsl = float(max(path.points[segments, 2].max(), path.points[segments + 1, 2].max()))
@@ -148,7 +154,7 @@ def _leg_finding(
                 message(f"{judged_maximum.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m")
             )
         if not judged_maximum.is_ground_known:
-            facts.append("part of the terrain below it is unknown")
+            facts.append("part of the terrain below the leg is unknown")
         ok = False if faults else True if judged_maximum.is_ground_known else None
     if (
         planned_maximum is not None

@@ -32,7 +32,7 @@ from world.arrays import Floats
 def launch_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown take-off with one finding."""
+    """Judge a flown take-off with one finding; return [] if no take-off was flown."""
     ground = requirements.ground_phases
     if ground is None or ground.procedures.take_off is None:
         return []
@@ -102,9 +102,9 @@ def _launch_finding(requirements: RouteRequirements, ground: FlownGround, take_o
 
 
 def _climb_clearance(requirements: RouteRequirements, path: GroundPath) -> tuple[float, float]:
-    """Return the minimum height above ground after the launch run and its distance along the path, m.
+    """Return the minimum height above ground after the launch run, and where it occurs as a distance along the path, m.
 
-    The height is inf if the take-off ends within the launch run, NaN if the ground is unknown.
+    The height is inf if the take-off ends within the launch run, NaN without terrain; the distance is then NaN.
     """
     terrain, (position, distances) = requirements.setup.scenario.terrain, path
     if terrain is None:
@@ -138,7 +138,7 @@ def _remaining_runway(requirements: RouteRequirements, take_off: TakeOff, positi
 
 
 def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clearance: float) -> list[str]:
-    """Describe the take-off in a list of phrases."""
+    """Describe course, launch method, climb and minimum height above ground (m) of a take-off, in a list of phrases."""
     course, method = round(math.degrees(take_off.course)) % 360, take_off.launch.method
     notes = [f"launched on a runway on {course}°"]
     if method != "runway":
@@ -152,7 +152,7 @@ def _describe_take_off(take_off: TakeOff, track: Track, distances: Floats, clear
             f"{verb} {abs(100.0 * altitude_gain / distances[-1]):.0f} m in 100 m, finally on a course of {course}°"
         )
     if math.isfinite(clearance):
-        notes.append(f"{clearance:.0f} m above ground at the lowest, once {LAUNCH_RUN_M:.0f} m from the launch")
+        notes.append(f"at least {clearance:.0f} m above ground more than {LAUNCH_RUN_M:.0f} m from the launch")
     return notes
 
 

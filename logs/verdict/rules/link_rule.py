@@ -57,26 +57,29 @@ def link_findings(
     return [_link_finding(requirements, aligned, (planned, flown), limit, reaction)]
 
 
-def _link_text(along: LinkAlongPath) -> str:
+def _link_text(link_on_path: LinkAlongPath) -> str:
     """Describe the smallest margin of the link and its outages."""
-    k = along.worst
+    k = link_on_path.worst
     if k < 0:
         return "the terrain below the radio path is unknown"
-    points = along.points
+    points = link_on_path.points
     sight_text = "in line of sight" if points.is_visible[k] else "behind the terrain"
     text = (
         f"{abs(points.margin[k]):.1f} dB {'above' if points.margin[k] >= 0.0 else 'below'} the fade margin"
-        f" at {along.time[k]:.0f} s, {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
+        f" at {link_on_path.time[k]:.0f} s, {points.distance[k] / 1000.0:.1f} km from the station, {sight_text}"
     )
-    if along.outages:
-        count = len(along.outages)
-        times_text = f", {count} times, at most {along.longest_outage:.0f} s at a time" if count > 1 else ""
-        text += f"; below the fade margin for {along.time_below_margin:.0f} s{times_text}"
-    return text if along.is_known else f"{text}; elsewhere the terrain below the radio path is unknown"
+    if link_on_path.outages:
+        count = len(link_on_path.outages)
+        times_text = f", {count} times, at most {link_on_path.longest_outage:.0f} s at a time" if count > 1 else ""
+        text += f"; below the fade margin for {link_on_path.time_below_margin:.0f} s{times_text}"
+    return text if link_on_path.is_known else f"{text}; elsewhere the terrain below the radio path is unknown"
 
 
 def _loss_reaction(requirements: RouteRequirements, link: RadioLink) -> Cause | None:
-    """Return the cause by which ArduPlane leaves its mission without this link; None if it continues, or is unknown."""
+    """Return the failsafe by which ArduPlane leaves its mission when this link is lost.
+
+    Return None if ArduPlane continues its mission, or if its reaction is unknown.
+    """
     world = _return_world(requirements)
     causes = () if world is None else world.causes
     reactions = [cause for cause in causes if cause.name in _LOSS_CAUSES[link.use]]
@@ -84,6 +87,7 @@ def _loss_reaction(requirements: RouteRequirements, link: RadioLink) -> Cause | 
 
 
 def _return_world(requirements: RouteRequirements) -> ReturnWorld | None:
+    """Return the conditions for simulated returns, or None for a mission without a home."""
     try:
         return return_world(requirements.setup)
     except MissionError:
@@ -94,7 +98,7 @@ def _return_world(requirements: RouteRequirements) -> ReturnWorld | None:
 def _reaction_text(
     requirements: RouteRequirements, aligned: AlignedTrack | None, outages: tuple[Outage, ...], reaction: Cause | None
 ) -> str:
-    """Describe what the autopilot does in outages that it notices, and judge its returns from there."""
+    """Describe the autopilot's reaction to the outages that it notices, and the result of its returns from them."""
     world = _return_world(requirements)
     title = requirements.setup.autopilot.title
     if world is None or world.has_other_law:
@@ -114,11 +118,14 @@ def _reaction_text(
 
 
 def _starts_in_outages(starts: ReturnStarts, outages: tuple[Outage, ...]) -> ReturnStarts:
-    """Return the starts in the outages that the autopilot notices, from when it does."""
+    """Return the starts of returns that lie in an outage, from the time at which the autopilot notices the outage.
+
+    One start before and after this time is included.
+    """
     is_lost = np.zeros(len(starts), dtype=np.bool_)
     for outage in outages:
-        noticed = outage.start + LINK_LOSS_REACTION_S
-        is_lost |= (starts.time >= noticed - _RETURN_INTERVAL_S) & (starts.time <= outage.end + _RETURN_INTERVAL_S)
+        notice_time = outage.start + LINK_LOSS_REACTION_S
+        is_lost |= (starts.time >= notice_time - _RETURN_INTERVAL_S) & (starts.time <= outage.end + _RETURN_INTERVAL_S)
     return starts.subset(np.flatnonzero(is_lost))
 
 
@@ -129,9 +136,11 @@ def _link_finding(
     limit: float,
     reaction: Cause | None,
 ) -> Finding:
-    """Judge the link along the second of two paths, the planned and the judged one.
+    """Judge the radio link along a path by its longest outage.
 
-    limit: longest accepted outage, s.  reaction: cause by which the autopilot leaves the mission, or None.
+    paths: link along the planned path and along the judged path; both are the planned path before a flight.
+    limit: longest accepted outage, s.
+    reaction: failsafe by which the autopilot leaves the mission, or None.
     """
     planned, judged = paths
     ok: bool | None = judged.longest_outage <= limit

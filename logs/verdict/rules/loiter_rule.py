@@ -94,7 +94,7 @@ def merge_loiter_findings(
         return [(k, finding) for k in indices if (finding := merged[k]) is not None and finding.rule in rules]
 
     for circle in loiter_circles(requirements):
-        # If the mission ends on its loiter, that end is on it too.
+        # If the mission ends on this loiter, its last waypoint belongs to the loiter.
         last_items = requirements.setup.route.items[circle.last : circle.last + 2]
         last = (
             circle.last + 1
@@ -114,7 +114,7 @@ def merge_loiter_findings(
         for rule in ("slope", "speed", "clearance", "corridor"):
             rule_findings = remaining_findings((rule,), legs)
             if joins_at_center and any(finding.ok is not None for _, finding in rule_findings):
-                # The loiter was left before the other legs: only the flown ones are judged.
+                # The aircraft left the loiter before its other legs: judge only the flown legs.
                 for k, finding in rule_findings:
                     merged[k] = finding if finding.ok is not None else None
                 rule_findings = [entry for entry in rule_findings if entry[1].ok is not None]
@@ -127,12 +127,12 @@ def merge_loiter_findings(
     return tuple(finding for finding in merged if finding is not None)
 
 
-def end_findings(
+def end_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Before a flight, judge the hazards around the loiter at the end of a mission.
+    """Before a flight, judge the hazards around the place where the autopilot loiters after the mission's end.
 
-    aligned: not used.
+    Return [] if the mission does not end in this way, or after a flight.
     """
     hazards = end_loiter_hazards(requirements) if geometric else None
     if hazards is None:
@@ -218,7 +218,7 @@ def _loiter_finding(
 
 
 def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
-    """Return the distances from a loiter's center, flown from the first to the last corner, m, (n,).
+    """Return the track's distances from a loiter's center, from the first to the last corner, m, (n,).
 
     The array is empty if the loiter was not flown to its end.
     """
@@ -242,12 +242,12 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle
 def _held_bank(
     requirements: RouteRequirements, circle: LoiterCircle, min_radius: float, corner_findings: list[Finding]
 ) -> float:
-    """Return the bank in a loiter that is tighter than the bank limit allows, rad.
+    """Return the bank held in a loiter that is tighter than the bank limit allows, rad.
 
     min_radius: radius at the bank limit, m.
 
-    The bank is the largest mean over a second.  Without a measurement, it is the bank needed to hold the loiter, up to
-    the autopilot's limit.
+    It is the largest one-second mean of the measured bank.  Without a measurement, it is the bank needed for the
+    loiter's radius, up to the autopilot's limit.
     """
     measured_banks = [fact.value for finding in corner_findings for fact in finding.facts if fact.what == "bank"]
     if measured_banks:
@@ -289,13 +289,13 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
 
 
 def _failed_corner_message(requirements: RouteRequirements, circle: LoiterCircle, finding: Finding) -> Message:
-    """Name a planned corner that fails, and the reason."""
+    """Return a message on a planned corner that fails, with the reason."""
     reason_text = f"{place_text(finding.place)}: {finding.reason}"
     return Message(reason_text, _corner_text(finding.place), finding.place == requirements.waypoint(circle.first))
 
 
 def _unheld_corners_message(circle: LoiterCircle, failed_corners: list[Finding]) -> Message:
-    """State the number of corners not held, and the worst one."""
+    """Return a message with the number of corners that were not held, and the worst of them."""
     worst_corner = min(failed_corners, key=badness)
     corner_count = len({finding.place for finding in failed_corners})
     count_text = f"{corner_count} of {circle.last - circle.first + 1} corners not held; the worst is "
@@ -319,7 +319,7 @@ RULE = Rule(
         "LOITER_SWING_RADII",
         "LOITER_WIDENING_FRACTION",
     ),
-    judge=end_findings,
+    judge=end_loiter_findings,
     merge=merge_loiter_findings,
     log=LogNeeds(needs_aircraft=True),
 )

@@ -18,7 +18,10 @@ from world.arrays import Floats
 def departure_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge whether a flight has unusable rows, extreme bank, too low an airspeed, or ground contact."""
+    """Judge a flight by its unusable rows, maximum bank, minimum airspeed and ground contact.
+
+    Return [] before a flight; without usable rows, the finding is not judged.
+    """
     if geometric:
         return []
     if aligned is None:
@@ -35,7 +38,7 @@ def departure_findings(
         )
     if (bank > MAX_CONTROLLED_BANK_RAD).any():
         k = int(np.argmax(bank > MAX_CONTROLLED_BANK_RAD))
-        limit_text = f", beyond {math.degrees(MAX_CONTROLLED_BANK_RAD):.0f}°"
+        limit_text = f", more than the limit of {math.degrees(MAX_CONTROLLED_BANK_RAD):.0f}°"
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s", limit_text))
     faults += airspeed_faults
     if (aligned.clearance <= 0.0).any():
@@ -76,12 +79,15 @@ def _max_finite(values: Floats) -> float:
 
 
 def _low_airspeed_faults(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Message]:
-    """Return a fault if the aircraft was too slow to fly; return [] for an unknown aircraft."""
+    """Return a fault at the first row with too low an airspeed for controlled flight.
+
+    Return [] if there is no such row, or for an imported flight of an unknown aircraft.
+    """
     source = requirements.setup.source
     if source is not None and not source.aircraft_known:
         return []
     track = aligned.track
-    min_airspeeds = _min_flying_airspeed(requirements, track.position[:, 2])
+    min_airspeeds = _min_flying_airspeeds(requirements, track.position[:, 2])
     slow_rows = np.flatnonzero(track.airspeed < min_airspeeds)
     if not slow_rows.size:
         return []
@@ -98,8 +104,11 @@ def _time_text(time: float) -> str:
     return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
 
 
-def _min_flying_airspeed(requirements: RouteRequirements, altitude: Floats) -> Floats:
-    """Return the minimum airspeed of controlled flight at each altitude (m AMSL), m/s."""
+def _min_flying_airspeeds(requirements: RouteRequirements, altitude: Floats) -> Floats:
+    """Return the minimum airspeed of controlled flight at each altitude (m AMSL), m/s.
+
+    It is a fixed airspeed for the Aerosonde, and a multiple of the minimum level speed for other aircraft.
+    """
     if requirements.setup.aircraft == "aerosonde":
         return np.full(altitude.shape, MIN_CONTROLLED_AIRSPEED_MPS)
     envelope = requirements.setup.envelope

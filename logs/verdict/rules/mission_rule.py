@@ -56,7 +56,7 @@ C = Command
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
-    """Run each check and return its finding, with the first item at fault."""
+    """Run PX4's checks and planfly's own checks on a mission; each finding names the first item at fault."""
     mission, origin, limits = setup.mission, setup.scenario.origin, setup.autopilot.checks.feasibility
     refuses = setup.autopilot.checks.dialect == "px4"
     checks = (
@@ -74,10 +74,10 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     # No autopilot has a name for the last checks, which report the parts of a mission that are not judged.
     return [
         *findings,
-        *_arduplane_refusals(setup),
+        *_arduplane_refusal_findings(setup),
         *([_unjoined_finding(setup)] if setup.route.unjoined_stops else []),
         *_unreached_findings(setup),
-        *_unflown_findings(setup),
+        *_unsimulated_findings(setup),
     ]
 
 
@@ -88,7 +88,10 @@ _Remark = tuple[bool | Literal["refused"] | None, int | None, str | Message]
 
 
 def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding:
-    """Merge the remarks of a check into one finding.  refuses: True if the autopilot refuses what PX4 refuses."""
+    """Merge the remarks of a check into one finding.
+
+    refuses: True if PX4 is to fly, so that the items that it refuses fail.
+    """
     verdict = False if refuses else None
     sorted_remarks = [(verdict if ok == REFUSED else ok, item, reason) for ok, item, reason in remarks]
     # A failure comes first, then PX4's refusals, then mere remarks.
@@ -108,8 +111,8 @@ def _check_finding(check: str, remarks: list[_Remark], refuses: bool) -> Finding
     )
 
 
-def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
-    """Return a finding on the items that ArduPlane refuses at upload but PX4 does not, if ArduPlane flies."""
+def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
+    """Return a finding if ArduPlane is to fly and refuses items at upload that PX4 accepts, otherwise []."""
     refused_items = [
         item
         for item in setup.mission.items
@@ -134,15 +137,16 @@ def _arduplane_refusals(setup: FlightSetup) -> list[Finding]:
 
 
 def _unjoined_finding(setup: FlightSetup) -> Finding:
-    """Report that an autopilot leaves the route for a waypoint inside a loiter, or for a loiter about another center.
+    """Report a waypoint inside the circle of a loiter, or two loiters without a common tangent.
 
-    For an imported flight this is undecided, not a fault; see
+    The path between them is not laid out, so it is not judged.  For an imported flight this is undecided, not a fault:
+    see
     `logs.verdict.rules.completion_rule.imported_completion_finding`.
     """
     first_stop, *other_stops = setup.route.unjoined_stops
     autopilot = setup.autopilot.title
     if first_stop.is_circle:
-        reason = f"no tangent joins its circle to that of item {first_stop.circle}"
+        reason = f"no tangent joins its circle to the circle of item {first_stop.circle}"
     else:
         reason = f"lies inside the circle of item {first_stop.circle}"
     more_text = f" (+{len(other_stops)} more)" if other_stops else ""
@@ -162,18 +166,18 @@ def _unjoined_finding(setup: FlightSetup) -> Finding:
     )
 
 
-# Items behind which a mission continues only if someone acts: sets the next item, or arms again.
+# Items after which a mission continues only if somebody sets the next item or arms the aircraft again.
 _WAITING_ENDS = LANDINGS | {C.NAV_LOITER_UNLIM}
-# Marks of items that an autopilot reaches by itself after the mission: of a landing sequence and of a return path.
+# Items that mark a landing sequence or a return path, which an autopilot may enter by itself after the mission.
 _REENTRY_MARKS = (C.DO_LAND_START, C.DO_RETURN_PATH_START)
 
 
 def _unreached_findings(setup: FlightSetup) -> list[Finding]:
-    """Report navigation items behind the mission's end, which are never reached.
+    """Report navigation items after the mission's end, which are never reached.
 
-    Behind a return to launch the plan is not flown; behind a landing or a loiter without end it is only flown if
-    someone acts, so that part is not judged.  Items of a landing sequence or of a return path belong there, and items
-    that a jump leaves out are left out on purpose.
+    Items after a return to launch fail.  Items after a landing or an endless loiter are reached only if somebody sets
+    the next item, so they leave the verdict undecided.  Items of a landing sequence or of a return path belong after
+    the end, and items that a jump skips are skipped on purpose: neither are reported.
     """
     items = setup.mission.items
     if setup.source is not None or not any(item.command in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH} for item in items):
@@ -183,36 +187,36 @@ def _unreached_findings(setup: FlightSetup) -> list[Finding]:
     end = items[last]
     if itinerary.endless_jump >= 0 or last < 0 or end.command not in _WAITING_ENDS | {C.NAV_RETURN_TO_LAUNCH}:
         return []
-    behind = itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[last + 1 :])
-    unreached = [item for item in behind if item.seq in itinerary.unreached and is_navigation(item.command)]
+    later_items = itertools.takewhile(lambda item: item.command not in _REENTRY_MARKS, items[last + 1 :])
+    unreached = [item for item in later_items if item.seq in itinerary.unreached and is_navigation(item.command)]
     if not unreached:
         return []
-    waits, first = end.command in _WAITING_ENDS, unreached[0]
+    is_waiting_end, first = end.command in _WAITING_ENDS, unreached[0]
     more_text = f" (+{len(unreached) - 1} more)" if len(unreached) > 1 else ""
-    rest = f": {command_name(end.command)} (item {end.seq}) ends the mission"
-    rest += " until someone sets the next item" if waits else ""
-    where = f"item {first.seq}: " if waits else ""
-    fault = message(f"{where}{command_name(first.command)}{more_text} is never reached", rest)
+    end_text = f": {command_name(end.command)} (item {end.seq}) ends the mission"
+    end_text += " until someone sets the next item" if is_waiting_end else ""
+    item_text = f"item {first.seq}: " if is_waiting_end else ""
+    fault = message(f"{item_text}{command_name(first.command)}{more_text} is never reached", end_text)
     return [
         make_finding(
             "mission",
             Place("mission", item=first.seq),
-            ok=None if waits else False,
+            ok=None if is_waiting_end else False,
             reason=fault.text,
             faults=[fault],
             source="route",
             method="mission items",
-            check=NOT_FLOWN if waits else "unreached",
+            check=NOT_FLOWN if is_waiting_end else "unreached",
         )
     ]
 
 
-def _unflown_findings(setup: FlightSetup) -> Iterator[Finding]:
+def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
     """Yield a finding for each item or setting that changes the flight path but is not simulated."""
     remarks = [(open_item.item, open_item.text) for open_item in setup.route.open_items]
     if not setup.autopilot.checks.follows_terrain:
         items_above_terrain = sorted(set(setup.route.items[np.isfinite(setup.route.above_ground)].tolist()))
-        reason = f"the simulated {setup.autopilot.title} does not follow its height above terrain along the leg"
+        reason = f"the simulated {setup.autopilot.title} does not follow the item's height above terrain along the leg"
         remarks += [(seq, reason) for seq in items_above_terrain]
     if setup.scenario.returns is not None:
         # Returns from anywhere on the route are judged only to the mission's home.
@@ -348,25 +352,27 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
 
 
 def _height_above_home(mission: Mission, item: MissionItem) -> float:
-    """Return an item's height above home, m; NaN if unknown.  Treat heights above terrain as above home."""
+    """Return an item's height above home, m; NaN if unknown.  A height above terrain is returned unchanged."""
     if item.frame in OVER_HOME | OVER_TERRAIN:
         return item.alt
     return item.alt - mission.home.alt if mission.home is not None else math.nan
 
 
 def _check_takeoff(mission: Mission) -> Iterator[_Remark]:
-    has_place = False
+    """Yield take-off items that are not above home, or that come after another navigation item."""
+    has_earlier_place = False
     for item in mission.items:
         if item.command in TAKEOFFS:
             height = _height_above_home(mission, item)
             if height <= 0.0:
                 yield REFUSED, item.seq, f"takeoff altitude {height:.1f} m is not above home"
-            if has_place:
+            if has_earlier_place:
                 yield REFUSED, item.seq, "takeoff is not the first waypoint item"
-        has_place = has_place or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
+        has_earlier_place = has_earlier_place or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
 
 
 def _check_landing(mission: Mission) -> Iterator[_Remark]:
+    """Yield items at fault in the order of DO_LAND_START, landings and return to launch."""
     commands = [item.command for item in mission.items]
     land_starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
     landings = [k for k, command in enumerate(commands) if command in LANDINGS]
@@ -383,6 +389,7 @@ def _check_landing(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimits) -> Iterator[_Remark]:
+    """Yield landings whose approach begins with an unsupported item, from below or inside an orbit, or is too steep."""
     max_angle = math.degrees(limits.landing_angle)
     for previous, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or previous.command not in PLACES | TAKEOFFS or not previous.has_position:
@@ -411,6 +418,10 @@ def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimi
 
 
 def _check_required_ends(mission: Mission, limits: FeasibilityLimits, refuses: bool) -> Iterator[_Remark]:
+    """Yield one remark on whether the mission has the take-off and landing that MIS_TKO_LAND_REQ requires.
+
+    A missing item is refused only if the user's parameter file states the requirement.
+    """
     missing_ends = missing_ends_text(mission, limits)
     if not missing_ends:
         yield True, None, "takeoff and landing are as MIS_TKO_LAND_REQ requires"
@@ -422,11 +433,13 @@ def _check_required_ends(mission: Mission, limits: FeasibilityLimits, refuses: b
 
 
 def _distance_between(first: MissionItem, second: MissionItem, origin: GeoOrigin) -> float:
+    """Return the horizontal distance between two items, m."""
     east, north = to_map(origin, [first.lat_deg, second.lat_deg], [first.lon_deg, second.lon_deg])
     return float(math.hypot(float(np.diff(east)[0]), float(np.diff(north)[0])))
 
 
 def _check_first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+    """Yield the first flown item if it is too far from home; without a home, yield a remark that says so."""
     flown_items = _flown_items(mission)
     if mission.home is None or not flown_items:
         yield True, None, "no home, so no distance to the first waypoint"
@@ -456,6 +469,7 @@ def _check_gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
+    """Yield gates that are too close to a waypoint, and the longest leg if older PX4 releases refuse it."""
     yield from _check_gates(mission, origin)
     flown_items = _flown_items(mission)
     if len(flown_items) < 2:
@@ -473,6 +487,7 @@ def _check_distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
 
 
 def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
+    """Yield flown items below home; stop at the first item above home if the file has no home."""
     for item in _flown_items(mission):
         if item.frame in OVER_HOME and mission.home is None:
             reason = "the file has heights above home but no home: PX4 refuses them until the vehicle has a home"
@@ -483,11 +498,12 @@ def _check_home_altitude(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
+    """Yield route points that violate the mission's own fence by PX4's test."""
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
         return
     if setup.autopilot.checks.unites_inclusions:
-        # Rule `zones` judges the flight against the union.
+        # The fence rule judges the flight against the union of the inclusion zones.
         return
     origin, route = setup.scenario.origin, setup.route
     for point, item in zip(route.waypoints, route.items, strict=True):

@@ -1,8 +1,8 @@
 """The return rule: judge the destination of a return to launch (RTL), and how far the RTL was flown.
 
 A mission only states that the aircraft is to return.  The autopilot chooses the path back, so the path has no required
-corridor, waypoint or slope, and is not judged against its stand-in in the route.  Ground, threats, zones, area, speed,
-stall and energy are judged on the RTL as on every other leg.
+corridor, waypoint or slope, and the RTL is not compared with its placeholder in the route.  Ground, threats, zones,
+area, speed, stall and energy are judged on the RTL as on every other leg.
 """
 
 import math
@@ -60,20 +60,20 @@ def return_findings(
     if requirements.setup.source is None:
         return []
     has_passed_end = aligned is not None and bool(aligned.passed[-1])
-    goes_on_to_land = requirements.setup.route.rtl_end <= requirements.legs
+    continues_to_landing = requirements.setup.route.rtl_end <= requirements.legs
     return _flown_rtl_findings(
         requirements,
         has_passed_end
-        and (goes_on_to_land or (aligned is not None and has_completed_return_loiter(requirements, aligned))),
+        and (continues_to_landing or (aligned is not None and has_completed_return_loiter(requirements, aligned))),
     )
 
 
 def flown_return_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, end_reason: str, log_complete: bool
 ) -> list[Finding]:
-    """Judge the path of a flown RTL, and whether the aircraft arrived.
+    """Judge the RTL of a planfly flight, the RTL after the last item, and the scenario's requirements on returns.
 
-    end_reason: "completed" if the flight ended after its loiter, otherwise the reason for its end.
+    end_reason: "completed" if the flight ended after its RTL loiter, otherwise the reason for its end.
     log_complete: not used, because the completion rule reports it.
     """
     has_arrived = aligned is not None and bool(aligned.passed[-1]) and end_reason == "completed"
@@ -91,9 +91,11 @@ def flown_return_findings(
 
 
 def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStarts | None) -> list[Finding]:
-    """Judge the return to launch that ArduPlane begins by itself after the last item, as it would judge an item's.
+    """Judge the return to launch that ArduPlane begins by itself after the last item.
 
-    end: the end of the mission, where that return begins; None if the flight did not reach it.
+    Return [] if the mission ends in another way.
+
+    end: start of this return, at the end of the mission; None if the flight did not reach the end of the mission.
     """
     setup = requirements.setup
     if not returns_after_last_item(setup):
@@ -135,13 +137,13 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     """
     setup = requirements.setup
     requirement = setup.scenario.returns
-    demands = [] if requirement is None else [_DEMANDS[name] for name in requirement.require if name in _DEMANDS]
-    if requirement is None or not demands:
+    judges = [] if requirement is None else [_JUDGES[name] for name in requirement.require if name in _JUDGES]
+    if requirement is None or not judges:
         return []
     interval = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MAX_RETURNS)))
     try:
         world, return_starts = return_world(setup), starts(interval)
-        answers = [judge(world, return_starts, interval) for judge in demands]
+        answers = [judge(world, return_starts, interval) for judge in judges]
     except MissionError as error:
         # Without a home no RTL is safe, and the places that a glide reaches are unknown.
         answers = [_Answer(False if "rtl" in requirement.require else None, str(error), _METHOD)]
@@ -160,7 +162,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
     ]
 
 
-_METHOD = "by the simulated ArduPlane on a point mass"
+_METHOD = "by the simulated ArduPlane flying a point-mass model"
 _NOT_KNOWN = "it is not fully known whether the aircraft gets home as the scenario requires"
 
 
@@ -186,15 +188,15 @@ def _judge_glides(world: ReturnWorld, starts: ReturnStarts, _: float) -> _Answer
     """
     is_low = heights_above_ground(world, starts) < world.limit
     glides = judge_glides(world, starts.subset(np.flatnonzero(~is_low)))
-    left_out = (
+    omitted_text = (
         f"; {is_low.sum()} starts lower than {world.limit:.0f} m above ground are omitted" if is_low.any() else ""
     )
-    reason = f"without the engine: {glides_headline(glides)}{left_out}"
+    reason = f"without the engine: {glides_headline(glides)}{omitted_text}"
     return _Answer(glides.always_reaches_ground, reason, f"glides that keep {MARGIN:.0f} m above ground")
 
 
 # The go-around has its own rule.
-_DEMANDS: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answer]] = {
+_JUDGES: dict[ReturnDemand, Callable[[ReturnWorld, ReturnStarts, float], _Answer]] = {
     "rtl": _judge_rtl,
     "glide": _judge_glides,
 }
@@ -213,19 +215,19 @@ def has_completed_return_loiter(requirements: RouteRequirements, aligned: Aligne
     east, north, up = (track.position - (loiter.east, loiter.north, loiter.up)).T
     # True radii grow with altitude as the square of true airspeed.
     radius = RTL_ARRIVAL_LOITER_RADII * abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
-    at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, radius)) & (
+    is_at_loiter = (np.hypot(east, north) < max(RTL_ARRIVAL_RADIUS_M, radius)) & (
         np.abs(up) < RTL_ARRIVAL_ALTITUDE_TOLERANCE_M
     )
-    if not at_loiter.any():
+    if not is_at_loiter.any():
         return False
-    first = int(np.argmax(at_loiter))
+    first = int(np.argmax(is_at_loiter))
     bearing = np.unwrap(np.arctan2(east[first:], north[first:]))
     has_circled = abs(float(bearing[-1] - bearing[0])) >= 2.0 * math.pi - _LAP_TOLERANCE_RAD
     return has_circled and float(track.time[-1] - track.time[first]) >= ENDLESS_LOITER_TIME_S
 
 
 def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reason: str = "") -> list[Finding]:
-    """Return the finding on a flown RTL, which passes if the aircraft arrived and is unjudged otherwise.
+    """Return the finding on a flown RTL: passed if the aircraft arrived, otherwise not judged; [] without an RTL.
 
     reason: text on how the flight ended, appended if the aircraft did not arrive.
     """
@@ -236,7 +238,7 @@ def _flown_rtl_findings(requirements: RouteRequirements, has_arrived: bool, reas
 def _rtl_findings(requirements: RouteRequirements, ok: bool | None, outcome: str) -> list[Finding]:
     """Return one finding on the path of the mission's RTL, or [] for a mission without an RTL.
 
-    ok: result of the finding; None, too, if the destination of the RTL is unknown.
+    ok: result of the finding; it becomes None if the destination of the RTL is unknown.
     outcome: text on how far the RTL was flown.
     """
     route = requirements.setup.route

@@ -48,7 +48,7 @@ def slope_findings(
 def _leg_finding(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None, *, is_complete: bool
 ) -> Finding:
-    """Judge the slope of a leg, and how the leg was flown.
+    """Judge a leg's planned slope, and after a flight also the flown slope, altitude, throttle and climb performance.
 
     measure: None before a flight.
     is_complete: True if the flight reached the last waypoint.
@@ -109,7 +109,10 @@ def _leg_finding(
 def _planned_slope_messages(
     requirements: RouteRequirements, leg: int, limit: float, source: str
 ) -> tuple[list[Message], list[str]]:
-    """Return the faults of a leg's planned slope and of the arc at its end, and a fact about a negligible step."""
+    """Return the faults of a leg's planned slope and of the fly-by arc at the leg's end, and facts.
+
+    A leg that is too steep, but only a negligible step in height, is reported as a fact.
+    """
     faults: list[Message] = []
     facts: list[str] = []
     if abs(float(requirements.slopes[leg])) > limit + PLAN_TOLERANCE_RAD:
@@ -141,7 +144,7 @@ def _uncertainty_text(requirements: RouteRequirements, leg: int) -> str:
 
 
 def _steep_arc_faults(requirements: RouteRequirements, leg: int) -> list[Message]:
-    """Return a fault if the fly-by arc at a leg's end is beyond the aircraft's limit."""
+    """Return a fault if the fly-by arc at a leg's end is steeper than the aircraft can fly, otherwise []."""
     arc = steep_arc(requirements, leg)
     if arc is None:
         return []
@@ -174,7 +177,7 @@ def _is_in_envelope(requirements: RouteRequirements, leg: int) -> bool:
 
 
 def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
-    """Describe a planned slope beyond its limit, and the limit."""
+    """Return a message on a leg's planned slope, which exceeds its limit, and on the limit."""
     planned_slope = float(requirements.slopes[leg])
     verb = "climbs" if planned_slope >= 0.0 else "descends"
     slope_text = f"{math.degrees(abs(planned_slope)):.1f}° for {_distance_text(float(requirements.runs[leg]))}"
@@ -185,7 +188,7 @@ def _steep_leg_message(requirements: RouteRequirements, leg: int, limit: float, 
 
 
 def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
-    """Describe the limit on a leg's slope, and how the wind changes the limit."""
+    """Describe the limit on a leg's slope (rad) and, for the aircraft's own limit, the influence of the wind."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
     speed = float(requirements.route.airspeed[leg])
@@ -207,9 +210,9 @@ def _limit_text(requirements: RouteRequirements, leg: int, limit: float, source:
     )
 
 
-def _distance_text(metres: float) -> str:
-    """Write a distance in metres, or in kilometres from 1 km on."""
-    return f"{metres / 1000.0:.1f} km" if metres >= 1000.0 else f"{metres:.0f} m"
+def _distance_text(distance: float) -> str:
+    """Format a distance (m) in meters, or in kilometers from 1 km on."""
+    return f"{distance / 1000.0:.1f} km" if distance >= 1000.0 else f"{distance:.0f} m"
 
 
 def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str], ...]:
@@ -221,7 +224,7 @@ def _throttle_times(measure: SlopeMeasure) -> tuple[tuple[str, float, float, str
 
 
 def _flown_facts(measure: SlopeMeasure) -> list[tuple[str, str]]:
-    """Describe how the leg was flown: quantities and their texts."""
+    """Return texts on how a leg was flown, each with the name of its quantity: (name, text)."""
     facts = []
     if measure.slope is not None:
         facts.append(("slope", f"flown {math.degrees(measure.slope.value):+.2f}°"))
@@ -255,7 +258,7 @@ def _measured_facts(requirements: RouteRequirements, leg: int, measure: SlopeMea
 def _flown_faults(
     requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, performance_faults: list[Message]
 ) -> dict[str, Message]:
-    """Return the faults of the flown leg compared with the planned leg, by quantity.
+    """Return the faults of a leg as flown, by quantity: "slope", "height", "full" and "idle" (throttle).
 
     performance_faults: faults that show a lack of performance.
     """
@@ -266,7 +269,9 @@ def _flown_faults(
     if fit is not None:
         flown_slope = math.degrees(fit.value)
         if sign * fit.value > limit + fit.tolerance:
-            faults["slope"] = message(f"flown {flown_slope:+.1f}°, beyond {math.degrees(limit):.1f}°")
+            faults["slope"] = message(
+                f"flown at {flown_slope:+.1f}°, steeper than the limit of {math.degrees(limit):.1f}°"
+            )
         elif fit.is_fitted and abs(fit.value - planned_slope) > SLOPE_TOLERANCE_RAD + fit.tolerance:
             faults["slope"] = message(f"flown at {flown_slope:+.1f}° instead of {math.degrees(planned_slope):+.1f}°")
     if measure.height_error is not None:

@@ -1,4 +1,4 @@
-"""The speed rule: judge the demanded airspeed by the envelope, the distance to reach it, and the flown airspeed."""
+"""The speed rule: compare the commanded airspeed with the envelope, and the flown airspeed with the command."""
 
 import math
 from typing import NamedTuple
@@ -43,7 +43,7 @@ from world.wind import W20
 def speed_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each leg's commanded airspeed by the envelope, and report the flown airspeed."""
+    """Compare each leg's commanded airspeed with the envelope, and the flown airspeed with the command."""
     # The demanded route is computed at each access, which is too slow to repeat for each of thousands of legs.
     demanded_speeds = requirements.setup.demanded_route.airspeed
     findings = [
@@ -66,6 +66,10 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
+    """Judge the airspeed on one leg.
+
+    demanded: airspeed that the mission demands, m/s; equivalent airspeed if it differs from the route's true airspeed.
+    """
     commanded = float(requirements.route.airspeed[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
@@ -80,7 +84,7 @@ def _speed_finding(
     elif aligned is not None:
         measurement = _measure_airspeed(requirements, aligned, leg)
         if measurement is None:
-            mean_speed = _nearest_mean(aligned, leg, commanded)
+            mean_speed = _nearest_mean_airspeed(aligned, leg, commanded)
             notes.append(f"{mean_speed:.1f} m/s reached; the leg is too short to hold it")
         else:
             mean_speed, tolerance, min_mean = measurement
@@ -100,7 +104,7 @@ def _speed_finding(
                 limit = commanded + math.copysign(allowed_error, mean_speed - commanded)
                 at_least = mean_speed < commanded
                 margin, tolerance = allowed_error - abs(mean_speed - commanded), held_speed.tolerance
-                faults.append(message(f"{mean_speed:.1f} m/s held of the commanded {commanded:.1f} m/s"))
+                faults.append(message(f"{mean_speed:.1f} m/s held instead of the commanded {commanded:.1f} m/s"))
         facts.append(Fact("speed error", mean_speed - commanded, "m/s"))
     ok: bool | None = not faults
     check = ""
@@ -127,13 +131,17 @@ def _speed_finding(
     )
 
 
-def _command_text(command: float, commanded: float, min_speed: float, max_speed: float) -> str:
-    """Describe a commanded airspeed, equivalent and true, and the range of airspeeds in level flight, m/s."""
-    true_speed_text = "" if command == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
+def _command_text(demanded: float, commanded: float, min_speed: float, max_speed: float) -> str:
+    """Describe the commanded airspeed on a leg, and the range of airspeeds in level flight, m/s.
+
+    demanded: commanded equivalent airspeed, m/s.
+    commanded: the same command as true airspeed, m/s; named in the text only if it differs.
+    """
+    true_speed_text = "" if demanded == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     if not (math.isfinite(min_speed) and math.isfinite(max_speed)):
-        return f"{command:.1f} m/s{true_speed_text} is commanded, but no level flight is known"
+        return f"{demanded:.1f} m/s{true_speed_text} is commanded, but no level flight is known"
     level_text = f"level flight is possible from {min_speed:.1f} to {max_speed:.1f} m/s"
-    return f"{command:.1f} m/s{true_speed_text} is commanded; {level_text}"
+    return f"{demanded:.1f} m/s{true_speed_text} is commanded; {level_text}"
 
 
 class _HeldSpeed(NamedTuple):
@@ -202,7 +210,7 @@ def _speed_range_notes(requirements: RouteRequirements, leg: int) -> list[str]:
 
 
 def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
-    """Return a note if a leg is too short to reach its speed at `MAX_STEADY_ACCELERATION_MPS2`."""
+    """Return a note if a leg is too short to reach its airspeed at `MAX_STEADY_ACCELERATION_MPS2`, otherwise []."""
     previous_speed = float(requirements.route.airspeed[leg - 1]) if leg else commanded
     change, leg_length = commanded - previous_speed, float(requirements.runs[leg])
     duration = abs(change) / MAX_STEADY_ACCELERATION_MPS2
@@ -211,7 +219,7 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
     needed_length = duration * (start_ground_speed + 0.5 * change)
     if not needed_length > leg_length or not start_ground_speed > 0.0:
         return []
-    # start t + a t^2 / 2 = run
+    # Speed after the leg's length at constant acceleration: v² = start_ground_speed² + 2 acceleration leg_length.
     acceleration = math.copysign(MAX_STEADY_ACCELERATION_MPS2, change)
     end_speed = (
         math.sqrt(max(0.0, start_ground_speed * start_ground_speed + 2.0 * acceleration * leg_length))
@@ -224,14 +232,17 @@ def _short_leg_notes(requirements: RouteRequirements, leg: int, commanded: float
     ]
 
 
-def _nearest_mean(aligned: AlignedTrack, leg: int, commanded: float) -> float:
-    """Return the one-second mean airspeed on a leg (or the mean over a shorter leg) nearest to the command, m/s."""
-    means = _second_means(aligned, aligned.leg_rows(leg))
+def _nearest_mean_airspeed(aligned: AlignedTrack, leg: int, commanded: float) -> float:
+    """Return the one-second mean airspeed on a leg that is nearest to the command, m/s.
+
+    On a leg shorter than a second, return the mean over the leg.
+    """
+    means = _one_second_means(aligned, aligned.leg_rows(leg))
     return float(means[np.argmin(np.abs(means - commanded))])
 
 
-def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
-    """Return the mean airspeed over each second of some rows, or over all rows if they are fewer, m/s."""
+def _one_second_means(aligned: AlignedTrack, rows: slice) -> Floats:
+    """Return the moving one-second means of the airspeed in some rows, m/s; one mean if the rows span less time."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
     width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     sums = np.concatenate([[0.0], np.cumsum(speed)])
@@ -239,7 +250,11 @@ def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
 
 
 def _is_caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, error: float) -> bool:
-    """Return True if vertical air motion caused a speed error: the aircraft showed enough ability for the slope."""
+    """Return True if vertical air motion caused a speed error (m/s), instead of a lack of performance.
+
+    This is assumed if the aircraft was too slow in a climb or too fast in a descent, although it showed the ability to
+    fly the leg's slope.
+    """
     if error * requirements.slopes[leg] >= 0.0:
         return False
     ability = measure_ability(requirements, aligned, leg)
@@ -249,7 +264,10 @@ def _is_caused_by_air(requirements: RouteRequirements, aligned: AlignedTrack, le
 def _level_speed_range(
     requirements: RouteRequirements, leg: int, commanded: float
 ) -> tuple[float, float, list[Message]]:
-    """Return the airspeed range of level flight along the whole leg, and faults of the commanded speed."""
+    """Return the minimum and maximum airspeed of level flight along the whole leg, m/s, and faults of the command.
+
+    The airspeeds are NaN if level flight is impossible at one end of the leg.
+    """
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
     speeds = [requirements.setup.envelope.level_speeds(altitude) for altitude in altitudes]
     # If level flight is impossible at one altitude, NaN remains for the whole leg.
@@ -291,16 +309,16 @@ def _measure_airspeed(
         return None
     speed = aligned.track.airspeed[rows].astype(np.float64)
     duration = float(time[-1] - time[0])
-    min_mean = float(_second_means(aligned, rows).min())
+    min_mean = float(_one_second_means(aligned, rows).min())
     spread = _gust_spread(requirements, duration)
     is_steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL_SLOPE_RAD
     return float(speed.mean()), spread + (SLOPE_CHANGE_LAG_M / duration if is_steepened else 0.0), min_mean
 
 
-def _gust_spread(requirements: RouteRequirements, seconds: float) -> float:
-    """Return the error of a mean airspeed over a duration that gusts may cause, m/s."""
+def _gust_spread(requirements: RouteRequirements, duration: float) -> float:
+    """Return the error that gusts may cause in a mean airspeed over a duration (s), m/s."""
     gust = GUST_SPEED_FRACTION * W20[requirements.setup.scenario.wind.turbulence]
-    return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_DURATION_S / max(seconds, 1e-3)))
+    return GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_DURATION_S / max(duration, 1e-3)))
 
 
 RULE = Rule(

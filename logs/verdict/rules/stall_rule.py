@@ -59,6 +59,7 @@ def stall_findings(
 
 
 def _planned_findings(requirements: RouteRequirements) -> list[Finding]:
+    """Judge the planned turn with the smallest margin above the stall; return [] for a route without a turn."""
     worst_margin: tuple[float, int, _Margin] | None = None
     for corner in range(1, requirements.legs):
         for speed in requirements.route.airspeed[corner - 1 : corner + 1].tolist():
@@ -106,6 +107,7 @@ def level_stall(requirements: RouteRequirements, altitude: float) -> float:
 
 
 def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Finding]:
+    """Judge the smallest margin above the stall in a flight; return [] if the margin is never known."""
     track = aligned.track
     width = max(1, min(len(track), round(STALL_AVERAGING_TIME_S / aligned.tick)))
     speed, load = _window_means(track.airspeed, width), _window_means(track.load_factor, width)
@@ -127,12 +129,13 @@ def _flown_findings(requirements: RouteRequirements, aligned: AlignedTrack) -> l
 
 
 def _window_means(values: NDArray[np.floating], width: int) -> Floats:
-    """Return the mean over each window of `width` rows."""
+    """Return the moving means of `values` over windows of `width` rows."""
     sums = np.concatenate([[0.0], np.cumsum(values.astype(np.float64))])
     return np.asarray((sums[width:] - sums[:-width]) / width)
 
 
 def _stall_finding(margin: _Margin, time_or_place_text: str, tolerance: float, *, geometric: bool) -> Finding:
+    """Return the finding on a margin above the stall.  tolerance: accepted deficit of airspeed, m/s."""
     stall_text = (
         f"{margin.speed:.1f} m/s {time_or_place_text}, stall {margin.stall_speed:.1f} m/s in"
         f" {math.degrees(margin.bank):.0f}° of bank"

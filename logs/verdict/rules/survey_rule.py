@@ -52,16 +52,16 @@ def survey_findings(
 
 
 def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | None, survey: Survey) -> list[Finding]:
-    """Judge the minimum overlap of a survey's photos along and across its lines, if its camera is known."""
+    """Judge the minimum front and side overlap of a survey's photos; return [] if the survey's camera is unknown."""
     measure = measure_overlap(requirements, aligned, survey)
     if measure is None:
         return []
-    sides = (
+    overlaps = (
         (FRONT, measure.front, measure.camera.front, survey.line(measure.line)),
         (SIDE, measure.side, measure.camera.side, survey.line(measure.line_pair[1])),
     )
     findings = []
-    for check, overlap, required, line in sides:
+    for check, overlap, required, line in overlaps:
         if overlap is None or required is None:
             continue
         limit = required - PHOTO_OVERLAP_FRACTION
@@ -90,7 +90,12 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
 
 
 def overlap_text(measure: OverlapMeasure, check: str) -> str:
-    """Describe the minimum overlap of photos along or across lines, its line, and the required overlap."""
+    """Describe the minimum overlap of a survey's photos, the photo lines with this overlap, and the required overlap.
+
+    Return "" if the overlap is unknown.
+
+    check: `FRONT` or `SIDE`.
+    """
     if check == FRONT:
         overlap, required = measure.front, measure.camera.front
         spacing_text = f" apart, one every {measure.camera.interval:g} s" if measure.is_camera_limited else " apart"
@@ -140,7 +145,7 @@ def _tight_turnaround_findings(requirements: RouteRequirements, survey: Survey) 
 
 
 def _is_too_tight(requirements: RouteRequirements, i: int) -> bool:
-    """Return True if the legs at a corner are too short for its turn."""
+    """Return True if the legs at corner `i` are too short for its turn; an end of the route has no turn."""
     turn = abs(float(requirements.turns[i]))
     return 0 < i < requirements.legs and turn > turn_limit(requirements, i)[0] + PLAN_TOLERANCE_RAD
 
@@ -157,7 +162,7 @@ def _line_place(requirements: RouteRequirements, line: PhotoLine) -> Place:
 
 
 def _planned_finding(requirements: RouteRequirements, survey: Survey, line: PhotoLine, number: int) -> Finding:
-    """Judge the part of a line that the turns at its ends leave straight."""
+    """Judge the fraction of a photo line that remains straight between the turns at its ends."""
     length = float(requirements.runs[line.first : line.last].sum())
     # The turns may use the leads before and after the line.
     lead_in = float(requirements.runs[line.begins : line.first].sum())
@@ -180,7 +185,7 @@ def _planned_finding(requirements: RouteRequirements, survey: Survey, line: Phot
 
 
 def _turn_lead(requirements: RouteRequirements, line: PhotoLine) -> float:
-    """Return the distance before the end of a line's straight run at which the turn begins, m."""
+    """Return the distance before waypoint `line.ends` at which the turn off a photo line begins, m."""
     setup, last = requirements.setup, line.ends
     if setup.autopilot.turns.follows_path or not 0 < last < requirements.legs:
         return float(requirements.length_before[last])
@@ -211,11 +216,14 @@ def _flown_finding(
 
 
 def lost_text(measure: LineMeasure) -> str:
-    """Describe the defects of a line's unusable parts, the largest first; return "" if almost nothing is lost."""
+    """List the causes that make parts of a photo line unusable, the largest first, each with its fraction of the line.
+
+    Causes below 0.5 % are left out; return "" if none remains.
+    """
     fractions = {
-        f"not flown along it within {measure.lateral_tolerance:.0f} m": measure.off_line,
-        f"banked beyond {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
-        f"more than {measure.min_height_tolerance:.0f} m off its height above ground": measure.off_height,
+        f"not flown along the line within {measure.lateral_tolerance:.0f} m": measure.off_line,
+        f"banked more than {math.degrees(MAX_PHOTO_BANK_RAD):.0f}°": measure.banked,
+        f"more than {measure.min_height_tolerance:.0f} m off the planned height above ground": measure.off_height,
         "with the camera off": measure.camera_off,
     }
     parts = sorted(((fraction, defect) for defect, fraction in fractions.items() if fraction >= 0.005), reverse=True)
@@ -223,7 +231,7 @@ def lost_text(measure: LineMeasure) -> str:
 
 
 def _coverage_fault(measure: LineMeasure, name: str) -> Message:
-    """Describe a line's usable part, the defects of its other parts, and the length lost at its ends."""
+    """Describe the usable fraction of a photo line, the causes of the loss, and the lengths lost at the line's ends."""
     ends_text = f"; its first {measure.lost_at_start:.0f} m and last {measure.lost_at_end:.0f} m are lost"
     return message(
         f"{name}: {100.0 * measure.usable:.0f} % of its {measure.length:.0f} m can be used",
@@ -242,8 +250,9 @@ def _line_finding(
     geometric: bool,
     measure: LineMeasure | None = None,
 ) -> Finding:
-    """Make the finding on a photo line.
+    """Return the finding on a photo line.
 
+    ok, faults, facts: the result and its texts.
     usable_fraction: usable fraction of the line's length; NaN if it was not flown.
     measure: measurements of the flown line, which are reported as facts.
     """

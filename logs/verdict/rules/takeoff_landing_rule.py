@@ -20,7 +20,7 @@ from logs.verdict.tolerances import PLAN_TOLERANCE_RAD
 from logs.verdict.wording import gentle_launch_text, place_text
 from world.airfield import Launch
 
-# Verb that says which end of the flight, in the air, replaces the phase.
+# Verb for a flight that begins or ends in the air, without this phase.
 _PHASE_VERBS = {"takeoff": "begins", "landing": "ends"}
 _PHASE_TITLES = {"takeoff": "take-off", "landing": "landing"}
 # Result for a slope beyond the limit.
@@ -30,9 +30,9 @@ _RESULT_BEYOND_LIMIT = {"takeoff": None, "landing": False}
 def takeoff_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the climb from the ground at home to the take-off item's waypoint.
+    """Judge the climb from the ground at home to the take-off item's waypoint; return [] without a take-off item.
 
-    A flown take-off has no finding here: the launch rule judges it.
+    Return [] also if the take-off was flown, because the launch rule then judges it.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.take_off is not None:
         return []
@@ -43,15 +43,15 @@ def takeoff_findings(
     if waypoint < 0 or (route.items[:waypoint] >= 0).any():
         return []
     altitude, home = float(requirements.points[waypoint, 2]), mission.home
-    has_own_place = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
+    has_own_position = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
     launch = requirements.setup.scenario.launch
     if launch is not None and (launch_findings := _gentle_launch_findings(requirements, launch)):
         return launch_findings
-    if launch is not None and (waypoint == 0 or not has_own_place):
+    if launch is not None and (waypoint == 0 or not has_own_position):
         # From the ground at home to the next waypoint, on the launch course.
         next_altitude = float(requirements.points[waypoint + 1, 2])
         return [_slope_finding(requirements, "takeoff", waypoint, waypoint + 1, route.takeoff_ground, next_altitude)]
-    if waypoint == 0 or not has_own_place:
+    if waypoint == 0 or not has_own_position:
         reason = f"to {altitude:.0f} m AMSL over home, on a course that the autopilot chooses"
         return [_unjudged_finding("takeoff", requirements.waypoint(waypoint), reason)]
     # The flight starts over home, and climbs to the take-off item's own waypoint.
@@ -59,9 +59,9 @@ def takeoff_findings(
 
 
 def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> list[Finding]:
-    """Return a finding if the acceleration of a launch is too small to start the motor.
+    """Return a finding if a launch accelerates the aircraft too little to start the motor, otherwise [].
 
-    Return [] if the autopilot needs no acceleration.
+    The list is empty, too, if the autopilot needs no acceleration to start the motor.
     """
     setup = requirements.setup
     trigger, acceleration = setup.autopilot.ground.launch_trigger, launch.acceleration(setup.default_launch_speed)
@@ -89,9 +89,9 @@ def _gentle_launch_findings(requirements: RouteRequirements, launch: Launch) -> 
 def landing_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None = None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the descent from the last waypoint to the landing.
+    """Judge the descent from the last waypoint to the landing; return [] for a mission without a landing item.
 
-    A flown landing has no finding here: the touchdown rule judges it.
+    Return [] also if the landing was flown, because the touchdown rule then judges it.
     """
     if requirements.ground_phases is not None and requirements.ground_phases.procedures.approach is not None:
         return []
@@ -104,11 +104,11 @@ def landing_findings(
         route = requirements.setup.route
         if route.rtl_start >= 0:
             reason = RTL_NOT_CONTINUED_TEXT
-        end_waypoint, return_flown_on = (
+        end_waypoint, is_return_continued = (
             requirements.waypoint(requirements.legs),
             RTL_NOT_CONTINUED_TEXT in " ".join(route.notes),
         )
-        if route.rtl_start >= 0 and not return_flown_on:
+        if route.rtl_start >= 0 and not is_return_continued:
             # The return ends the mission; the landing after it is not flown.
             return [make_finding("landing", end_waypoint, ok=None, reason=reason, unit="deg")]
         return [_unjudged_finding("landing", end_waypoint, reason)]
@@ -134,7 +134,10 @@ def _last_waypoint_of_item(requirements: RouteRequirements, seq: int) -> int:
 def _slope_finding(
     requirements: RouteRequirements, rule: str, first: int, last: int, first_altitude: float, last_altitude: float
 ) -> Finding:
-    """Judge the slope from waypoint `first` to waypoint `last`, at their altitudes, m AMSL."""
+    """Judge the slope from `first_altitude` at waypoint `first` to `last_altitude` at waypoint `last`, m AMSL.
+
+    rule: "takeoff" or "landing".
+    """
     waypoint_place = requirements.waypoint(last)
     distance = float(requirements.runs[first:last].sum())
     if math.isnan(first_altitude) or math.isnan(last_altitude):
@@ -171,7 +174,7 @@ def _slope_finding(
 
 
 def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
-    """Return a finding on an unjudged take-off or landing, which leaves the verdict undecided."""
+    """Return a finding that a take-off or landing is not judged, which leaves the verdict undecided."""
     fault = message(f"the {_PHASE_TITLES[rule]} at {place_text(place)} is not judged")
     return make_finding(rule, place, ok=None, reason=reason, faults=[fault], unit="deg", check=GROUND_PATH)
 
@@ -179,7 +182,10 @@ def _unjudged_finding(rule: str, place: Place, reason: str) -> Finding:
 def _slope_limit(
     requirements: RouteRequirements, leg: int, first_altitude: float, last_altitude: float, slope: float
 ) -> tuple[float, str]:
-    """Return the limit of slopes with the sign of `slope`, over the ground on a leg's course, rad, and its source."""
+    """Return the limit on the slope of a climb or descent on a leg's course, rad, and the name of the limit's source.
+
+    slope: rad; its sign selects the limit for a climb or for a descent.
+    """
     direction, limits = (0 if slope >= 0.0 else 1), requirements.limits
     speed, course = float(requirements.route.airspeed[leg]), float(requirements.courses[leg])
     aircraft_limit = min(

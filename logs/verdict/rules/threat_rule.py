@@ -26,7 +26,10 @@ _METHOD = "time inside, exact on each segment"
 def threat_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge each missile or radar sphere that plan or flight touches; if no missile sphere is entered, report it."""
+    """Judge each missile or radar sphere that the planned path or the flight touches.
+
+    If no missile sphere is touched, the first finding says so.  Without a scenario, one unjudged finding is returned.
+    """
     scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so threats are unknown"
@@ -36,37 +39,46 @@ def threat_findings(
     nearest_distance, nearest_name = math.inf, ""
     for kind in ("missile", "radar"):
         radii, scales = _sphere_sizes(threats, kind)
-        plan = path_spheres(requirements.path.points, requirements.path.times, threats.position, radii, scales)
-        track = None
+        planned_visits = path_spheres(
+            requirements.path.points, requirements.path.times, threats.position, radii, scales
+        )
+        flown_visits = None
         if aligned is not None:
-            track = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
+            flown_visits = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
         for number, threat in enumerate(scenario.spec.threats):
             if radii[number] <= 0.0:
                 continue
             if kind == "missile":
-                judged = plan if geometric or track is None else track
-                distance = float(judged.closest[number] - radii[number])
+                judged_visits = planned_visits if geometric or flown_visits is None else flown_visits
+                distance = float(judged_visits.closest[number] - radii[number])
                 if distance < nearest_distance:
                     nearest_distance, nearest_name = distance, threat_label(threat.name or "", number)
-            if plan.closest[number] <= radii[number] or (track is not None and track.closest[number] <= radii[number]):
-                visit = None if geometric else _sphere_visit(track, number)
+            if planned_visits.closest[number] <= radii[number] or (
+                flown_visits is not None and flown_visits.closest[number] <= radii[number]
+            ):
+                visit = None if geometric else _sphere_visit(flown_visits, number)
                 place = Place(kind, number, name=threat.name or "")
-                time_and_place = (
+                nearest_place = (
                     "" if kind == "radar" else _nearest_place_text(requirements, aligned, visit, float(radii[number]))
                 )
                 findings.append(
-                    _sphere_finding(place, _sphere_visit(plan, number), visit, float(radii[number]), time_and_place)
+                    _sphere_finding(
+                        place, _sphere_visit(planned_visits, number), visit, float(radii[number]), nearest_place
+                    )
                 )
     if not any(finding.place.kind == "missile" for finding in findings):
-        error = position_error(requirements.setup)
+        navigation_error = position_error(requirements.setup)
         findings.insert(
-            0, _no_entry_finding(len(threats), nearest_distance, nearest_name, error, aligned is not None or geometric)
+            0,
+            _no_entry_finding(
+                len(threats), nearest_distance, nearest_name, navigation_error, aligned is not None or geometric
+            ),
         )
     return findings
 
 
 def _sphere_sizes(threats: Threats, kind: SphereKind) -> tuple[Floats, Floats]:
-    """Return the radius and the scale of each threat's missile or radar sphere, m, (m,) each."""
+    """Return the radius and the exposure scale of each threat's missile or radar sphere, m: two arrays (m,)."""
     if kind == "missile":
         return threats.kill_radius, threats.kill_scale
     return threats.detection_radius, threats.detection_scale
@@ -97,7 +109,9 @@ def _sphere_visit(visits: SphereVisits | None, threat: int) -> _Visit:
 def _nearest_place_text(
     requirements: RouteRequirements, aligned: AlignedTrack | None, visit: _Visit | None, radius: float
 ) -> str:
-    """Describe the flight's point nearest to a sphere's center; return "" if the flight was never inside.
+    """Describe the leg and the position where the flight was nearest to a sphere's center.
+
+    Return "" if the flight never entered the sphere.
 
     radius: radius of the sphere, m.
     """
@@ -114,7 +128,8 @@ def _no_entry_finding(
 ) -> Finding:
     """Report that no missile sphere is entered.
 
-    nearest_distance: distance outside the sphere of the threat called `nearest_name`, m; inf without a sphere.
+    nearest_distance: minimum distance of the path from the nearest sphere's surface, m; inf without a sphere.
+    nearest_name: name of the threat of this sphere.
     navigation_error: navigation error, m.
     is_judged: False if nothing was flown, so that the finding is not judged.
     """

@@ -42,15 +42,16 @@ _SLOPE_RUN_M = 10.0
 class _Landing(NamedTuple):
     """Measurements of a landing.
 
-    along, lateral_offset: touch-down beyond the landing point and to the right of the landing course, m.
-    touchdown, stop: positions on the strip, each as distance beyond the strip's center and distance to the side, m.
+    distance_beyond_point: distance of the touch-down beyond the landing point, m; negative before the point.
+    lateral_offset: distance of the touch-down to the right of the landing course, m.
+    touchdown, stop: positions on the strip, each as distance beyond the strip's center and to the right of it, m.
     strip_left: length of strip remaining beyond the stop, m.
     sink, ground_sink: sink rate at the touch-down, vertical and relative to the sloping ground, m/s.
     final_clearance: minimum height of the final above ground, m; inf without a final, NaN if unknown.
     point_height: height of the landing point above the ground, m.
     """
 
-    along: float
+    distance_beyond_point: float
     lateral_offset: float
     touchdown: tuple[float, float]
     stop: tuple[float, float]
@@ -64,7 +65,7 @@ class _Landing(NamedTuple):
 def touchdown_findings(
     requirements: RouteRequirements, _aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge a flown landing; before a flight, only report a strip that is too short."""
+    """Judge a flown landing; before a flight, only report a strip that is too short to judge the touch-down."""
     ground_phases = requirements.ground_phases
     if ground_phases is None or ground_phases.procedures.approach is None:
         planned_approach = requirements.setup.ground_phases.approach if geometric else None
@@ -115,13 +116,13 @@ def _measure_landing(
 ) -> _Landing:
     """Measure a landing that touches down at row `touchdown_row`; the field `point_height` stays unset."""
     position = np.asarray(track.position, dtype=np.float64)
-    along, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
-    touch, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))
+    distance_beyond_point, lateral_offset = _as_floats(approach.distances_from_landing_point(position[touchdown_row]))
+    touchdown, stop = (_as_floats(approach.distances_from_strip_center(position[row])) for row in (touchdown_row, -1))
     sink, ground_sink = _sink_rates(track, terrain, approach, touchdown_row)
     return _Landing(
-        along=along,
+        distance_beyond_point=distance_beyond_point,
         lateral_offset=lateral_offset,
-        touchdown=touch,
+        touchdown=touchdown,
         stop=stop,
         strip_left=0.5 * approach.strip.length - stop[0],
         sink=sink,
@@ -133,7 +134,7 @@ def _measure_landing(
 def _landing_finding(
     place: Place, approach: Approach, landing: _Landing, faults: list[Message], *, has_gusts: bool
 ) -> Finding:
-    """Return the finding on a landing: its faults, or else its undecided parts.
+    """Return the finding on a measured landing: it fails with `faults`, and is undecided if the measures are too close.
 
     has_gusts: True if the air is turbulent.
     """
@@ -158,7 +159,7 @@ def _landing_finding(
         method="contact of skids or wheels with the ground, from the flown track",
         check=GROUND_PATH if undecided_messages else "",
         facts=(
-            Fact("along", landing.along, "m"),
+            Fact("along", landing.distance_beyond_point, "m"),
             Fact("aside", landing.lateral_offset, "m"),
             Fact("sink", landing.sink, "m/s"),
             Fact("sink towards the ground", landing.ground_sink, "m/s"),
@@ -169,7 +170,7 @@ def _landing_finding(
 
 
 def _landing_point_text(approach: Approach) -> str:
-    """Name the landing point by its mission item."""
+    """Return the mission item of the landing point as text."""
     return f"item {approach.item}"
 
 
@@ -179,7 +180,10 @@ def _as_floats(values: tuple[Floats, Floats]) -> tuple[float, float]:
 
 
 def _touchdown_row(track: Track, terrain: Terrain) -> int | None:
-    """Return the first row at which the aircraft is as low above ground as at rest; None if it never stopped."""
+    """Return the first row at which the aircraft is as low above ground as in the last row, where it stands still.
+
+    Return None if the aircraft does not stand still in the last row.
+    """
     if not len(track):
         return None
     position = np.asarray(track.position, dtype=np.float64)
@@ -206,7 +210,10 @@ def _sink_rates(track: Track, terrain: Terrain, approach: Approach, row: int) ->
 
 
 def _final_clearance(requirements: RouteRequirements, position: Floats, terrain: Terrain, approach: Approach) -> float:
-    """Return the minimum height above ground before flare or touch-down, m, as in `_Landing.final_clearance`."""
+    """Return the minimum height of the final approach above ground, up to the flare or the touch-down, m.
+
+    The height is inf without a final approach, NaN if the terrain is unknown.
+    """
     point_altitude = float(approach.point[2])
     glide = requirements.setup.autopilot.ground.glide(
         approach.start_altitude - point_altitude, approach.length, approach.tail_wind, point_altitude
@@ -227,23 +234,23 @@ def _detect_faults(approach: Approach, landing: _Landing) -> list[Message]:
     allowed_distance = (
         half_length - TOUCHDOWN_ERROR_M if half_length > TOUCHDOWN_ERROR_M else half_length + TOUCHDOWN_ERROR_M
     )
-    touch, stop = landing.touchdown, landing.stop
+    touchdown, stop = landing.touchdown, landing.stop
     faults = []
     if -landing.point_height > LANDING_POINT_ERROR_M:
         brief = (
             f"the landing point of {_landing_point_text(approach)} is {-landing.point_height:.0f} m below the ground"
         )
         faults.append(message(brief, ": the aircraft hits the ground before it flares"))
-    if abs(touch[0]) > allowed_distance:
-        direction = "before" if touch[0] < 0.0 else "beyond"
-        brief = f"touches down {abs(touch[0]):.0f} m {direction} the strip's center"
+    if abs(touchdown[0]) > allowed_distance:
+        direction = "before" if touchdown[0] < 0.0 else "beyond"
+        brief = f"touches down {abs(touchdown[0]):.0f} m {direction} the strip's center"
         faults.append(message(brief, f"; {max(0.0, half_length - TOUCHDOWN_ERROR_M):.0f} m are allowed on this strip"))
     if stop[0] > allowed_distance:
         brief = f"comes to rest {half_length - stop[0]:.0f} m before the strip's end"
         if stop[0] > half_length:
             brief = f"runs {stop[0] - half_length:.0f} m beyond the strip's end"
         faults.append(message(brief, f"; {TOUCHDOWN_ERROR_M:.0f} m of the strip must be left"))
-    lateral_offset = max(abs(touch[1]), abs(stop[1]))
+    lateral_offset = max(abs(touchdown[1]), abs(stop[1]))
     if lateral_offset > half_width:
         faults.append(
             message(
@@ -292,9 +299,9 @@ def _undecided_messages(approach: Approach, landing: _Landing, *, has_gusts: boo
 
 def _describe_landing(approach: Approach, landing: _Landing) -> list[str]:
     """Describe the landing in a list of phrases."""
-    direction = "before" if landing.along < 0.0 else "beyond"
+    direction = "before" if landing.distance_beyond_point < 0.0 else "beyond"
     notes = [
-        f"touches down {abs(landing.along):.0f} m {direction} the landing point, "
+        f"touches down {abs(landing.distance_beyond_point):.0f} m {direction} the landing point, "
         f"{abs(landing.lateral_offset):.1f} m to the side"
     ]
     notes.append(f"comes to rest with {landing.strip_left:.0f} m of the strip left")

@@ -43,7 +43,7 @@ def _planned_finding(requirements: RouteRequirements, i: int) -> Finding:
         turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
             message(
-                f"the arc of its {turn:.0f}° corner passes it at {offset:.0f} m",
+                f"the arc of the {turn:.0f}° corner passes the waypoint at {offset:.0f} m",
                 f" (radius {radius:.0f} m); the waypoint counts as reached within {condition.radius:.0f} m",
             )
         )
@@ -71,7 +71,8 @@ def _turn_text(requirements: RouteRequirements, i: int, condition: AcceptanceCon
         turn_distance = autopilot.turns.distance(turn, float(requirements.points[i, 2]))
         unread_text = f"; {autopilot.title} does not read the mission's {condition.radius:.0f} m"
     return (
-        f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before it, or once it is past it{unread_text}"
+        f"{autopilot.title} turns to the next leg {turn_distance:.0f} m before the waypoint, or once the aircraft has"
+        f" passed the waypoint{unread_text}"
     )
 
 
@@ -80,7 +81,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
 
     A waypoint to which the flight was not yet flying when it ended is not judged.
 
-    apexes: points at which the planned path passes the waypoints, (w, 3) m.
+    apexes: points of the planned path nearest to the waypoints, m, (w, 3).
     """
     condition, setup = acceptance_condition(requirements, i), requirements.setup
     offset, max_distance = float(requirements.fly_by_offset[i]), condition.radius + condition.tolerance
@@ -92,15 +93,17 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
         distance, height_error = _closest_approach(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", height_error, "m"),)
         ok = distance <= max_distance
-        crossing = math.inf if ok or setup.autopilot.turns.follows_path else _crossing_offset(requirements, aligned, i)
-        if crossing <= setup.corridor:
+        crossing_offset = (
+            math.inf if ok or setup.autopilot.turns.follows_path else _crossing_offset(requirements, aligned, i)
+        )
+        if crossing_offset <= setup.corridor:
             ok = True
         side = "above" if height_error >= 0.0 else "below"
         reason = f"passed at {distance:.1f} m, {abs(height_error):.1f} m {side} its altitude"
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
-        if math.isfinite(crossing):
-            reason += f"; the line across the leg at the waypoint was crossed {crossing:.0f} m to the side"
+        if math.isfinite(crossing_offset):
+            reason += f"; the line across the leg at the waypoint was crossed {crossing_offset:.0f} m to the side"
         if i > 0 and not aligned.passed[i]:
             last_leg = requirements.leg(aligned.leg_at(len(aligned.track) - 1))
             text = (
@@ -109,7 +112,7 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
             faults = [message("not reached", text)]
             ok, reason = False, finding_reason(faults)
             if not aligned.passed[i - 1]:
-                # The flight was not flying to this waypoint: its distance says nothing.
+                # The aircraft was not flying to this waypoint, so its distance from the waypoint means nothing.
                 distance, ok, facts = math.nan, None, ()
                 reason = f"not reached: the flight ended on {place_text(last_leg)}"
         elif not ok:
@@ -134,26 +137,36 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
 
 
 def _crossing_offset(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
-    """Return the lateral offset at which the track crossed the line across a leg's end, m; inf if it did not."""
+    """Return the distance from waypoint `i` at which the track first crossed the line across the leg's end, m.
+
+    Return inf if the track did not cross this line, or for the first waypoint.
+    """
     if i == 0:
         return math.inf
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
-    along, across = along_across(requirements, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1])
-    rows_past = np.flatnonzero(along >= requirements.runs[i - 1])
-    return abs(float(across[rows_past[0]])) if rows_past.size else math.inf
+    distances_along, lateral_offsets = along_across(
+        requirements, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1]
+    )
+    rows_past = np.flatnonzero(distances_along >= requirements.runs[i - 1])
+    return abs(float(lateral_offsets[rows_past[0]])) if rows_past.size else math.inf
 
 
 def _acceptance_text(condition: AcceptanceCondition) -> str:
     """Describe the acceptance distance and its source."""
-    owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(condition.source, "the fly-by path's")
+    radius_owner = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(
+        condition.source, "the fly-by path's"
+    )
     error_text = f" plus {condition.tolerance:.1f} m for navigation and gusts" if condition.tolerance else ""
-    return f"the waypoint counts as reached within {condition.radius:.0f} m ({owner} radius){error_text}"
+    return f"the waypoint counts as reached within {condition.radius:.0f} m ({radius_owner} radius){error_text}"
 
 
 def _closest_approach(
-    requirements: RouteRequirements, aligned: AlignedTrack, i: int, level: float
+    requirements: RouteRequirements, aligned: AlignedTrack, i: int, reference_altitude: float
 ) -> tuple[float, float]:
-    """Return the minimum horizontal distance of the track from a waypoint, and its height above ``level`` there, m."""
+    """Return the minimum horizontal distance of the track from waypoint `i`, and the altitude error at this point, m.
+
+    The altitude error is relative to `reference_altitude` (m AMSL).
+    """
     first = int(aligned.rows[i - 1]) if i else 0
     last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
     position = aligned.track.position[first : max(last, first + 1) + 1]
@@ -161,12 +174,12 @@ def _closest_approach(
     if not distance.size:
         offset = aligned.track.position[-1] - requirements.points[i]
         return math.hypot(offset[0], offset[1]), float(offset[2])
-    # Among equally close rows take the one nearest in altitude.
+    # Among equally close segments take the one nearest in altitude.
     nearest_rows = np.flatnonzero(distance <= distance.min() + EQUAL_DISTANCE_TOLERANCE_M)
     heights = (
         position[nearest_rows, 2]
         + fraction[nearest_rows] * (position[nearest_rows + 1, 2] - position[nearest_rows, 2])
-        - level
+        - reference_altitude
     )
     return float(distance.min()), float(heights[np.argmin(np.abs(heights))])
 

@@ -367,7 +367,8 @@ def trust_line(again: Reflight) -> str:
     if not again.spreads:
         return f"Model and flight have no part in common: it is unknown how far {model_text} can be trusted"
     spread_texts = [
-        f"{_QUANTITY_NAMES[spread.name]} {number(spread.median)} {spread.unit} ({number(spread.most)} {spread.unit})"
+        f"{_QUANTITY_NAMES[spread.name]} {number(spread.median)} {spread.unit}"
+        f" ({number(spread.percentile_95)} {spread.unit})"
         for spread in again.spreads
     ]
     end_text = "" if again.ended == "completed" else f"; the simulated flight ended early: {again.ended}"

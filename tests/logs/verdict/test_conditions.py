@@ -160,9 +160,8 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     assert setup.corridor == 30.0
     default = "Corridor: 30 m to either side of the legs, planfly's default ([limits] corridor_m states one)"
     assert corridor_line(survey) == (
-        f"{default}; it is wider than the 20 m between legs 0 and 2; staying within it does not show that"
-        " the lines were"
-        " flown"
+        f"{default}; the corridor is wider than the 20 m between legs 0 and 2, so a flight within the corridor may"
+        " not have followed the lines"
     )
     assert corridor_line(replace(setup, route=replace(setup.route, waypoints=lines(31.0)))) == default
     assert corridor_line(setup) == default

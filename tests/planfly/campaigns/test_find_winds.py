@@ -241,7 +241,7 @@ def test_a_search_that_is_gone_on_with_keeps_its_number_of_flights(wind_base: Ca
 def test_a_table_whose_flights_do_not_follow_is_refused(wind_base: CampaignBase, tmp_path: Path) -> None:
     with open_winds_store(wind_base, GOAL, tmp_path, resume=False) as store:
         store.add(RequestedFlight(3, 1, 9.9, 0), made_flight(wind_base, 0))
-    with pytest.raises(StoreError, match="flight 3 is not the flight that this search would request"):
+    with pytest.raises(StoreError, match="flight 3 belongs to a search with other settings"):
         searched(wind_base, tmp_path)
     assert len(table(tmp_path / WINDS_DATABASE)) == 1
 

@@ -40,7 +40,7 @@ def untold(name: str, time: np.ndarray, source: ImportedLog, out: str) -> str:
     if known and " gap" not in out:
         return "gaps that are not in words"
     if source.faults.clock_jumps:
-        return "" if "of the clock" in out else "a jump of the clock"
+        return "" if "clock jump" in out else "a clock jump"
     begin, end = float(TIMES[0]), float(np.floor(TIMES[-1])) if name in TRACKS else float(TIMES[-1])
     if name in TRACKS:
         begin, end = BEGAN.timestamp(), BEGAN.timestamp() + end - begin

@@ -59,11 +59,15 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
         ),
         ('"volt", unit = "V"', '"volt", unit = "V", rate = 1.0', "columns.voltage.rate: 1 Hz: it changes"),
         # The motion contradicts itself.
-        ('"r", unit = "deg/s"', '"r", unit = "deg/s", sign = -1', "yaw_rate: r runs against .* check sign and frame"),
+        (
+            '"r", unit = "deg/s"',
+            '"r", unit = "deg/s", sign = -1',
+            "yaw_rate: r varies opposite to .* check sign and frame",
+        ),
         ('"r", unit = "deg/s"', '"r", unit = "deg/s", scale = 0.0174533', "yaw_rate: r is .* times .* check unit"),
         ('"az", unit = "m/s2"', '"az", unit = "m/s2", sign = -1', "acceleration_down: az is .* check sign and frame"),
         ('"az", unit = "m/s2"', '"az", unit = "ft/s2"', "acceleration_down: az is -3.1.* check unit"),
-        ('"yaw", unit = "deg"', '"yaw", unit = "deg", frame = "ENU"', "yaw.* check sign, frame|runs against"),
+        ('"yaw", unit = "deg"', '"yaw", unit = "deg", frame = "ENU"', "yaw.* check sign, frame|varies opposite to"),
         (
             '"yaw", unit = "deg"',
             '"yaw", unit = "deg", offset = 90.0',
@@ -72,7 +76,7 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
         (
             '"ve", unit = "m/s"',
             '"ve", unit = "m/s", sign = -1',
-            "velocity_east: ve runs against the change of",
+            "velocity_east: ve varies opposite to the change of",
         ),
         ('"r", unit = "deg/s"', '"ail", unit = "deg/s"', "yaw_rate: ail does not follow the change of .* check column"),
         ('"tas", unit = "m/s"', '"tas", unit = "m/s", scale = 0', "airspeed: tas keeps one value from 0 to 239.5 s"),
@@ -102,7 +106,11 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
             "airspeed =",
             "wind_direction: wind_direction states -1 times the wind of airspeed",
         ),
-        ('"thr", unit = "%"', '"thr", unit = "%", sign = -1, offset = -100', "throttle: thr runs against the current"),
+        (
+            '"thr", unit = "%"',
+            '"thr", unit = "%", sign = -1, offset = -100',
+            "throttle: thr varies opposite to the current",
+        ),
         ('"thr", unit = "%"', '"thr", unit = "%", scale = 0', "throttle: thr stays at 0 .* current goes from 4"),
     ],
 )

@@ -10,7 +10,7 @@ import pytest
 
 from flight.simulation.setup import Damage, Heights, ImportedLog, RowFaults
 from logs.importers.raw_log import LogSeries, ModeChange, RawLog, example_raw_log
-from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, rows_text
+from logs.verdict.imported.judge_imported_flight import damage_text, heights_text, row_faults_text
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import verdict_json
 from planfly.flight_options import LogOptions
@@ -231,9 +231,9 @@ def test_a_return_that_the_mission_ends_with_completes_it(tmp_path: Path, mode: 
 
 def test_each_fault_of_rows_is_counted_by_name() -> None:
     faults = RowFaults(doubled=1, unordered=2, unusable=3, glitches=4, clock_jumps=(5.0, 6.0))
-    assert rows_text(faults, 2) == (
-        "2 gaps, 1 doubled, 2 out of order, 3 without a position or a time, 4 position glitches,"
-        " 2 jumps of the clock (at 5.0 s, 6.0 s)"
+    assert row_faults_text(faults, 2) == (
+        "2 gaps, 1 duplicate, 2 out of order, 3 without a position or a time, 4 position glitches,"
+        " 2 clock jumps (at 5.0 s, 6.0 s)"
     )
 
 

@@ -156,7 +156,7 @@ def test_a_climb_that_passes_the_ground_beyond_the_landing_point_by_too_little_i
         found, least = climbs(top + more)
         assert found.ok is ok
         assert least == pytest.approx(6.0 - more, abs=0.1)
-    assert "its climb clears the ground by" in climbs(top + 1.0)[0].reason
+    assert "the climb clears the ground by" in climbs(top + 1.0)[0].reason
     assert level.ok is True
 
 

@@ -160,7 +160,7 @@ def test_ground_that_is_known_in_part_judges_what_is_above_it(most: float, ok: b
     track = fly_path(setup)
     (item,) = findings(setup, track)
     assert (item.ok, item.flown) == (ok, pytest.approx(200.0))
-    assert "part of the terrain below it is unknown" in item.reason
+    assert "part of the terrain below the leg is unknown" in item.reason
     level = replace(ground, heights=np.full_like(ground.heights, 100.0))
     (item,) = findings(replace(setup, scenario=replace(setup.scenario, terrain=level)), track)
     assert item.ok is (most > 200.0)

@@ -41,7 +41,8 @@ def test_the_first_row_of_each_departure_is_told(setup: FlightSetup, track: Trac
         columns["attitude"][row, 0] = math.radians(bank)
         columns["airspeed"][row] = speed
     reason = of(judge(setup, Track(**columns)), "departure").reason
-    assert reason.startswith("bank 80° at 50.0 s, beyond 75°; airspeed 14.0 m/s at 50.0 s, below 15.0 m/s")
+    bank_text, airspeed_text = "bank 80° at 50.0 s, more than the limit of 75°", "airspeed 14.0 m/s at 50.0 s"
+    assert reason.startswith(f"{bank_text}; {airspeed_text}, below 15.0 m/s")
     columns = copied(track)
     columns["position"][3000:3600, 2] = -5.0
     assert "ground contact at 50.0 s" in of(judge(setup, Track(**columns)), "departure").reason

@@ -281,11 +281,11 @@ UNJOINED = {
     ),
     "inner": (
         (_WIDE, wp(300, 0, 300, command=18, p="1 0 200 0"), wp(5000, 0, 300)),
-        (3, "no tangent joins its circle to that of item 2: ArduPlane flies it anyway"),
+        (3, "no tangent joins its circle to the circle of item 2: ArduPlane flies it anyway"),
     ),
     "same-middle": (
         (_WIDE, wp(0, 0, 300, command=18, p="1 0 200 0"), wp(5000, 0, 300)),
-        (3, "no tangent joins its circle to that of item 2"),
+        (3, "no tangent joins its circle to the circle of item 2"),
     ),
     # Nobody has to fly elsewhere for a loiter without a place of its own, or with that of the waypoint before.
     "at-the-place-before": ((wp(0, 0, 300), wp(0, 0, 300, command=18, p="1 0 150 0"), wp(5000, 0, 300)), None),
@@ -301,7 +301,7 @@ UNJOINED = {
     ),
     "down-the-other-way": (
         (wp(0, 0, 200, command=18, p="2 0 150 0"), wp(0, 0, 50, command=31, p="0 -150 0 0"), wp(5000, 0, 50)),
-        (3, "no tangent joins its circle to that of item 2"),
+        (3, "no tangent joins its circle to the circle of item 2"),
     ),
     "outside": ((_WIDE, wp(1500, 0, 300), wp(5000, 0, 300)), None),
     "apart": ((_WIDE, wp(5000, 0, 300, command=18, p="1 0 200 0"), wp(9000, 0, 300)), None),

@@ -59,7 +59,7 @@ def test_a_slope_as_flown_is_within_the_limit_of_its_own_direction(
     assert item.ok is ok
     assert (item.flown, item.limit) == (pytest.approx(flown), math.copysign(limit, planned))
     if not ok:
-        assert item.reason.startswith(f"flown {flown:+.1f}°, beyond {limit:.1f}°")
+        assert item.reason.startswith(f"flown at {flown:+.1f}°, steeper than the limit of {limit:.1f}°")
         assert item.margin == pytest.approx(-beyond)
 
 

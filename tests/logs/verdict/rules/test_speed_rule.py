@@ -138,7 +138,7 @@ def test_a_commanded_speed_that_is_not_held_fails(setup: FlightSetup) -> None:
     setup = make_setup(STRAIGHT)
     item = of(judge(setup, fly_path(setup, airspeed=lambda s: 0.0 * s - 4.0)), "speed", leg(0))
     assert item.ok is False
-    assert item.reason.startswith("21.0 m/s held of the commanded 25.0 m/s")
+    assert item.reason.startswith("21.0 m/s held instead of the commanded 25.0 m/s")
     # A tenth of 25 m/s may be missing.
     assert (item.planned, item.limit_source, item.unit) == (25.0, "mission", "m/s")
     assert item.flown == pytest.approx(21.0, abs=0.01)

@@ -78,7 +78,7 @@ def test_a_quarter_of_the_spacing_beside_its_line_is_lost(aside: float, lost: fl
     assert all(item.ok for item in others)
     if lost:
         assert "photo line 1 of 3 (items 1 to 2)" in first.reason
-        assert "30 % not flown along it within 50 m" in first.reason
+        assert "30 % not flown along the line within 50 m" in first.reason
 
 
 @pytest.mark.parametrize(("off", "lost"), [(9.0, 0.0), (-9.0, 0.0), (11.0, 20.0), (-11.0, 20.0)])
@@ -88,7 +88,7 @@ def test_a_tenth_of_the_height_over_ground_is_lost(off: float, lost: float) -> N
     first = photo_lines(judge(setup, track))[0]
     assert first.flown == pytest.approx(100.0 - lost, abs=1.0)
     if lost:
-        assert "20 % more than 10 m off its height above ground" in first.reason
+        assert "20 % more than 10 m off the planned height above ground" in first.reason
 
 
 @pytest.mark.parametrize(("bank_deg", "lost"), [(9.0, 0.0), (11.0, 10.0)])

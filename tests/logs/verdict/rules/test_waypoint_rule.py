@@ -85,7 +85,7 @@ def test_an_arc_that_passes_too_far_is_known_before_the_flight(turn: float, offs
     assert own == pytest.approx(offset, abs=0.5)
     missed = of(judge_geometry(accepting(make_setup(corner(turn)), own - 0.1)), "waypoint", waypoint(1))
     assert (missed.ok, missed.planned) == (False, pytest.approx(own))
-    assert missed.reason.startswith(f"the arc of its {turn:.0f}° corner passes it at {own:.0f} m")
+    assert missed.reason.startswith(f"the arc of the {turn:.0f}° corner passes the waypoint at {own:.0f} m")
     assert missed.margin == pytest.approx(-0.1, abs=1e-5)
     reached = of(judge_geometry(accepting(make_setup(corner(turn)), own + 0.1)), "waypoint", waypoint(1))
     assert (reached.ok, reached.margin) == (True, pytest.approx(0.1, abs=1e-5))
@@ -190,8 +190,9 @@ def test_px4_turns_by_its_own_radius_and_says_so() -> None:
     )
     planned = of(judge_geometry(setup), "waypoint", waypoint(1)).reason
     assert planned == (
-        "PX4 turns to the next leg 10 m before it, or once it is past it; PX4 does not read the mission's 120 m"
+        "PX4 turns to the next leg 10 m before the waypoint, or once the aircraft has passed the waypoint; PX4 does not"
+        " read the mission's 120 m"
     )
     own = replace(setup, route=replace(setup.route, acceptance=np.zeros(3)))
     told = of(judge_geometry(own), "waypoint", waypoint(1)).reason
-    assert told == "PX4 turns to the next leg 10 m before it, or once it is past it"
+    assert told == "PX4 turns to the next leg 10 m before the waypoint, or once the aircraft has passed the waypoint"
