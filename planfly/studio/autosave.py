@@ -1,6 +1,7 @@
 """Save the mission, settings and plan of a session automatically, in case the server dies.
 
-An autosave is restored only into its own document, which is identified by its first mission.
+An autosave is restored only into its own document, which is identified by its first mission, or by the file that the
+studio has written over it.
 """
 
 import hashlib
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from flight.mission.items import MAX_BYTES, Home, Mission, MissionItem, item_problem
-from planfly.studio.documents import planned_mission
+from planfly.studio.documents import Document, planned_mission
 from planfly.studio.edit_context import EditContext
 from planfly.studio.pilot import INTERNAL
 from planfly.studio.settings import SetParameters
@@ -27,22 +28,25 @@ _MAX_AUTOSAVE_BYTES = 4 * MAX_BYTES
 _SAVED_TABLES = ("wind", "flight", "limits", "area")
 
 
-def autosave_text(context: EditContext, first: Mission, mission: Mission, plan: Plan | None, name: str) -> str:
+def autosave_text(
+    context: EditContext, document: Document, mission: Mission, plan: Plan | None, *, is_in_file: bool
+) -> str:
     """Return the JSON text of the autosave file.
 
-    first: the mission that was opened.
     mission: the edited mission.
-    name: name of the document.
     plan: the plan of the mission, or None if the mission was changed after planning.
+    is_in_file: True if the file of the document contains the edited mission.
     """
     spec = context.scenario.to_json()
     # An area made around a mission is not saved; it is made again when the mission is restored.
     names = [table for table in _SAVED_TABLES if table in spec and (table != "area" or not context.scenario.external)]
     data = {
         "schema": _SCHEMA,
-        "name": name,
+        "name": document.name,
         "mission": mission_data(mission),
-        "first": mission_data(first),
+        "first": mission_data(document.setup.mission),
+        "file": _file_digest(document),
+        "in_file": is_in_file,
         "settings": {table: spec[table] for table in names},
         "parameters": asdict(context.parameters),
         "planned": context.planned,
@@ -51,10 +55,15 @@ def autosave_text(context: EditContext, first: Mission, mission: Mission, plan: 
     return json.dumps(data)
 
 
-def read_autosave(file: Path, context: EditContext, first: Mission) -> tuple[Mission, EditContext] | None:
+def _file_digest(document: Document) -> str:
+    """Return a digest of the file of a document as it was last read or written; "" without a file."""
+    return hashlib.sha256(document.on_disk).hexdigest() if document.on_disk else ""
+
+
+def read_autosave(file: Path, context: EditContext, document: Document) -> tuple[Mission, EditContext] | None:
     """Return the saved mission and its editing context, or None if there is no autosave of this document.
 
-    first: the mission that was opened; the autosave of another mission is ignored.
+    The autosave of another mission is ignored.
     Raises one of `INTERNAL` or PlanflyError for a file that cannot be read.
     """
     if not file.exists():
@@ -62,9 +71,12 @@ def read_autosave(file: Path, context: EditContext, first: Mission) -> tuple[Mis
     data = json.loads(
         utf8_text(read_small_file(file, _MAX_AUTOSAVE_BYTES, "session", PlanflyError), file, PlanflyError)
     )
-    if data["schema"] != _SCHEMA or data["first"] != mission_data(first):
+    first = document.setup.mission
+    is_same_file = bool(document.on_disk) and data.get("file") == _file_digest(document)
+    if data["schema"] != _SCHEMA or (data["first"] != mission_data(first) and not is_same_file):
         return None
-    mission = first if data["mission"] == data["first"] else mission_from_data(data["mission"], first)
+    is_opened = data["mission"] == mission_data(first) or (is_same_file and data.get("in_file") is True)
+    mission = first if is_opened else mission_from_data(data["mission"], first)
     try:
         restored = _restore_plan(_restore_settings(context, data), mission, data)
     except (*INTERNAL, PlanflyError):

@@ -98,7 +98,7 @@ def _place_key(place: Place, route_items: Sequence[int], order: dict[int, int]) 
                 "leg",
                 order[first_item],
                 order[last_item],
-            ), f"leg {first_item}\u2013{last_item}" if first_item != last_item else f"item {last_item}"
+            ), f"leg to item {last_item}" if first_item != last_item else f"item {last_item}"
     elif place.kind == "waypoint" and place.index is not None and route_items[place.index] in order:
         number = route_items[place.index]
         return ("waypoint", order[number], order[number]), f"item {number}"
@@ -133,10 +133,10 @@ def describe_changes(previous: FlightResults | None, current: FlightResults) -> 
 
     >>> leg = ("clearance", ("leg", 0, 1))
     >>> items = ((16.0, 46.0, 8.0, 100.0), (16.0, 46.0, 8.1, 100.0))
-    >>> low = FlightResults(items, {leg: PlaceResult(False, 22.0, -38.0, "m", "leg 1\u20132")}, 500.0)
-    >>> high = FlightResults(items, {leg: PlaceResult(True, 61.0, 1.0, "m", "leg 1\u20132")}, 512.0)
+    >>> low = FlightResults(items, {leg: PlaceResult(False, 22.0, -38.0, "m", "leg to item 2")}, 500.0)
+    >>> high = FlightResults(items, {leg: PlaceResult(True, 61.0, 1.0, "m", "leg to item 2")}, 512.0)
     >>> describe_changes(low, high)
-    ['leg 1\u20132: clearance 22 m \u2192 61 m, now passes', '12 s longer']
+    ['leg to item 2: clearance 22 m \u2192 61 m, now passes', '12 s longer']
     >>> describe_changes(high, high), describe_changes(None, high)
     (['nothing'], [])
     """

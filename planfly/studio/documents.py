@@ -50,6 +50,8 @@ DROPPED_SUFFIXES = (
     ".kml",
     ".kmz",
 )
+# File types of maps, which contain no mission.
+MAP_SUFFIXES = (".kml", ".kmz")
 # File types that a mission can be opened from and saved as.
 KINDS = {"waypoints": ".waypoints", "plan": ".plan", "plan.json": ".json", "kml": ".kml"}
 # All file types that can be saved.
@@ -181,9 +183,10 @@ def _read_imported_log(path: Path, options: MissionOptions) -> ImportedFlight:
     try:
         return read_imported(path, **world)
     except LogError as error:
-        if "contains no mission" not in str(error):
+        has_track = "contains no mission" in str(error)
+        if not has_track and path.suffix.lower() not in MAP_SUFFIXES:
             raise
-        reason = "contains a track but no mission: open the mission file instead"
+        reason = f"contains {'a track' if has_track else 'a map'} but no mission: open the mission file instead"
         raise MissionError(f"{path}: {reason}", file=path) from None
 
 

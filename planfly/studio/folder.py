@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from planfly.studio.documents import DROPPED_SUFFIXES
+from planfly.studio.documents import DROPPED_SUFFIXES, MAP_SUFFIXES
 from planfly.studio.settings import PARAMETER_FILES
 from planfly.studio.view_model import Json
 from world.errors import MissionError
@@ -10,6 +10,7 @@ from world.errors import MissionError
 # Maximum number of files that are listed.
 _MAX_FILES = 200
 _READABLE_SUFFIXES = (*DROPPED_SUFFIXES, *PARAMETER_FILES)
+_LISTED_SUFFIXES = tuple(suffix for suffix in _READABLE_SUFFIXES if suffix not in MAP_SUFFIXES)
 
 
 def folder_message(folder: Path | None) -> Json:
@@ -25,7 +26,7 @@ def folder_message(folder: Path | None) -> Json:
     try:
         resolved_folder = folder.resolve(strict=True)
         files = sorted(
-            file for file in resolved_folder.iterdir() if file.suffix.lower() in _READABLE_SUFFIXES and file.is_file()
+            file for file in resolved_folder.iterdir() if file.suffix.lower() in _LISTED_SUFFIXES and file.is_file()
         )
     except OSError:
         return {"folder": "", "files": []}
@@ -58,12 +59,15 @@ def find_file_in_folder(folder: Path | None, name: str) -> Path:
         raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
     try:
         resolved_folder = folder.resolve(strict=True)
-        path = (resolved_folder / name).resolve(strict=True)
-        is_inside = path.is_file() and path.is_relative_to(resolved_folder) and ".." not in Path(name).parts
+        path = (resolved_folder / name).resolve()
+        is_inside = path.is_relative_to(resolved_folder) and ".." not in Path(name).parts
+        is_missing = is_inside and not path.exists()
     except (OSError, ValueError, RuntimeError):
-        is_inside = False
-    if not is_inside:
-        raise MissionError.at("open", "name", name[:60], f"expected a file in {folder}", shown=repr(name[:60]))
+        is_inside = is_missing = False
+    if is_missing or not is_inside or not path.is_file():
+        place = home_relative_text(folder)
+        allowed = f"no such file in {place}" if is_missing else f"expected a file in {place}"
+        raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
     if path.suffix.lower() not in _READABLE_SUFFIXES:
         raise MissionError.at(
             "open", "suffix", path.suffix, f"allowed {', '.join(_READABLE_SUFFIXES)}", shown=repr(path.suffix)

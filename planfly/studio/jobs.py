@@ -31,6 +31,7 @@ class _ActiveTask:
     """Task in progress.
 
     rev: revision of the mission for which the task is done.
+    item_range: first and last item between which a path is planned; None for other tasks, and for the whole mission.
     report_time: time of the last progress report, s.
     fraction: largest reported progress of the task, 0 to 1.
     """
@@ -38,6 +39,7 @@ class _ActiveTask:
     number: int
     name: str
     rev: int
+    item_range: tuple[int, int] | None = None
     report_time: float = 0.0
     fraction: float = 0.0
 
@@ -130,6 +132,8 @@ class Jobs:
         request = self._plan_request(message, session)
         self._uses_first_path = False
         self._submit_task(LONG_WORKER, "plan", "planfly.studio.worker_tasks.plan", request, session.rev)
+        if message.first is not None and message.last is not None:
+            self._active[LONG_WORKER].item_range = (message.first, message.last)
 
     def start_task(self, kind: str, session: Session) -> None:
         """Start a flight of the current mission, or a long task.  kind: "fly" or the name of the long task."""
@@ -151,7 +155,7 @@ class Jobs:
                 worker.cancel()
 
     def _plan_request(self, message: messages.Plan, session: Session) -> PlanRequest:
-        """Make the request for a search, and forget earlier planned paths.
+        """Make the request for a search.
 
         Raises PlanflyError for an unknown algorithm, and for items between which no path can be planned.
         """
@@ -164,7 +168,6 @@ class Jobs:
         if message.first is None or message.last is None:
             if scenario.external:
                 raise MissionError(f"{session.document.name}: choose the two items to plan between", field="first")
-            session.plans = ([], None)
             return request
         ends = [session.item_position(index) for index in (message.first, message.last)]
         if message.first >= message.last:
@@ -172,7 +175,6 @@ class Jobs:
                 f"{session.document.name}: of the two items to plan between, the second must come later in the mission",
                 field="last",
             )
-        session.plans = ([], (message.first, message.last))
         return replace(request, ends=(ends[0], ends[1]))
 
     def _submit_task(self, worker: str, name: str, function: str, payload: Any, rev: int) -> None:
@@ -258,7 +260,8 @@ class Jobs:
             self._flight_message = (self._flight_message or {}) | {"findings": value["findings"]}
             return {"kind": "tried", "rev": task.rev, "findings": value["findings"]}
         if task.name == "plan":
-            session.plans = ([message.plan for message in value], session.plans[1])
+            # Until then the paths of an earlier search can be chosen, also if this one is stopped.
+            session.plans = ([front_plan.plan for front_plan in value], task.item_range)
             return {"kind": "ways", "rev": task.rev, "ways": paths_json(value), "at_once": self._uses_first_path}
         message = {"kind": task.name, "rev": task.rev, **value}
         self._other_messages = [*(message for message in self._other_messages if message["kind"] != task.name), message]

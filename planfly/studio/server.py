@@ -313,10 +313,14 @@ class Server:
         match message:
             case messages.Ask(kind="stop"):
                 self.jobs.stop()
-            case messages.Ask():
-                self.jobs.start_task(message.kind, session)
-            case messages.Plan():
-                self.jobs.plan(message, session)
+            case messages.Ask() | messages.Plan():
+                if isinstance(message, messages.Plan):
+                    self.jobs.plan(message, session)
+                else:
+                    self.jobs.start_task(message.kind, session)
+                # A process that starts for the task takes seconds to report progress.
+                for progress_message in self.jobs.progress_messages():
+                    self._broadcast(progress_message)
             case messages.Save():
                 save_mission = session.overwrite_file if message.over else lambda: session.save(message.form)
                 async with self._change_lock:

@@ -58,6 +58,7 @@ class Session:
     document_rev: number that increases with every opened document.
     named_file: file named on the command line, the only file that may be overwritten.
     saved_mission: the mission as saved last.
+    file_mission: the mission as saved last over the document's file.
     earlier_states: states of the documents opened earlier.
     undone_states: states of the documents whose opening was undone.
     """
@@ -76,6 +77,7 @@ class Session:
     unreadable: list[Path] = field(default_factory=list)
     named_file: Path | None = None
     saved_mission: Mission | None = None
+    file_mission: Mission | None = None
     document_rev: int = 1
     earlier_states: list[_OpenedState] = field(default_factory=list)
     undone_states: list[_OpenedState] = field(default_factory=list)
@@ -441,6 +443,8 @@ class Session:
         saved_file = self.save(self.document.kind)
         write_atomically(path, saved_file.data)
         self.document = replace(self.document, on_disk=saved_file.data)
+        # The next autosave knows the new file.
+        self.file_mission, self.autosaved_rev = self.mission, 0
         return saved_file
 
     # ------------------------------------------------------------------
@@ -470,7 +474,8 @@ class Session:
             return
         file.parent.mkdir(parents=True, exist_ok=True)
         plan = self.judged.setup.plan
-        text = autosave_text(self.context, self.history.first, self.mission, plan, self.document.name)
+        is_in_file = self.mission is self.file_mission
+        text = autosave_text(self.context, self.document, self.mission, plan, is_in_file=is_in_file)
         write_atomically(file, text)
         self.autosaved_rev = self.rev
 
@@ -482,7 +487,7 @@ class Session:
         """
         previous_state = self.context, self.judged, self.plans
         try:
-            autosave = read_autosave(file, self.context, self.history.first)
+            autosave = read_autosave(file, self.context, self.document)
             if autosave is None:
                 return False
             self._set_mission(*autosave)

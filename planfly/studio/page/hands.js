@@ -154,7 +154,8 @@ export class Hands {
     const leg = app.map.legAt(x, y);
     if (leg < 0) return app.hint(null);
     const [state, text] = model.states.legs[leg];
-    app.hint([`leg ${leg}`, text || (state === "ok" ? "passes" : "")], x, y, state);
+    const to = model.items.find((one) => one.k === model.of[leg + 1]);
+    app.hint([to ? `leg ${leg}, to item ${to.seq}` : `leg ${leg}`, text || (state === "ok" ? "passes" : "")], x, y, state);
   }
 
   // Numbers beside the pointer: heights, and what of its corner and legs is closest to its limit.

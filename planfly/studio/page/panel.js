@@ -126,7 +126,10 @@ export class Panel {
       if (flight.changes.length) part.append(element("p", {}, element("b", {}, "Since the last flight")), element("ul", { class: "changes" }, ...flight.changes.map((text) => element("li", {}, text))));
       box.append(part);
     }
-    const failed = this.listed(now.findings, false), flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
+    const flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
+    // A place that the flight has judged, too, is listed with the change that was flown, once there is one.
+    const better = flownFailed.length ? flight.findings.filter((one) => one.ok !== true && (one.suggestions.length || this.app.now.work.trials)) : [];
+    const failed = this.listed(now.findings.filter((one) => !better.some((other) => other.rule === one.rule && other.where === one.where)), false);
     if (failed.length) box.append(element("h2", {}, "What fails"), element("ul", { class: "findings" }, ...failed));
     if (flownFailed.length) {
       const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
@@ -286,7 +289,7 @@ export class Panel {
     this.lossBox = this.lossBox || element("div", { role: "status" });
     box.append(element("h2", {}, "Save"), this.lossBox, ...(over ? [over] : []), ...FORMS.map(([form, name, more]) => element("p", {}, element("button", { type: "button", onclick: () => app.send({ kind: "save", form }) }, name), element("small", {}, more))));
     const pick = element("input", { type: "file", id: "pick", onchange: (event) => event.target.files[0] && this.openFile(event.target.files[0]) });
-    box.append(element("h2", {}, "Open"), element("p", { class: "more" }, "Drop a file anywhere, or choose one: a mission (.waypoints, .plan, plan.json), a flight log whose mission is opened (.mcap, .bin, .tlog, .ulg, .gpx, .igc, .kml, .kmz), or the autopilot's parameters (.parm, .param)."), element("p", {}, element("label", { for: "pick", class: "hidden" }, "File to open"), pick));
+    box.append(element("h2", {}, "Open"), element("p", { class: "more" }, "Drop a file anywhere, or choose one: a mission (.waypoints, .plan, plan.json), a flight log whose mission is opened (.mcap, .bin, .tlog, .ulg, .gpx with a route, .igc with a task), or the autopilot's parameters (.parm, .param)."), element("p", {}, element("label", { for: "pick", class: "hidden" }, "File to open"), pick));
     if (this.folder) box.append(...this.byPath());
     box.append(element("h2", {}, "Back"), element("p", {}, element("button", { type: "button", disabled: !now?.changed, onclick: () => app.send({ kind: "revert" }) }, "Revert to the file"), element("small", {}, "undo brings the changes back")));
   }

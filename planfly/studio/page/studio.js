@@ -39,12 +39,15 @@ function onSheet(sent) {
   const before = now.sheet, sheet = sent.planning ? unjudged(sent) : sent;
   now.sent = sent;
   const same = sameItems(before, sheet), opened = before && isOther(before, sheet);
-  now.sheet = now.model = sheet;
+  // What was wrong before an edit that was taken is over.
+  if (now.committed) complain("");
+  now.sheet = sheet;
   now.committed = false;
   if (opened) {
     now.flown = null;
     panel.forget();
   }
+  now.model = withFlight(sheet);
   catchUp(before, sheet, same);
   if (hands.onSheet(same, sheet.rev)) hold();
   else {
@@ -206,11 +209,32 @@ function hold() {
   now.model = placed(now.model, now.dragging.k, drop);
 }
 
+const SEVERITY = ["ok", "near", "open", "fail"];
+
+// A sheet with the worse of the states by geometry and by the flight of this very mission.
+function withFlight(sheet) {
+  const { flown } = now;
+  if (!flown || flown.rev !== sheet.rev || sheet.planning) return sheet;
+  const worse = (kind) => sheet.states[kind].map((own, i) => {
+    const other = flown.states[kind][i];
+    return other && SEVERITY.indexOf(other[0]) > SEVERITY.indexOf(own[0]) ? [other[0], `flown: ${other[1]}`] : own;
+  });
+  const both = (kind) => [...new Set([...sheet.violated[kind], ...flown.violated[kind]])];
+  return {
+    ...sheet, states: { legs: worse("legs"), corners: worse("corners") },
+    violated: { threats: both("threats"), zones: both("zones") },
+  };
+}
+
 function onFlown(flown) {
   now.flown = flown;
   now.work.fly = null;
   progress();
   if (now.model) {
+    if (!isStale()) {
+      now.model = now.nudged ? placed(withFlight(now.sheet), now.nudged.k, now.nudged) : withFlight(now.sheet);
+      map.show(now.model);
+    }
     profile.show(now.model, now.world, now.grid, shownFlight());
     map.setTrack(flown.track, isStale());
     scene?.show(now);
@@ -245,6 +269,10 @@ function onFault({ text, job }) {
 function onStopped({ job }) {
   now.work[job] = null;
   progress();
+  if (now.stopping && !Object.values(now.work).some(Boolean)) {
+    now.stopping = false;
+    complain("Stopped; earlier results stay.");
+  }
   answers();
   panel.stopped(job);
   planningEnded(job);
@@ -380,7 +408,7 @@ const app = {
     map.root.classList.remove("dragging");
     $("panel-verdict").classList.remove("before");
     link.settle();
-    now.model = now.sheet;
+    now.model = withFlight(now.sheet);
     drawAll();
     answers();
     app.hint(null);
@@ -487,7 +515,7 @@ const link = new Link({
   stopped: onStopped,
   choices: (message) => panel.choices(message),
   ways: (message) => { now.work.plan = null; progress(); panel.ways(message); answers(); },
-  saved: (message) => { showName(now.sheet.name, message.unsaved); panel.saved(message); },
+  saved: (message) => { complain(""); showName(now.sheet.name, message.unsaved); panel.saved(message); },
   returns: (message) => { now.work.returns = null; progress(); panel.returns(message); },
   campaign: (message) => { now.work.campaign = null; progress(); panel.campaign(message); },
   fault: onFault,
@@ -503,7 +531,10 @@ $("redo").onclick = () => app.send({ kind: "redo" });
 $("fly").onclick = () => app.send({ kind: "fly" });
 $("save").onclick = () => panel.save();
 for (const id of ["geometry", "flown"]) $(id).onclick = () => panel.reveal("verdict");
-$("stop").onclick = () => link.send({ kind: "stop" });
+$("stop").onclick = () => {
+  now.stopping = link.send({ kind: "stop" });
+  if (now.stopping) complain("Stopping \u2026", true);
+};
 for (const [id, factor] of [["zoom-in", 1.5], ["zoom-out", 1 / 1.5]]) {
   $(id).onclick = () => { map.view.zoom(factor, map.view.width / 2, map.view.height / 2); map.layOut(); };
 }

@@ -21,7 +21,7 @@ def test_a_height_that_fails_and_is_mended_is_said_with_its_leg_and_figures() ->
     session.edit(messages.Raise(kind="raise", rev=session.rev, by=-90.0))
     low = figures_of(session, 103.0)
     said = describe_changes(before, low)
-    words = re.compile(r"(leg \d+\u2013\d+): clearance ([\d.]+) m \u2192 ([-\d.]+) m, fails now")
+    words = re.compile(r"(leg to item \d+): clearance ([\d.]+) m \u2192 ([-\d.]+) m, fails now")
     place, was, now = next(found.groups() for line in said if (found := words.fullmatch(line)))
     assert float(was) > 60.0 > float(now)
     assert said[-1] == "3 s longer"
@@ -38,23 +38,23 @@ def test_items_that_have_other_numbers_are_the_same() -> None:
     (east, north, _), (far, further, _) = session.item_position(own[0]), session.item_position(own[1])
     assert [one.place for one in before.results.values() if one.ok is False] == [
         "item 6",
-        "leg 1\u20132",
-        "leg 2\u20133",
+        "leg to item 2",
+        "leg to item 3",
         "item 8",
     ]
     middle = {"east": 0.5 * (east + far), "north": 0.5 * (north + further)}
     session.edit(messages.Insert(kind="insert", rev=session.rev, after=own[0], **middle))
     inserted = figures_of(session)
     assert [re.sub(r"-[\d.]+", "-", line) for line in describe_changes(before, inserted)] == [
-        "leg 1\u20132: slope -\u00b0, fails now",
-        "leg 2\u20133: slope -\u00b0, fails now",
-        "the former leg 1\u20132: slope -\u00b0, is gone",
+        "leg to item 2: slope -\u00b0, fails now",
+        "leg to item 3: slope -\u00b0, fails now",
+        "the former leg to item 2: slope -\u00b0, is gone",
     ]
     session.edit(messages.Delete(kind="delete", rev=session.rev, ks=[edits.movable_indices(session.mission)[1]]))
     assert [re.sub(r"-[\d.]+", "-", line) for line in describe_changes(inserted, figures_of(session))] == [
-        "leg 1\u20132: slope -\u00b0, fails now",
-        "the former leg 1\u20132: slope -\u00b0, is gone",
-        "the former leg 2\u20133: slope -\u00b0, is gone",
+        "leg to item 2: slope -\u00b0, fails now",
+        "the former leg to item 2: slope -\u00b0, is gone",
+        "the former leg to item 3: slope -\u00b0, is gone",
     ]
 
 

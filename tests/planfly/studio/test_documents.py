@@ -9,7 +9,7 @@ import pytest
 from flight.mission_files.formats import mission_text
 from logs.recording.example_log import write_example_log
 from planfly.flight_options import MissionOptions
-from planfly.studio.documents import DROPPED_SUFFIXES, open_dropped, straight_plan
+from planfly.studio.documents import DROPPED_SUFFIXES, open_document, open_dropped, straight_plan
 from planfly.studio.folder import find_file_in_folder, folder_message
 from planner.plan import plan_json
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
@@ -60,7 +60,8 @@ def test_a_file_of_each_suffix_is_opened(suffix: str, tmp_path: Path) -> None:
     write, items = FORMS[suffix]
     data = write(tmp_path / f"a{suffix}").read_bytes()
     assert find_file_in_folder(tmp_path, f"a{suffix}") == tmp_path.resolve() / f"a{suffix}"
-    assert f"a{suffix}" in folder_message(tmp_path)["files"]
+    # Only what can be opened is listed: a .kml and a .kmz have no mission.
+    assert (f"a{suffix}" in folder_message(tmp_path)["files"]) is (items > 0)
     if not items:
         with pytest.raises(PlanflyError, match=f"^A{suffix.upper()}: contains a track but no mission"):
             open_dropped(f"A{suffix.upper()}", data, MissionOptions())
@@ -72,6 +73,15 @@ def test_a_file_of_each_suffix_is_opened(suffix: str, tmp_path: Path) -> None:
     assert (document.name, document.path) == (f"A{suffix.upper()}", None)
 
 
+def test_a_map_of_planflys_own_is_not_listed_and_says_that_it_has_no_mission(tmp_path: Path) -> None:
+    session = drawn_session(8, 10)
+    (tmp_path / "m.kml").write_bytes(session.save("kml").data)
+    (tmp_path / "m.waypoints").write_bytes(session.save("waypoints").data)
+    assert folder_message(tmp_path)["files"] == ["m.waypoints"]
+    with pytest.raises(PlanflyError, match=r"m\.kml: contains a map but no mission: open the mission file"):
+        open_document(str(tmp_path / "m.kml"), MissionOptions(scenario="jacksboro"))
+
+
 def test_no_path_leads_out_of_the_folder(tmp_path: Path) -> None:
     inside = tmp_path / "in"
     (inside / "deeper").mkdir(parents=True)
@@ -81,10 +91,12 @@ def test_no_path_leads_out_of_the_folder(tmp_path: Path) -> None:
     (inside / "notes.md").write_text("", encoding="utf-8")
     for name in ("m.plan", "deeper/m.plan", str(inside / "m.plan")):
         assert find_file_in_folder(inside, name).is_relative_to(inside.resolve())
-    outside = ("../m.plan", "deeper/../../m.plan", "link.plan", str(tmp_path / "m.plan"), "deeper", "none.plan")
+    outside = ("../m.plan", "deeper/../../m.plan", "link.plan", str(tmp_path / "m.plan"), "deeper", "../none.plan")
     for name in (*outside, "a\0.plan", "/etc/passwd", "."):
         with pytest.raises(MissionError, match=r"expected a file in .*"):
             find_file_in_folder(inside, name)
+    with pytest.raises(MissionError, match=r"name: 'none.plan': no such file in .*/in$"):
+        find_file_in_folder(inside, "none.plan")
     with pytest.raises(MissionError, match=r"suffix: '.md': allowed"):
         find_file_in_folder(inside, "notes.md")
     with pytest.raises(MissionError, match="drop the file here"):

@@ -7,11 +7,12 @@ import pytest
 from planfly.flight_options import MissionOptions
 from planfly.studio import jobs as jobs_module
 from planfly.studio import messages
-from planfly.studio.documents import open_document
+from planfly.studio.documents import open_document, straight_plan
 from planfly.studio.jobs import FLIGHT_WORKER, LONG_WORKER, Jobs
 from planfly.studio.pilot import Answer, Task
 from planfly.studio.session import Session
 from planfly.studio.worker_tasks import fly, try_suggestions
+from planner.search.plan_front import FrontPlan
 from tests.planfly.studio.drafts import drawn_session
 from world.errors import MissionError
 
@@ -126,3 +127,34 @@ def test_trials_end_when_other_work_comes() -> None:
 
     with pytest.raises(Ended):
         try_suggestions((session.context, flown["judged"]), other)
+
+
+def test_paths_that_were_found_can_be_chosen_after_another_search_was_stopped(jobs: Jobs) -> None:
+    session = Session.from_document(open_document("hard-07", MissionOptions()), MissionOptions())
+    plan = straight_plan(session.context.scenario, 3)
+    found = [FrontPlan(plan, 1.0, 0.0, 1.0, 1.0, 1.0)] * 2
+    jobs.plan(messages.Plan(kind="plan", ways=2), session)
+    (first,) = asked(jobs, LONG_WORKER)
+    (shown,) = jobs.handle_answer(LONG_WORKER, Answer(first.number, "done", found), session)
+    assert len(shown["ways"]) == 2
+    jobs.plan(messages.Plan(kind="plan", ways=2), session)
+    second = asked(jobs, LONG_WORKER)[-1]
+    stopped = jobs.handle_answer(LONG_WORKER, Answer(second.number, "cancelled"), session)
+    assert stopped == [{"kind": "stopped", "job": "plan"}]
+    session.replace_plan(messages.Choose(kind="choose", rev=session.rev, which=1))
+    assert session.sheet()["undo"] == "plan with seed 3"
+
+
+def test_paths_between_items_replace_the_items_of_their_own_search(jobs: Jobs) -> None:
+    """Also if another search, of the whole mission, was begun and stopped since."""
+    session = drawn_session(8, 8)
+    plan = straight_plan(session.context.scenario, 3)
+    jobs.plan(messages.Plan(kind="plan", first=0, last=2), session)
+    jobs.handle_answer(
+        LONG_WORKER,
+        Answer(asked(jobs, LONG_WORKER)[-1].number, "done", [FrontPlan(plan, 1.0, 0.0, 1.0, 1.0, 1.0)]),
+        session,
+    )
+    jobs.plan(messages.Plan(kind="plan"), session)
+    jobs.handle_answer(LONG_WORKER, Answer(asked(jobs, LONG_WORKER)[-1].number, "cancelled"), session)
+    assert session.plans == ([plan], (0, 2))

@@ -357,6 +357,8 @@ def test_a_suggestion_is_applied_by_its_button(page: Browser) -> None:
     page.value("document.getElementById('tab-verdict').click()")
     failed = int(page.value("document.querySelectorAll('#panel-verdict li[data-state=fail]').length"))
     assert failed
+    # Where the flight fails, too, a change is offered once it was flown.
+    page.wait_for("document.querySelector('#panel-verdict .apply') !== null", 150.0)
     page.value("document.querySelector('#panel-verdict .apply').click()")
     page.wait_for("document.getElementById('undo').title.startsWith('Undo: apply a suggestion')")
     undo_all(page)
@@ -371,6 +373,55 @@ def test_a_suggestion_of_the_flight_is_offered_once_it_was_flown_and_applied(pag
     page.wait_for(f"{apply} && document.getElementById('stop').hidden", 150.0)
     page.value(f"{apply}.click()")
     page.wait_for("document.getElementById('undo').title === 'Undo: apply a suggestion of the flight'")
+    undo_all(page)
+
+
+def test_the_map_has_the_worse_colour_of_geometry_and_flight(page: Browser, studio: Studio) -> None:
+    """80 m lower the flight ends in the ground before an item whose corner passes by geometry."""
+    page.value("document.getElementById('tab-items').click()")
+    page.value("document.getElementById('raise-by').value = 80")
+    page.value("[...document.querySelectorAll('#panel-items button')].find((b) => b.textContent === 'Lower').click()")
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: lower all')")
+    with Served(studio.address).page() as program:
+        sheet = program.until("sheet")
+        flown = program.until("flown", rev=sheet["rev"])
+    corners = [[state for state, _ in one["states"]["corners"]] for one in (sheet, flown)]
+    failing = [k for k, *pair in zip(sheet["of"], *corners, strict=True) if pair == ["ok", "fail"]]
+    assert failing
+    look = f"document.querySelector('.mark[data-k=\"{failing[0]}\"]').getAttribute('class')"
+    page.wait_for(f"{look}.includes('fail')")
+    undo_all(page)
+    page.wait_for(f"!{look}.includes('fail')")
+
+
+def test_one_place_has_one_suggestion(page: Browser) -> None:
+    """A place that fails by geometry and in flight offers the change that was flown."""
+    page.value("document.getElementById('tab-verdict').click()")
+    page.wait_for("document.querySelector('#panel-verdict .apply') && document.getElementById('stop').hidden", 150.0)
+    places = page.value(
+        "[...document.querySelectorAll('#panel-verdict .findings:not(.passed) > li')].filter((one) =>"
+        " one.querySelector('.apply')).map((one) => one.querySelector('p').textContent)"
+    )
+    assert places
+    assert len(places) == len(set(places))
+
+
+def test_stop_and_a_mended_error_are_said(page: Browser) -> None:
+    page.value("document.getElementById('tab-verdict').click()")
+    message = "document.getElementById('message')"
+    page.value("document.querySelector('[data-job=campaign]').click()")
+    # The button shows at once that its work has begun.
+    page.wait_for("document.querySelector('[data-job=campaign]').dataset.share !== undefined", 2.0)
+    page.value("document.getElementById('stop').click()")
+    page.wait_for(f"{message}.textContent === 'Stopped; earlier results stay.'", 60.0)
+    page.value("document.getElementById('tab-files').click()")
+    page.value("document.getElementById('open-path').value = 'nope.waypoints'")
+    page.value("document.getElementById('open-path').focus()")
+    page.key("Enter")
+    page.wait_for(f"{message}.textContent.includes(\"'nope.waypoints': no such file in\")")
+    drag(page, centre(page, ".mark .dot", 1), (20.0, 10.0))
+    page.wait_for("document.getElementById('undo').title.startsWith('Undo: move')")
+    assert page.value(f"{message}.hidden")
     undo_all(page)
 
 

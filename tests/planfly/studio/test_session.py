@@ -233,6 +233,31 @@ def test_settings_and_a_planned_path_are_there_after_the_server_died(tmp_path: P
     assert fourth.mission.items == third.mission.items
 
 
+def test_parameters_are_there_after_the_mission_was_saved_over_its_file(tmp_path: Path) -> None:
+    file, kept, world = tmp_path / "m.waypoints", tmp_path / "m.json", MissionOptions(scenario="jacksboro-air")
+    file.write_text(mission_text(drawn_session(8, 10).mission, "waypoints"), encoding="utf-8")
+    session, _ = open_session(str(file), world, kept)
+    session.edit(messages.Raise(kind="raise", rev=session.rev, by=10.0 / 3.0))
+    session.change_settings(messages.Settings(kind="settings", parameter="RTL_ALTITUDE=700"))
+    session.autosave(kept)
+    session.overwrite_file()
+    session.autosave(kept)
+    again, restored = open_session(str(file), world, kept)
+    assert restored
+    assert again.settings_json() == session.settings_json()
+    assert "RTL_ALTITUDE" in json.dumps(again.settings_json())
+    # Its mission is that of the file, so there is nothing to save or undo.
+    assert (again.is_unsaved, again.undo_text) == (False, "")
+    # An edit after that is restored as one, once; a file that another program wrote is another mission.
+    again.edit(messages.Raise(kind="raise", rev=again.rev, by=5.0))
+    again.autosave(kept)
+    third, _ = open_session(str(file), world, kept)
+    assert third.mission.items == again.mission.items
+    assert third.undo_text
+    file.write_text(mission_text(drawn_session(9, 10).mission, "waypoints"), encoding="utf-8")
+    assert not open_session(str(file), world, kept)[1]
+
+
 def test_what_cannot_be_set_any_more_leaves_the_edits(tmp_path: Path) -> None:
     session = drawn_session(8, 10)
     session.change_settings(messages.Settings(kind="settings", wind_speed=9.0))
