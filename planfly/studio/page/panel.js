@@ -127,9 +127,12 @@ export class Panel {
       box.append(part);
     }
     const flownFailed = flight && !stale ? this.listed(flight.findings, true) : [];
-    // A place that the flight has judged, too, is listed with the change that was flown, once there is one.
-    const better = flownFailed.length ? flight.findings.filter((one) => one.ok !== true && (one.suggestions.length || this.app.now.work.trials)) : [];
-    const failed = this.listed(now.findings.filter((one) => !better.some((other) => other.rule === one.rule && other.where === one.where)), false);
+    // A place that the flight has judged, too, is listed there, unless only the geometry has a change to offer.
+    const flownToo = (one) => flownFailed.length && flight.findings.find((other) => other.ok !== true && other.rule === one.rule && other.where === one.where);
+    const failed = this.listed(now.findings.filter((one) => {
+      const other = flownToo(one);
+      return !other || (one.suggestions.length && !other.suggestions.length && !this.app.now.work.trials);
+    }), false);
     if (failed.length) box.append(element("h2", {}, "What fails"), element("ul", { class: "findings" }, ...failed));
     if (flownFailed.length) {
       const trying = this.app.now.work.trials ? element("p", { class: "more" }, "Changes that would help are being flown \u2026") : null;
