@@ -664,7 +664,14 @@ class _ItineraryBuilder:
     def _add_stop(self, item: MissionItem) -> None:
         """Add the stop of a waypoint or loiter, with notes on the parts that are not flown as written."""
         name = command_name(item.command)
-        if not item.has_position and loiter_of(item) is not None and self.stops:
+        is_later_loiter = loiter_of(item) is not None and bool(self.stops)
+        if is_later_loiter and item.alt == 0.0 and item.frame in OVER_HOME | OVER_TERRAIN:
+            # `Location::sanitize`, which ArduPlane's `do_loiter_*` call, takes such an altitude for the present one.
+            text = f"{name} at a height of 0 m: flown at the altitude of the item before, which ArduPlane keeps"
+            self.notes.arduplane.add(text, item.seq)
+            self.add_open_item(text, item.seq, arduplane=False)
+            item = replace(item, alt=math.nan)
+        if not item.has_position and is_later_loiter:
             text = f"{name} without a position: flown around the previous position"
             self.notes.arduplane.add(text, item.seq)
             # PX4 reads 0, 0 as a position.

@@ -78,6 +78,7 @@ _NEUTRAL = {
     "SYS_HAS_GPS": _NeutralRange(1.0, math.inf, by_program=False),
     "SYS_HITL": _NeutralRange(0.0, 0.0, by_program=False),
     "COM_ARMABLE": _NeutralRange(1.0, math.inf, by_program=False),
+    "COM_ARM_AUTH_REQ": _NeutralRange(-math.inf, 0.0, by_program=False),
     # Altitude from range finder or vision.
     "EKF2_HGT_REF": _NeutralRange(0.0, 1.0, by_program=False),
 }
@@ -270,7 +271,9 @@ class Px4(Autopilot):
                     yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not simulated"
 
     def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
-        """Return the failsafe from COM_LOW_BAT_ACT and BAT_CRIT_THR, which PX4's own program does not get.
+        """Return the failsafe that leaves the mission first, which PX4's own program does not get.
+
+        COM_LOW_BAT_ACT acts at BAT_CRIT_THR and at BAT_EMERGEN_THR, which `Battery::determineWarning` tests first.
 
         >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
         >>> Px4(made).checks.battery_failsafes[0].used_charge
@@ -279,11 +282,12 @@ class Px4(Autopilot):
         parameters = self.parameters
         if parameters["COM_LOW_BAT_ACT"] not in _LEAVE_AT_CRITICAL_CHARGE:
             return ()
-        threshold, capacity = parameters["BAT_CRIT_THR"], parameters["BAT1_CAPACITY"]
+        name = max("BAT_CRIT_THR", "BAT_EMERGEN_THR", key=lambda threshold_name: parameters[threshold_name])
+        threshold, capacity = parameters[name], parameters["BAT1_CAPACITY"]
         if capacity > 0.0:
-            return (BatteryFailsafe("BAT_CRIT_THR", threshold, (1.0 - threshold) * capacity),)
+            return (BatteryFailsafe(name, threshold, (1.0 - threshold) * capacity),)
         # Without a capacity the charge is estimated from the voltage.
-        return (BatteryFailsafe("BAT_CRIT_THR", threshold, remaining_fraction=threshold),)
+        return (BatteryFailsafe(name, threshold, remaining_fraction=threshold),)
 
     @property
     def turns(self) -> TurnRules:

@@ -72,9 +72,14 @@ def _describe_estimate(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe a control allocation that moves no ailerons, no elevator or no motor, if the file states it."""
+    """Describe a control allocation of the file that is not a fixed wing's, or lacks ailerons, elevator or motor.
+
+    A release before control allocation (SYS_CTRL_ALLOC 0) states no airframe.
+    """
     stated = parameters.by_origin("file")
     if parameters["CA_AIRFRAME"] != _FIXED_WING:
+        if "CA_AIRFRAME" in stated and parameters["SYS_CTRL_ALLOC"] != 0.0:
+            yield f"CA_AIRFRAME {parameters['CA_AIRFRAME']:g} moves no surfaces of a fixed wing, which is not simulated"
         return
     if stated.get("CA_ROTOR_COUNT", 1.0) == 0.0:
         yield "CA_ROTOR_COUNT 0 leaves no motor, which is not simulated"

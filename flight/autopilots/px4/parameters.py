@@ -172,9 +172,11 @@ OUTPUT_FUNCTION_NAMES = tuple(
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
     "BAT_CRIT_THR": 0.07,
+    "BAT_EMERGEN_THR": 0.05,
     "BAT1_CAPACITY": -1.0,
     "CBRK_FLIGHTTERM": 121212.0,
     "COM_FLTT_LOW_ACT": 0.0,
+    "COM_ARM_AUTH_REQ": 0.0,
     "COM_LOW_BAT_ACT": 0.0,
     "COM_WIND_MAX": -1.0,
     "COM_WIND_MAX_ACT": 0.0,
@@ -202,6 +204,7 @@ _WHEN_STATED = {
     "GPS_1_CONFIG": 201.0,
     # Surfaces and motors.
     **dict.fromkeys(("CA_AIRFRAME", "CA_ROTOR_COUNT", "CA_SV_CS_COUNT"), 0.0),
+    "SYS_CTRL_ALLOC": 1.0,
     **{f"CA_SV_CS{surface}_TYPE": 0.0 for surface in range(8)},
     **{f"CA_SV_CS{surface}_TRQ_{axis}": 1.0 for surface in range(8) for axis in "RP"},
     **dict.fromkeys(SLEW_NAMES, 0.0),

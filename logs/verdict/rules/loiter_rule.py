@@ -130,25 +130,41 @@ def merge_loiter_findings(
 def end_loiter_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Before a flight, judge the hazards around the place where the autopilot loiters after the mission's end.
+    """Judge the loiter without end after the last waypoint.
 
-    Return [] if the mission does not end in this way, or after a flight.
+    It fails if the wind is too strong for a circle, since the aircraft then drifts downwind without end.  Before a
+    flight, the hazards around the circle are judged, too; a flight flies it once.
+
+    Return [] if the mission does not end in this way.
     """
-    hazards = end_loiter_hazards(requirements) if geometric else None
-    if hazards is None:
+    reach_and_hazards = end_loiter_hazards(requirements)
+    if reach_and_hazards is None:
         return []
-    reach, descriptions = hazards
-    reason = f"{requirements.setup.autopilot.title} then circles here, up to {reach:.0f} m from this waypoint"
-    if descriptions:
-        reason += f": {', '.join(descriptions)}; only a simulated flight shows how close the aircraft comes"
+    reach, hazards = reach_and_hazards
+    title, place = requirements.setup.autopilot.title, requirements.waypoint(requirements.legs)
+    if not math.isfinite(reach):
+        fault = message(
+            f"{title} then circles here without end, and the wind is too strong to fly a circle",
+            f": at {float(requirements.route.airspeed[-1]):.1f} m/s the aircraft drifts downwind",
+        )
+        return [
+            make_finding(
+                *("loiter", place), ok=False, reason=fault.text, faults=[fault], method="wind and airspeed at the end"
+            )
+        ]
+    if not geometric:
+        return []
+    reason = f"{title} then circles here, up to {reach:.0f} m from this waypoint"
+    if hazards:
+        reason += f": {', '.join(hazards)}; only a simulated flight shows how close the aircraft comes"
     return [
         make_finding(
             "loiter",
-            requirements.waypoint(requirements.legs),
-            ok=None if descriptions else True,
+            place,
+            ok=None if hazards else True,
             reason=reason,
             method="the area that its circles may reach, at the altitude of the last waypoint",
-            check=UNKNOWN_PATH if descriptions else "",
+            check=UNKNOWN_PATH if hazards else "",
         )
     ]
 

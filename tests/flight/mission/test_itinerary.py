@@ -182,6 +182,19 @@ def test_jumps_to_nowhere_or_too_often_are_refused() -> None:
     assert "more than 200,000 items" in refusal(wp(0, 0), wp(0, 900), "2 177 3 999999 0 0 0 0 0")
 
 
+@pytest.mark.parametrize("command", [17, 18, 19, 31])
+@pytest.mark.parametrize(("frame", "keeps"), [(3, True), (10, True), (0, False)])
+def test_a_loiter_at_a_height_of_0_keeps_the_altitude_of_the_item_before(
+    command: int, frame: int, keeps: bool
+) -> None:
+    """ArduPlane's `Location::sanitize` takes a relative altitude of 0 for the present one; home is at 300 m."""
+    loiter = wp(0, 1500, 0, command=command, p="1 0 0 0", frame=frame)
+    made = route(wp(0, 500, 150), loiter, wp(0, 5000, 150), terrain=ground())
+    altitudes = made.waypoints[made.items == 2, 2]
+    assert bool(np.allclose(altitudes, 450.0, atol=0.02)) is keeps
+    assert any("at a height of 0 m" in note for note in made.notes) is keeps
+
+
 def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     home = route(wp(0, 500, 150), wp(0, 1500, 200), "0 20 0 0 0 0 0 0 0", wp(5, 5))
     # Home is at 300 m, and 100 m over it is where planfly's guidance comes home.

@@ -126,6 +126,8 @@ def test_a_predicted_breach_of_the_missions_fence_leaves_the_verdict_open(
         ({"COM_LOW_BAT_ACT": 2.0, "BAT1_CAPACITY": 4000.0, "BAT_CRIT_THR": 0.25}, 3000.0),
         ({"COM_LOW_BAT_ACT": 3.0}, float("nan")),  # by the voltage
         ({"COM_LOW_BAT_ACT": 0.0, "BAT1_CAPACITY": 4000.0}, None),
+        # `Battery::determineWarning` tests the emergency threshold first.
+        ({"COM_LOW_BAT_ACT": 3.0, "BAT1_CAPACITY": 4000.0, "BAT_EMERGEN_THR": 0.5}, 2000.0),
     ],
 )
 def test_a_critical_charge_leaves_the_mission_by_com_low_bat_act(values: dict[str, float], used: float | None) -> None:

@@ -94,7 +94,11 @@ def test_px4s_defaults_leave_nothing_open_stated_or_not(name: str) -> None:
         ("PWM_MAIN_FUNC1 101\nPWM_MAIN_FUNC2 0", "the output functions (PWM_MAIN_FUNC1 and others) connect no surface"),
         ("PWM_AUX_FUNC1 201\nPWM_AUX_FUNC2 202", "the output functions (PWM_MAIN_FUNC1 and others) connect no motor"),
         ("PWM_MAIN_FUNC1 201\nUAVCAN_EC_FUNC1 101", ""),
-        ("CA_AIRFRAME 0\nCA_ROTOR_COUNT 0", ""),  # of a release before control allocation
+        ("CA_AIRFRAME 0\nCA_ROTOR_COUNT 0", "CA_AIRFRAME 0 moves no surfaces"),
+        ("CA_AIRFRAME 9", "CA_AIRFRAME 9 moves no surfaces"),
+        ("CA_AIRFRAME 0\nSYS_CTRL_ALLOC 0", ""),  # of a release before control allocation
+        ("COM_ARM_AUTH_REQ 1", "COM_ARM_AUTH_REQ 1"),
+        ("COM_ARM_AUTH_REQ 0", ""),
     ],
 )
 def test_what_leaves_no_position_or_control(text: str, name: str) -> None:

@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.loiter_rule import loiter_circles
-from tests.logs.verdict.judging import of
+from tests.logs.verdict.judging import judge, of
 from tests.mission_lines import setup_of, wp
+from tests.synthetic import fly_path
 
 
 def loiter(radius: float, wind: float = 0.0) -> FlightSetup:
@@ -53,3 +56,17 @@ def test_legs_of_a_circle_give_the_worst_of_each_rule() -> None:
         assert len(there) == 1
         numbers = [one.place.number for one in verdict.findings if one.rule == rule]
         assert numbers == list(range(len(set(setup.route.stops.tolist())) - 1))
+
+
+@pytest.mark.parametrize(("wind", "fails"), [(20.0, False), (26.0, True)])
+def test_px4_drifts_from_the_circle_after_the_last_waypoint_in_a_wind_above_its_airspeed(
+    wind: float, fails: bool
+) -> None:
+    """25 m/s of airspeed; the flight itself, downwind over both legs, passes all other rules."""
+    setup = replace(setup_of(wp(0, 500), wp(0, 2500), wp(0, 4500)), autopilot=Px4(Px4Parameters.defaults()))
+    scenario = replace(setup.scenario, wind=replace(setup.scenario.wind, speed=wind, from_course=3.14159))
+    setup = replace(setup, scenario=scenario, limits=replace(setup.limits, wind=scenario.wind))
+    for verdict in (judge(setup, fly_path(setup)), judge_geometry(setup)):
+        failed = [one for one in verdict.findings if one.rule == "loiter" and one.ok is False]
+        assert bool(failed) is fails
+        assert all("the wind is too strong to fly a circle" in one.reason for one in failed)
