@@ -184,9 +184,7 @@ def test_jumps_to_nowhere_or_too_often_are_refused() -> None:
 
 @pytest.mark.parametrize("command", [17, 18, 19, 31])
 @pytest.mark.parametrize(("frame", "keeps"), [(3, True), (10, True), (0, False)])
-def test_a_loiter_at_a_height_of_0_keeps_the_altitude_of_the_item_before(
-    command: int, frame: int, keeps: bool
-) -> None:
+def test_a_loiter_at_a_height_of_0_keeps_the_altitude_of_the_item_before(command: int, frame: int, keeps: bool) -> None:
     """ArduPlane's `Location::sanitize` takes a relative altitude of 0 for the present one; home is at 300 m."""
     loiter = wp(0, 1500, 0, command=command, p="1 0 0 0", frame=frame)
     made = route(wp(0, 500, 150), loiter, wp(0, 5000, 150), terrain=ground())
