@@ -448,15 +448,16 @@ def _read_item(item: _Item, index: int, source: str) -> MissionItem:
 
 
 def _read_home(values: list[float | None] | None, source: str) -> Home | None:
-    """Return the planned home, or None if it is missing or at 0, 0; a missing altitude is 0."""
+    """Return the planned home, or None if it is missing or at 0, 0; a missing altitude is NaN."""
     if values is None or values[0] is None or values[1] is None:
         return None
-    lat, lon, alt = values[0], values[1], values[2] or 0.0
-    home_item = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, alt + 0.0)
+    lat, lon, alt = values[0], values[1], math.nan if values[2] is None else values[2] + 0.0
+    known_alt = 0.0 if math.isnan(alt) else alt
+    home_item = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, known_alt)
     problem = item_problem(home_item)
     if problem is not None:
         raise MissionError(**problem.at(source, f"{source}: mission.plannedHomePosition"))
-    return Home(round_to_grid(lat), round_to_grid(lon), alt + 0.0) if home_item.has_position else None
+    return Home(round_to_grid(lat), round_to_grid(lon), alt) if home_item.has_position else None
 
 
 def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:

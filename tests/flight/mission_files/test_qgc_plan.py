@@ -1,6 +1,7 @@
 """QGroundControl's complex items: read as the simple items that they stand for, or refused by name."""
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -199,6 +200,15 @@ def test_items_are_counted_by_their_order_and_jumps_go_to_the_item_named() -> No
     assert [item.seq for item in mission.items] == [1, 2, 3]
     assert mission.items[2].params[0] == 2.0
     assert mission.warnings == ("a.plan: doJumpId is not 1 to 3: items are counted by their order",)
+
+
+@pytest.mark.parametrize(("altitude", "known"), [(None, False), (0.0, True), (310.0, True)])
+def test_a_home_without_an_altitude_is_not_at_sea_level(altitude: float | None, known: bool) -> None:
+    data = plan_data()
+    data["mission"]["plannedHomePosition"] = [36.5, -84.2, altitude]
+    home = parse_mission(json.dumps(data), "a.plan").home
+    assert home is not None
+    assert home.alt == altitude if known else math.isnan(home.alt)
 
 
 # ----------------------------------------------------------------------
