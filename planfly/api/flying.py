@@ -281,7 +281,7 @@ def _prepare_log_file(
     Raises PlanflyError for a file that cannot be written, and for an existing file without `overwrite`.
     """
     source = None if isinstance(mission, Plan) else Path(mission)
-    target = file_target(log, setup.name, setup.seed, overwrite=overwrite, source=source)
+    target = file_target(log, setup.name, setup.seed, suffix=".mcap", overwrite=overwrite, source=source)
     if program is not None:
         check_output_file(autopilot_log(target, program), overwrite, source)
     target.parent.mkdir(parents=True, exist_ok=True)

@@ -211,7 +211,7 @@ def _plan_target(
         return None
     source_file = None if isinstance(source, Scenario) else Path(source)
     seed = choose_seed(world, options["seed"])
-    return file_target(out, world.name, seed, overwrite=overwrite, source=source_file)
+    return file_target(out, world.name, seed, suffix=".json", overwrite=overwrite, source=source_file)
 
 
 def _write_plan(plan: Plan, target: Path | None) -> Plan:

@@ -147,12 +147,18 @@ def expand_path_pattern(target: str | Path, name: str, seed: int) -> Path:
     return Path(str(target).replace("{name}", safe_name).replace("{seed}", str(seed)))
 
 
-def file_target(target: str | Path, name: str, seed: int, *, overwrite: bool, source: Path | None = None) -> Path:
+def file_target(
+    target: str | Path, name: str, seed: int, *, suffix: str, overwrite: bool, source: Path | None = None
+) -> Path:
     """Return the file to write, after the checks of `check_output_file`.
 
     A pattern whose folder does not exist is not checked; the caller makes the folder.
+    suffix: suffix that the file must have, because its format does not depend on its name.
     """
     path = expand_path_pattern(target, name, seed)
+    if path.suffix.lower() != suffix:
+        allowed = f"expected a {suffix} file; planfly.export writes other formats"
+        raise PlanflyError(f"{path}: {allowed}", file=path, field="suffix", value=path.suffix, allowed=allowed)
     if path.parent.exists() or not is_pattern(target):
         check_output_file(path, overwrite, source)
     return path

@@ -7,6 +7,7 @@ height above ground, more distance from radars, and time or energy instead of le
 constraints of a search, and every plan of the front has its own certificate.
 """
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -34,6 +35,7 @@ from planner.seeding.first_samples import bridge_modes
 from planner.seeding.shortening import resample, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from world.arrays import Floats
+from world.html_table import html_table
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
 
@@ -92,6 +94,7 @@ class FrontPlan:
     """Plan of a front, and its values in SI units: m, s, m, s, J (NaN if the aircraft's power is unknown).
 
     exposure: density of detection by radars, integrated over the flight time; not the time inside their range.
+    clearance: minimum height above ground; `Certificate.clearance` is this less the required clearance.
     """
 
     plan: Plan
@@ -126,8 +129,25 @@ class Front:
     refused: int = 0
     ended: str = "completed"
 
+    def _repr_html_(self) -> str:
+        """Return an HTML table of the plans for notebooks."""
+        head = ("plan", "length, km", "exposure, s", "above ground at least, m", "energy, Wh", "time, s")
+        rows = [
+            (
+                number,
+                f"{plan.length / 1000.0:.3f}",
+                f"{plan.exposure:.2f}",
+                f"{plan.clearance:.1f}",
+                f"{plan.energy / 3600.0:.2f}" if math.isfinite(plan.energy) else "unknown",
+                f"{plan.time:.1f}",
+            )
+            for number, plan in enumerate(self.plans, 1)
+        ]
+        name = self.default.plan.scenario.name
+        return html_table(f"Front of {name}: {len(self.plans)} of {self.asked} plans, {self.ended}", rows, head)
+
     def objectives(self) -> Floats:
-        """Return the objectives (n, 4) of the plans; smaller is better for all of them."""
+        """Return length, exposure, negated clearance, and time or energy of the plans, (n, 4); smaller is better."""
         return np.array([_objective_row(plan, self.fourth) for plan in self.plans]).reshape(-1, 4)
 
 

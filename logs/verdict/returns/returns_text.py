@@ -170,9 +170,9 @@ def point_of_no_return_text(returns: Returns) -> str:
     """Describe the point after which the battery no longer permits a return with its reserve.
 
     >>> point_of_no_return_text(Returns((), 1.0, (), 60.0, None, 0.0, True))
-    'point of no return: not judged, because the battery energy is unknown'
+    'point of no return by energy: not judged, because the battery energy is unknown'
     """
-    point, name = returns.point_of_no_return, "point of no return"
+    point, name = returns.point_of_no_return, "point of no return by energy"
     reserve = f"the reserve of {returns.reserve:.0f} Wh"
     match point.kind:
         case "battery":

@@ -211,6 +211,14 @@ def test_bad_input_is_one_line_and_its_data(options: dict[str, object], field: s
     assert field in caught.value.field
 
 
+def test_a_file_is_named_as_its_format(path: planfly.Plan, tmp_path: Path) -> None:
+    with pytest.raises(planfly.PlanflyError, match=r"p\.txt: expected a \.json file; planfly\.export writes other"):
+        planfly.plan("tight", out=tmp_path / "p.txt")
+    with pytest.raises(planfly.PlanflyError, match=r"x\.csv: expected a \.mcap file; planfly\.export writes other"):
+        planfly.fly(path, log=tmp_path / "x.csv")
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_nothing_is_written_for_bad_input(tmp_path: Path) -> None:
     with pytest.raises(planfly.ScenarioError):
         planfly.plan("tight", algorithm="ga", out=tmp_path / "plan.json")

@@ -62,7 +62,7 @@ SCENARIOS = {
     "terrain file missing": edited('kind = "flat"\namsl_m = 100', 'kind = "dem"\npath = "nowhere.tif"'),
     "terrain by URL": edited('kind = "flat"\namsl_m = 100', 'kind = "dem"\npath = "http://example.org/a.tif"'),
     "threat without a weapon": SCENARIO + "[[threats]]\neast_m = 3000\nnorth_m = 3000\n",
-    "threat with half a missile": SCENARIO + "[[threats]]\neast_m = 3000\nnorth_m = 3000\nkill_radius_m = 300\n",
+    "threat with half a missile": SCENARIO + "[[threats]]\neast_m = 3000\nnorth_m = 3000\nkill_scale_m = 300\n",
     "planner algorithm": SCENARIO + '[planner]\nalgorithm = "magic"\n',
     "terrain above the ceiling everywhere": edited('kind = "flat"\namsl_m = 100', 'kind = "flat"\namsl_m = 1000'),
     "population of one": SCENARIO + "[planner]\npopulation = 1\n",

@@ -118,14 +118,14 @@ def test_no_two_names_share_a_folder() -> None:
 
 
 def test_a_patterns_folder_may_be_missing_and_a_named_files_may_not(tmp_path: Path) -> None:
-    made = file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, overwrite=False)
+    made = file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, suffix=".json", overwrite=False)
     assert made == tmp_path / "a-b-c14cdd-3" / "plan.json"
     made.parent.mkdir()
     made.write_text("mine", encoding="utf-8")
     with pytest.raises(PlanflyError, match="overwrite=True replaces it"):
-        file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, overwrite=False)
+        file_target(tmp_path / "{name}-{seed}" / "plan.json", "a/b", 3, suffix=".json", overwrite=False)
     with pytest.raises(PlanflyError, match="does not exist"):
-        file_target(tmp_path / "none" / "plan.json", "a/b", 3, overwrite=True)
+        file_target(tmp_path / "none" / "plan.json", "a/b", 3, suffix=".json", overwrite=True)
 
 
 def test_every_figure_of_a_report_is_cleared_with_it() -> None:

@@ -90,6 +90,16 @@ def test_the_front_offers_what_the_shortest_plan_does_not(front: Front) -> None:
     assert -rows[:, 2].min() > default.clearance + 10.0
 
 
+def test_a_notebook_shows_the_plans_with_units(front: Front) -> None:
+    table = front._repr_html_()
+    assert table.count("<tr>") == 1 + len(front.plans)
+    first = front.plans[0]
+    # Kilometres of metres; the power of this aircraft is not known.
+    row = [f"{first.length / 1e3:.3f}", f"{first.exposure:.2f}", f"{first.clearance:.1f}", "unknown"]
+    assert "".join(f"<td>{text}</td>" for text in row) in table
+    assert f"Front of {front.default.plan.scenario.name}: {len(front.plans)} of {front.asked} plans" in table
+
+
 def test_the_same_seed_gives_the_same_front(scenario: Scenario, limits: Limits, front: Front) -> None:
     again = plan_front(scenario, limits, 6, seed=3, generations=GENERATIONS)
     assert [plan_json(one.plan) for one in again.plans] == [plan_json(one.plan) for one in front.plans]

@@ -18,6 +18,7 @@ from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
 from world.scenario import load_scenario
 
+# Its destination is 100 m beyond the mission's end, so the return after the mission is judged.
 SCENARIO = """
 name = "hill"
 [origin]
@@ -31,7 +32,7 @@ east_m = 0
 north_m = 0
 amsl_m = 600
 [destination]
-east_m = 6500
+east_m = 6600
 north_m = 0
 amsl_m = 600
 [terrain]
