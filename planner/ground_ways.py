@@ -114,7 +114,7 @@ class DepartureAndApproachFile(_FileTable):
     descent: _DescentFile | None = None
 
     def ways(self) -> DepartureAndApproach:
-        """Return the departure and the approach."""
+        """Convert the file's entries to a departure and an approach; each is None if it is missing."""
         climb_file, descent_file = self.climb, self.descent
         climb = descent = None
         if climb_file is not None:

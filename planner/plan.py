@@ -240,7 +240,7 @@ class _PlanFile(_Model):
 
 
 def _finite_or_none(value: float) -> float | None:
-    """Return a number, or None (null in JSON) if it is inf or NaN."""
+    """Return a number, or None (null in JSON) if the number is inf or NaN."""
     return float(value) if np.isfinite(value) else None
 
 

@@ -37,7 +37,7 @@ _LAUNCH_INCLINE_RAD: dict[LaunchMethod, float] = {
 STEEPEST_STRIP_SLOPE = 0.10
 # Smallest width over which the slope across a strip is measured, m.
 _MIN_MEASURED_WIDTH_M = 60.0
-# Release speed of a catapult as a fraction of the slowest level flight, as catapults are usually set.
+# Release speed of a catapult as a multiple of the lowest speed in level flight, as catapults are usually set.
 _CATAPULT_SPEED_RATIO = 1.2
 # Speed of a hand launch, m/s.
 _THROW_SPEED_MPS = 10.0
@@ -70,9 +70,10 @@ class Launch:
         return _LAUNCH_LENGTH_M[self.method] if self.length is None else self.length
 
     def release_speed(self, min_speed: float) -> float:
-        """Return the speed at the end of the launch, m/s; 0 for a runway, where only the motor accelerates.
+        """Return the ground speed at the end of the launch, m/s: the stated speed, or else the method's default.
 
-        min_speed: slowest level flight, m/s.
+        min_speed: lowest speed in level flight, m/s.
+        The default is 0 for a runway, where the aircraft accelerates under its own power.
 
         >>> [Launch(method).release_speed(15.0) for method in ("catapult", "hand", "runway")]
         [18.0, 10.0, 0.0]
@@ -84,7 +85,7 @@ class Launch:
     def acceleration(self, min_speed: float) -> float:
         """Return the mean acceleration along the launch, v^2 / (2 L), m/s^2; 0 for a runway.
 
-        min_speed: slowest level flight, m/s.
+        min_speed: lowest speed in level flight, m/s.
 
         >>> Launch("catapult", speed=10.0, length=6.0).acceleration(15.0).__round__(2)
         8.33
@@ -117,8 +118,9 @@ class LandingStrip:
     height_sd: float | None = None
 
     def landing_course(self, wind: Wind, amsl: float) -> float | None:
-        """Return the landing course, rad: the stated one, or into the wind at ``amsl`` (m AMSL).
+        """Return the landing course, rad: the stated course, or else the course into the wind at ``amsl``.
 
+        amsl: altitude of the wind, m AMSL.
         Returns None if no course is stated and there is no wind: then any course is suitable.
 
         >>> LandingStrip(0.0, 0.0).landing_course(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
@@ -132,9 +134,10 @@ class LandingStrip:
 
 
 def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:
-    """Return the ground slope of a strip along a landing course, and across it to the right, m per m.
+    """Return two ground slopes of a strip, m per m: along a landing course, and across it to the right.
 
-    course: rad.  A slope is the mean between two ends of the strip, or NaN if the ground height at an end is not known.
+    course: rad.  A rising slope is positive.  Each slope is the mean between two opposite ends of the strip, and NaN if
+    the ground height at one of these ends is not known.
     """
     slopes = []
     for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_MEASURED_WIDTH_M, strip.width))):
@@ -174,10 +177,11 @@ class ReturnRequirements:
 def make_home(
     table: HomeTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats, start: Floats
 ) -> Floats | None:
-    """Convert a scenario's [home] table to a position on the ground (3,) m; None without a table.
+    """Convert a scenario's [home] table to a position on the ground, (3,) m; return None if there is no table.
 
-    start: (3,) m, above home if place = "start".  source: name of the file in messages.
-    Raises ScenarioError if home is outside the area (2, 2), or if the ground height there is not known.
+    start: (3,) m; home is below it if place = "start".  source: name of the file in messages.
+    bounds: area of the scenario, (2, 2) m.
+    Raises ScenarioError if home is outside the area, or if the ground height at home is not known.
     """
     if table is None:
         return None
@@ -186,7 +190,7 @@ def make_home(
 
 
 def make_launch(table: LaunchTable | None) -> Launch | None:
-    """Convert a scenario's [launch] table to a launch; None without a table."""
+    """Convert a scenario's [launch] table to a launch; return None if there is no table."""
     if table is None:
         return None
     incline = _LAUNCH_INCLINE_RAD[table.method] if table.incline_deg is None else math.radians(table.incline_deg)
@@ -197,7 +201,7 @@ def make_launch(table: LaunchTable | None) -> Launch | None:
 def make_landing(
     table: LandingTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats
 ) -> LandingStrip | None:
-    """Convert a scenario's [landing] table to a landing strip; None without a table.
+    """Convert a scenario's [landing] table to a landing strip; return None if there is no table.
 
     Raises ScenarioError as `make_home` does.
     """
@@ -213,7 +217,7 @@ def make_landing(
 def make_return_requirements(
     table: ReturnsTable | None, source: str, origin: GeoOrigin, ground: Terrain | None
 ) -> ReturnRequirements | None:
-    """Convert a scenario's [returns] table to RTL requirements; None without a table.
+    """Convert a scenario's [returns] table to RTL requirements; return None if there is no table.
 
     Raises ScenarioError for a rally point that is not above the ground, and for a height above ground at a position
     with unknown ground.
@@ -231,7 +235,7 @@ def make_return_requirements(
 def _position_on_ground(
     key: str, position: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats
 ) -> Floats:
-    """Add the ground height to a position; return it as (3,) m.  Raises ScenarioError as `make_home` does."""
+    """Return a position with its ground height added, (3,) m.  Raises ScenarioError as `make_home` does."""
     check_in_area(key, np.array(position), source, bounds)
     ground_height = float(ground.height(*position)) if ground is not None else math.nan
     if math.isnan(ground_height):

@@ -51,9 +51,9 @@ class _Layout(NamedTuple):
 
 
 def by_reference(cls: _Class) -> _Class:
-    """Let kernels take instances of a class of `typing.NamedTuple` as one pointer, and read its fields.
+    """Return a subclass of a `typing.NamedTuple` class; kernels take its instances as one pointer and read the fields.
 
-    Its fields are numbers, arrays, records and named tuples of these.  Records are copied when the instance is first
+    The fields must be numbers, arrays, records or named tuples of these.  Records are copied when an instance is first
     passed to a kernel.
 
     >>> import numba
@@ -74,7 +74,7 @@ def _get_layout(value: Any) -> _Layout:
     """Return the layout of an instance, made at the first call and stored in the instance."""
     attributes: dict[str, Any] = vars(value)
     if "_layout" not in attributes:
-        tuple_type = _value_type(typeof_impl.dispatch(tuple)(value, None))
+        tuple_type = _replace_references(typeof_impl.dispatch(tuple)(value, None))
         attributes["_layout"] = _Layout(Reference(tuple_type), _lay_out_in_memory(tuple_type, value))
     return attributes["_layout"]
 
@@ -84,8 +84,8 @@ def _instance_address(value: Any) -> int:
     return ctypes.addressof(_get_layout(value).memory)
 
 
-def _value_type(numba_type: Any) -> Any:
-    """Return a numba type with references replaced by their named tuples, as they are laid out in memory."""
+def _replace_references(numba_type: Any) -> Any:
+    """Return a numba type in which each reference is replaced by the named tuple type that it points to."""
     if isinstance(numba_type, Reference):
         return numba_type.tuple_type
     if isinstance(numba_type, types.Array):
@@ -93,7 +93,7 @@ def _value_type(numba_type: Any) -> Any:
         return numba_type.copy(readonly=True)
     if _is_named_tuple(numba_type):
         return types.BaseTuple.from_types(
-            [_value_type(member) for member in numba_type.types], numba_type.instance_class
+            [_replace_references(member) for member in numba_type.types], numba_type.instance_class
         )
     return numba_type
 
@@ -126,7 +126,7 @@ def _lay_out_in_memory(numba_type: Any, value: Any) -> Any:
 
 
 def _find_field(reference: Reference, name: str) -> tuple[int, Any]:
-    """Return the index and type of a field; the type is a pointer if the field's class is marked."""
+    """Return the index and type of a field; the type is a `Reference` if the field's class is marked `by_reference`."""
     index = reference.tuple_type.fields.index(name)
     member = reference.tuple_type.types[index]
     if _is_named_tuple(member) and hasattr(member.instance_class, "_address"):
@@ -150,7 +150,7 @@ class _Field(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, name: str) -> Any:
-    """Generate the code that reads a field, or returns a pointer to a field whose class is marked."""
+    """Generate the code that reads a field; a field whose class is marked `by_reference` is read as a pointer."""
     index, member = _find_field(reference, name)
     field_pointer = cgutils.gep_inbounds(builder, pointer, 0, index)
     if isinstance(member, Reference):

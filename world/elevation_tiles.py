@@ -42,7 +42,7 @@ def tile_files(path: Path) -> list[Path] | None:
     else:
         return None
     if len(files) > MAX_TILES:
-        allowed = f"at most {MAX_TILES} tiles are read; give a folder with those that are needed"
+        allowed = f"at most {MAX_TILES} tiles are read; give a folder with only the needed tiles"
         raise TerrainError.at(path, "tiles", len(files), allowed)
     return files
 
@@ -69,7 +69,7 @@ def _virtual_files(path: Path) -> list[Path]:
         computing_element = element.get("subClass") or (element.tag if element.tag in _ALTERING_ELEMENTS else None)
         if computing_element is not None:
             raise TerrainError(
-                f"{path}: {computing_element} computes its pixels: only a mosaic of files is read", file=path
+                f"{path}: {computing_element} computes pixels: only a plain mosaic of files is read", file=path
             )
     files, folder = [], os.path.normpath(path.parent.absolute())
     for element in sources:
@@ -86,7 +86,7 @@ def _virtual_files(path: Path) -> list[Path]:
 
 
 def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
-    """Join tiles into one raster.  name: its name in messages.
+    """Join tiles into one raster.  name: name of that raster in messages.
 
     Where tiles overlap, the first tile with data is used.  Raises TerrainError for tiles that are not on one grid.
     """
@@ -135,9 +135,9 @@ def _shift_pixels(
 
 
 def _place_on_grid(first: RasterFile, tile: RasterFile) -> tuple[int, int]:
-    """Return row and column of a tile's first pixel on the grid of the first tile.
+    """Return the row and the column of a tile's first pixel on the grid of the first tile.
 
-    Raises TerrainError if the tile is not on this grid.
+    Raises TerrainError if the pixels of both tiles do not coincide, or if their reference systems differ.
     """
     if tile.crs != first.crs:
         allowed = f"all tiles need the reference system of {first.name}"

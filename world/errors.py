@@ -62,9 +62,9 @@ class PlanflyError(Exception):
     def of_argument(
         cls, argument: str, value: Any, allowed: str, *, shown: str | None = None, file: str | Path = ""
     ) -> Self:
-        """Make an error about an argument of a call, by its keyword.
+        """Make an error about an argument of a call, which the message names by its keyword.
 
-        The command line names its option instead.
+        The command line replaces the keyword by the name of its option.
         shown: text of the value in the message; None for its str(), "" to omit it.
         file: file that the argument refers to, if any.
 

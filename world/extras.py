@@ -88,7 +88,7 @@ def require_extra(name: str, needs: str = "") -> None:
 
 
 def _is_installed(module: str) -> bool:
-    """Return True if a module can be imported, without importing it."""
+    """Return True if a module is installed; the module is not imported."""
     try:
         return find_spec(module) is not None
     except (ImportError, ValueError):

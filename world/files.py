@@ -40,9 +40,10 @@ class TextLine(NamedTuple):
 
 
 def read_small_file(path: Path, max_bytes: int, kind: str, error: type[PlanflyError]) -> bytes:
-    """Return the bytes of a file of this kind, which has at most ``max_bytes`` bytes.
+    """Return the bytes of a file that has at most ``max_bytes`` bytes.
 
-    Raises ``error``, in one line, for a file that is missing, larger or not readable.
+    kind: kind of the file in messages, such as "mission".
+    Raises ``error``, in one line, for a file that is missing, too large or not readable.
 
     >>> from world.errors import MissionError
     >>> read_small_file(Path("missing.plan"), 100, "mission", MissionError)
@@ -58,8 +59,9 @@ def read_small_file(path: Path, max_bytes: int, kind: str, error: type[PlanflyEr
 
 
 def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
-    """Return the bytes of a file of this kind, which has at most ``max_bytes`` bytes.
+    """Return the bytes of a file that has at most ``max_bytes`` bytes.
 
+    kind: kind of the file in messages, such as "mission".
     Raises OSError, and ValueError for a larger file and for anything but a plain file: a named pipe without a writer
     would block, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
 
@@ -81,7 +83,7 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
 
 
 def absolute_path(path: Path) -> str:
-    """Return the absolute path of a file or folder with links resolved; a link that leads to itself stays.
+    """Return the absolute path of a file or folder with links resolved; a link that leads to itself is not resolved.
 
     >>> absolute_path(Path("/usr/../none/"))
     '/none'
@@ -118,7 +120,7 @@ def toml_table(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ValueError("tables or arrays within one another without end") from None
+        raise ValueError("tables or arrays are nested too deeply") from None
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
@@ -141,7 +143,7 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
 
 
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
-    """Return the end of a message about an unknown name or key: the most similar known name, or "" without one.
+    """Return the end of a message about an unknown name: a suggestion of the most similar known name, or "".
 
     >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
     (": did you mean 'jacksboro'?", '')
@@ -192,10 +194,11 @@ def write_atomically(path: Path, data: str | bytes) -> None:
 
 
 def write_folder(path: Path, files: Mapping[str, bytes], kept_names: Iterable[str] | None = None) -> None:
-    """Make a folder with files by their paths within it, whole or not at all.
+    """Make a folder with files, completely or not at all.
 
-    kept_names: names of entries that an existing folder keeps when it is replaced; None to replace no folder.
-    Raises OSError, which names the folder, and leaves nothing.
+    files: content of each file, by its path within the folder.
+    kept_names: entries of an existing folder that are kept when the folder is replaced; None to replace no folder.
+    Raises OSError, which names the folder; no partly written folder is left.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as home:
@@ -246,7 +249,7 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
 
 
 def remove_temporary_folders(process_id: int) -> bool:
-    """Remove the folders of `temporary_folder` that a killed process did not remove; return True if there were none.
+    """Remove the folders that a killed process made by `temporary_folder`; return True if there were none.
 
     >>> with temporary_folder("planfly-") as folder:
     ...     remove_temporary_folders(os.getpid()), folder.exists()

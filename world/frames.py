@@ -112,7 +112,7 @@ def crs_transformer(crs: str) -> "Transformer":
 
 
 def height_unit(crs: str) -> tuple[str, float]:
-    """Return the name of a CRS's unit of height and its length in m; ("metre", 1) without one.
+    """Return the name of a CRS's unit of height and its length in m; ("metre", 1) for a CRS without heights.
 
     Raises ValueError for a CRS that PROJ does not know.
     """
@@ -168,7 +168,7 @@ class PolyMap:
         object.__setattr__(self, "record", locked[0])
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-        """Return both components at arrays of positions."""
+        """Return both components of the map at positions, each in the common shape of x and y."""
         xs, ys = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
         components = _evaluate_polymap(self.record, xs.ravel(), ys.ravel())
         return components[0].reshape(xs.shape), components[1].reshape(xs.shape)
@@ -193,7 +193,7 @@ class PolyMap:
 
 
 def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
-    """Make a record of `POLYMAP` with these (n, n) coefficients."""
+    """Make a record of `POLYMAP`.  u, v: coefficients of both components, (n, n) each."""
     size = len(u)
     record = np.zeros(1, dtype=POLYMAP)[0]
     record["centre_x"], record["centre_y"] = centre
@@ -220,17 +220,17 @@ def fit_polymap(
     centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
     half_widths = np.array([max((x1 - x0) / 2, 1e-9), max((y1 - y0) / 2, 1e-9)])
 
-    def grid(count: int) -> tuple[Floats, Floats]:
+    def node_grid(count: int) -> tuple[Floats, Floats]:
         nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
         u, v = np.meshgrid(nodes, nodes)
         return u.ravel(), v.ravel()
 
-    def targets(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    def function_values(u: Floats, v: Floats) -> tuple[Floats, Floats]:
         return function(centre[0] + half_widths[0] * u, centre[1] + half_widths[1] * v)
 
-    nodes_u, nodes_v = grid(14)
-    check_u, check_v = grid(23)
-    node_values, check_values = targets(nodes_u, nodes_v), targets(check_u, check_v)
+    nodes_u, nodes_v = node_grid(14)
+    check_u, check_v = node_grid(23)
+    node_values, check_values = function_values(nodes_u, nodes_v), function_values(check_u, check_v)
     best_map: PolyMap | None = None
     for size in range(2, MAX_TERMS + 1):
         powers = [(i, j) for i, j in itertools.product(range(size), repeat=2) if i + j < size]
@@ -256,7 +256,7 @@ def fit_polymap(
 
 @inlined
 def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:
-    """Evaluate both components of the record of a `PolyMap` at one point, by Horner's scheme."""
+    """Return both components of a polynomial map at one point (x, y), by Horner's scheme.  record: see `PolyMap`."""
     a = (x - record.centre_x) / record.half_x
     b = (y - record.centre_y) / record.half_y
     u = 0.0

@@ -63,6 +63,7 @@ def _open_dataset(file: Path, driver: str) -> Any:
 
 
 def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
+    """Open and check a file with one GDAL driver.  Raises TerrainError; ``failure_text`` says what was expected."""
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
@@ -211,7 +212,10 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Set the heights of blocks that a GeoTIFF does not contain to NaN; GDAL reads 0 without a nodata value."""
+    """Set the heights in blocks that a GeoTIFF omits to NaN, because GDAL reads 0 there if no nodata value is stated.
+
+    top, left: first row and column of ``heights`` in the file.
+    """
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
     for block_row in range(top // rows, -(-bottom // rows)):

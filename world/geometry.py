@@ -17,9 +17,9 @@ MIN_RANGE_M = 1.0
 
 
 def turning_angles(waypoints: ArrayLike) -> Floats:
-    """Return the course change at each inner waypoint, ignoring height (paper eq. 1).
+    """Return the course change at each inner waypoint, rad in [0, pi], shape (..., w - 2) (paper eq. 1).
 
-    waypoints: (..., w, 3) metres.  Returns (..., w - 2) radians in [0, pi].
+    waypoints: (..., w, 3) metres; altitudes are ignored.
     A leg with no horizontal length has no course and gives no turn.
 
     >>> turning_angles([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
@@ -31,9 +31,9 @@ def turning_angles(waypoints: ArrayLike) -> Floats:
 
 
 def signed_turns(waypoints: ArrayLike) -> Floats:
-    """Return the course change at each inner waypoint, (..., w - 2) rad in (-pi, pi], positive to the right.
+    """Return the course change at each inner waypoint, rad in (-pi, pi], positive to the right, shape (..., w - 2).
 
-    waypoints: (..., w, 3) metres; heights are ignored.
+    waypoints: (..., w, 3) metres; altitudes are ignored.
 
     >>> signed_turns([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [-1.5708]
@@ -47,7 +47,9 @@ def signed_turns(waypoints: ArrayLike) -> Floats:
 
 
 def leg_courses(waypoints: ArrayLike) -> Floats:
-    """Return the course of each leg of waypoints (..., w, 3), (..., w - 1) rad clockwise from north in (-pi, pi].
+    """Return the course of each leg, rad clockwise from north in (-pi, pi], shape (..., w - 1).
+
+    waypoints: (..., w, 3) metres.
 
     >>> leg_courses([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [1.5708, 0.0]
@@ -57,7 +59,9 @@ def leg_courses(waypoints: ArrayLike) -> Floats:
 
 
 def leg_runs(waypoints: ArrayLike) -> Floats:
-    """Return the horizontal length of each leg of waypoints (..., w, 3), (..., w - 1) m.
+    """Return the horizontal length of each leg, m, shape (..., w - 1).
+
+    waypoints: (..., w, 3) metres.
 
     >>> leg_runs([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).tolist()
     [1000.0, 1000.0]
@@ -67,7 +71,9 @@ def leg_runs(waypoints: ArrayLike) -> Floats:
 
 
 def leg_slopes(waypoints: ArrayLike) -> Floats:
-    """Return the slope angle of each leg of waypoints (..., w, 3), (..., w - 1) rad, climb positive (paper eq. 3).
+    """Return the slope angle of each leg, rad, climb positive (paper eq. 3), shape (..., w - 1).
+
+    waypoints: (..., w, 3) metres.
 
     >>> leg_slopes([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [0.0, 0.0997]
@@ -77,7 +83,9 @@ def leg_slopes(waypoints: ArrayLike) -> Floats:
 
 
 def path_length(waypoints: ArrayLike) -> Floats:
-    """Return the length in three dimensions of paths of waypoints (..., w, 3), (...,) m.
+    """Return the length of each path in three dimensions, m, shape (...,).
+
+    waypoints: (..., w, 3) metres.
 
     >>> float(path_length([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(2))
     2004.99
@@ -87,7 +95,7 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 def tangent_length(turn: float, radius: float) -> float:
-    """Return the length of leg that a fly-by arc uses on either side of its waypoint, R tan(turn / 2), m.
+    """Return the distance from a waypoint at which a fly-by arc leaves one leg and joins the next, R tan(turn / 2), m.
 
     turn: rad, from 0 to below pi.  radius: m.
 
@@ -124,10 +132,12 @@ def turning_angle(ax: float, ay: float, bx: float, by: float, cx: float, cy: flo
 
 @inlined
 def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[float, float, float]:
-    """Intersect the segment a-b with a sphere; return the distance to its centre, m, and fractions of entry and exit.
+    """Intersect the segment a-b with a sphere.
 
-    a, b, centre: (3,).  Both fractions are in [0, 1], and 0 if the segment stays outside.  A point on the surface is
-    inside (paper eq. 9: d <= R).
+    a, b, centre: (3,) m.
+    Returns the smallest distance from the segment to the centre, m, and the fractions of the segment at which it enters
+    and leaves the sphere, in [0, 1]; both are 0 if the segment stays outside.  A point on the surface is inside (paper
+    eq. 9: d <= R).
     """
     length2 = 0.0
     dot = 0.0
@@ -152,11 +162,12 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
 
 @inlined
 def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale: float) -> tuple[float, float]:
-    """Return the fraction of the segment a-b inside a sphere, and the mean over the segment of (scale/d)^4 inside it.
+    """Return the fraction of the segment a-b inside a sphere, and the segment's exposure to the sphere's centre.
 
-    Exact: with perpendicular distance h (at least `MIN_RANGE_M`) and path coordinate s from the closest point, the
-    integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The exposure follows the paper's eq. 9 and 10,
-    as a density along the path instead of a sum over six points.
+    The exposure is the mean of (scale/d)^4 over the whole segment, with 0 outside the sphere, for the distance d from
+    the centre.  Exact: with perpendicular distance h (at least `MIN_RANGE_M`) and path coordinate s from the closest
+    point, the integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The exposure follows the paper's
+    eq. 9 and 10, as a density along the path instead of a sum over six points.
     """
     _, begin_fraction, end_fraction = sphere_window(a, b, centre, radius)
     if end_fraction <= begin_fraction:
@@ -177,9 +188,11 @@ def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale:
 def window_exposure(
     begin_fraction: float, end_fraction: float, length2: float, dot: float, start2: float, scale: float
 ) -> float:
-    """Return the mean over a segment of (scale/d)^4 between two of its fractions, which `segment_exposure` integrates.
+    """Return the exposure of the part of a segment between two fractions, averaged over the whole segment.
 
-    length2: squared length.  dot: step times (start - centre).  start2: squared distance of the start.
+    See `segment_exposure` for the formula.  length2: squared length of the segment, m^2.  dot: dot product of the
+    segment's vector and the vector from the centre to the segment's start.  start2: squared distance of the start from
+    the centre, m^2.
     """
     if length2 < 1e-12:
         return (end_fraction - begin_fraction) * scale**4 / max(start2, MIN_RANGE_M * MIN_RANGE_M) ** 2

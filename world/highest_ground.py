@@ -15,9 +15,10 @@ from world.terrain import Terrain, segment_clearance
 
 
 def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
-    """Return the highest ground (rows, columns) in square cells, sides included, m; NaN if part of a cell has no data.
+    """Return the highest ground in each square cell, sides included, m: an array of shape (rows, columns).
 
     west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
+    The value is NaN for a cell that is partly without data.
 
     >>> from world.terrain import make_gridded_terrain
     >>> line = np.arange(-100.0, 101.0, 50.0)
@@ -61,7 +62,7 @@ def _fill_cells(
 
 @inner
 def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
-    """Set cell (i, j) of `max_heights` to a height above its value, or to NaN; ignore a cell outside the array."""
+    """Raise the value of cell (i, j) to ``height`` if that is higher or NaN; ignore a cell outside the array."""
     if (
         0 <= i < max_heights.shape[0]
         and 0 <= j < max_heights.shape[1]

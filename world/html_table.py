@@ -5,7 +5,7 @@ from html import escape
 
 
 def html_table(title: str, rows: Iterable[Sequence[object]], head: Sequence[str] = ()) -> str:
-    """Make a table under a title; all text is escaped, so that names of files and missions are only text.
+    """Return the HTML of a table under a title; all text is escaped, so that no name is read as HTML.
 
     head: names of the columns, if any.
 

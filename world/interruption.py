@@ -50,7 +50,7 @@ _state = _State()
 
 
 def interrupt(number: int, _frame: FrameType | None = None) -> None:
-    """Handle a signal by raising `Interrupted`, immediately or at the end of an `delay_signals` block.
+    """Handle a signal by raising `Interrupted`, immediately or at the end of a `delay_signals` block.
 
     >>> import signal
     >>> try:
@@ -66,7 +66,7 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
 
 
 class delay_signals:
-    """Complete the block, then raise `Interrupted` for a signal that arrived in the meantime.
+    """Context manager that completes its block, and then raises `Interrupted` if a signal arrived in the block.
 
     >>> import signal
     >>> try:
@@ -84,7 +84,7 @@ class delay_signals:
         _state.depth += 1
 
     def __exit__(self, *_: object) -> None:
-        """Raise `Interrupted` for a signal that arrived in the meantime."""
+        """Raise `Interrupted` at the end of the outermost block if a signal arrived in the block."""
         _state.depth -= 1
         if _state.pending_signal and not _state.depth:
             number, _state.pending_signal = _state.pending_signal, 0
@@ -133,10 +133,11 @@ def _remove_path(path: Path) -> bool:
 
 @contextlib.contextmanager
 def children_ignore_sigint() -> Iterator[None]:
-    """Block SIGINT in child processes started inside, because Ctrl-C reaches all of them but their parent ends them.
+    """Block SIGINT in child processes that are started in this block.
 
-    This process receives at the end a SIGINT that arrives meanwhile.  Use it with `delay_signals`: if another signal
-    interrupts the start, the child waits for its task and ends with a traceback.
+    Ctrl-C reaches child processes too, but their parent ends them.  This process receives a SIGINT that arrives in the
+    block at the end of the block.  Use it with `delay_signals`: if another signal interrupts the start, the child waits
+    for its task and ends with a traceback.
 
     >>> from multiprocessing import Process
     >>> with children_ignore_sigint():
@@ -160,10 +161,10 @@ def children_ignore_sigint() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
-def end_with_parent(in_service: threading.Event | None = None) -> None:
+def end_with_parent(detects_parent_end: threading.Event | None = None) -> None:
     """Make this child process end at once on SIGTERM and with its parent, and remove its temporary files.
 
-    in_service: event that is set once the process detects by itself that its parent has ended.
+    detects_parent_end: event that is set once the process detects by itself that its parent has ended.
 
     >>> import multiprocessing
     >>> child = multiprocessing.get_context("spawn").Process(target=end_with_parent)
@@ -177,7 +178,7 @@ def end_with_parent(in_service: threading.Event | None = None) -> None:
     def end_after_parent() -> None:
         if parent is not None:
             parent.join()
-            if in_service is None or not in_service.is_set():
+            if detects_parent_end is None or not detects_parent_end.is_set():
                 _end_process(signal.SIGTERM)
 
     threading.Thread(target=end_after_parent, daemon=True).start()

@@ -29,7 +29,7 @@ class CheckedCacheFiles(IndexDataCacheFile):
         self._folder = Path(folder)
 
     def load(self, key: Any) -> Any:
-        """Return the compiled form for a key, or None."""
+        """Return the compiled form for a key, or None if it is not saved or its file is damaged."""
         name = self._load_index().get(key)
         return None if name is None else _read_checked(self._folder / name, repr(key))
 
@@ -57,8 +57,8 @@ class CheckedCacheFiles(IndexDataCacheFile):
             file.write(_compute_digest(label, content) + content)
 
 
-def check_files(dispatcher: Any) -> None:
-    """Let a kernel that numba caches use files with a digest."""
+def use_checked_files(dispatcher: Any) -> None:
+    """Let a kernel that numba caches use files with a digest, `CheckedCacheFiles`."""
     cache = dispatcher._cache
     cache_file = cache._cache_file
     cache._cache_file = CheckedCacheFiles(cache.cache_path, cache._impl.filename_base, cache_file._source_stamp)

@@ -17,7 +17,7 @@ from platformdirs import user_cache_dir
 
 from world.compile_events import COMPILE_TIMER, announce_compilation
 from world.kernel_cache import usable_folder, versioned_folder
-from world.kernel_files import check_files
+from world.kernel_files import use_checked_files
 from world.kernel_saves import CacheWriteLock
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
@@ -115,7 +115,7 @@ def _make_dispatcher(kernel: Any, **options: bool) -> Any:
     # The wrapper for C is only needed to pass a kernel to another one as a value, which no kernel here does.
     dispatcher = njit(cache=_usable_folder is not None, error_model="numpy", no_cfunc_wrapper=True, **options)(kernel)
     if _usable_folder is not None:
-        check_files(dispatcher)
+        use_checked_files(dispatcher)
     return dispatcher
 
 

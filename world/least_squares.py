@@ -15,10 +15,11 @@ _DEPENDENT_NORM_RATIO = 1e-12
 
 
 def least_squares(basis: Floats, values: Floats) -> Floats:
-    """Return the coefficients (k,) that bring basis (n, k) closest to values (n,).
+    """Return the coefficients c, (k,), that minimise the norm of basis c - values.
 
+    basis: (n, k).  values: (n,).
     By modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6).  The coefficient
-    of a column that depends on earlier columns, to 1e-6 of the longest column, is 0.
+    of a column that depends linearly on earlier columns, to 1e-6 of the longest column, is 0.
 
     >>> least_squares(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), np.array([1.0, 3.0, 5.0])).round(9).tolist()
     [1.0, 2.0]

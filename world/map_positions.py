@@ -13,7 +13,7 @@ from world.threats import Threats, threat_label
 
 
 def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, float]:
-    """Return east and north of a position, m."""
+    """Return the east and north coordinates that a table states, in m or degrees, converted to m."""
     if table.east_m is not None and table.north_m is not None:
         return table.east_m, table.north_m
     east, north = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
@@ -21,10 +21,10 @@ def map_coordinates(table: PositionTable, origin: GeoOrigin) -> tuple[float, flo
 
 
 def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
-    """Return east, north, up (3,) m of a position, with the terrain height added to a height above ground.
+    """Return the position that a table states: east, north, altitude AMSL, (3,) m.
 
-    key, source: names of the table and its file in messages.  Raises ScenarioError for a height above ground at a
-    position without terrain.
+    key, source: names of the table and its file in messages.
+    A stated height above ground is added to the terrain height; raises ScenarioError if there is no terrain.
     """
     east, north = map_coordinates(table, origin)
     if table.amsl_m is not None:
@@ -41,7 +41,7 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
 
 
 def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
-    """Raise ScenarioError for a position (2,) or (3,) outside the area (2, 2), m."""
+    """Raise ScenarioError for a position outside the area.  point: (2,) or (3,) m.  bounds: area, (2, 2) m."""
     for axis, name in enumerate(("east", "north")):
         min_coordinate, max_coordinate = bounds[axis]
         if not min_coordinate <= point[axis] <= max_coordinate:
@@ -55,8 +55,9 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
 def check_inside(
     key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
 ) -> None:
-    """Raise ScenarioError for a start or destination (3,) outside the area (2, 2) or floor..ceiling, or in the ground.
+    """Raise ScenarioError for a start or destination outside the area, outside floor..ceiling or not above the ground.
 
+    key, source: names of the point and its file in messages.  point: (3,) m.  bounds: area, (2, 2) m.
     floor, ceiling: m AMSL.
     """
     check_in_area(key, point, source, bounds)
@@ -76,9 +77,9 @@ def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | N
 
 
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
-    """Convert the threats of a scenario file to its map; a threat without a height is on the ground.
+    """Convert the threats of a scenario file to threats on the map; a threat without a height is on the ground.
 
-    Raises ScenarioError for a threat without an altitude AMSL at a position without terrain.
+    Raises ScenarioError for a threat that states no altitude AMSL, at a position without terrain.
     """
     positions = np.zeros((len(tables), 3))
     for k, table in enumerate(tables):

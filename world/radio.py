@@ -58,7 +58,7 @@ class RadioLink:
 
 
 def make_link(table: LinkTable | None, source: str, origin: GeoOrigin, ground: Terrain | None) -> RadioLink | None:
-    """Convert a scenario's [link] table; None without a table.
+    """Convert a scenario's [link] table to a radio link; return None if there is no table.
 
     Raises ScenarioError for a station at a position with unknown ground.
     """
@@ -129,7 +129,7 @@ class PathLoss(NamedTuple):
 
 
 def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathProfile:
-    """Sample the ground between two antennas, (3,) m each, at the spacing of the terrain."""
+    """Sample the ground between two antennas at the spacing of the terrain.  station, aircraft: (3,) m."""
     length = math.dist(station[:2], aircraft[:2])
     count = min(_MAX_PROFILE_POINTS, math.ceil(length / max(1.0, terrain.spacing)))
     fractions = np.arange(1, count) / max(1, count)
@@ -141,7 +141,7 @@ def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathPro
 
 
 def path_loss(profile: PathProfile, station_altitude: float, aircraft_altitude: float, frequency: float) -> PathLoss:
-    """Return the loss over a ground profile.
+    """Return the radio loss between two antennas over a ground profile; NaN if the ground is unknown.
 
     station_altitude, aircraft_altitude: altitudes of the antennas, m AMSL.  frequency: Hz.
     """
@@ -215,7 +215,10 @@ class LinkPoints(NamedTuple):
 
 
 def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> LinkPoints:
-    """Return the link between a station's antenna, (3,) m, and positions of the aircraft, (t, 3) m."""
+    """Compute the radio link between a station and each position of the aircraft.
+
+    station: antenna, (3,) m.  positions: (t, 3) m.
+    """
     losses = [
         path_loss(path_profile(terrain, station, position), float(station[2]), float(position[2]), link.frequency)
         for position in positions

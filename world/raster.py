@@ -49,12 +49,12 @@ _UNZIP_ERRORS = (zipfile.BadZipFile, zlib.error, lzma.LZMAError)
 # Checks for all formats.
 
 
-def grid_in_degrees(
+def make_degree_raster(
     file: Path, name: str, heights: NDArray[np.generic], edges: tuple[float, float, float, float]
 ) -> RasterFile:
-    """Make a raster of heights in one array, rows from north to south, on a grid of longitudes and latitudes.
+    """Make a raster file from an array of heights on a grid of longitudes and latitudes.
 
-    edges: west, east, south and north edge of the outermost pixels, deg.
+    heights: rows from north to south.  edges: west, east, south and north edge of the outermost pixels, deg.
 
     Raises TerrainError for too few or too many pixels, and for edges that are not on the globe.
     """
@@ -106,7 +106,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
         allowed = "expected a 2-D array of numbers"
         shape_text = f"{heights.dtype} of shape {heights.shape}"
         raise TerrainError.at(name, "elevation", heights.shape, allowed, shown=shape_text)
-    return grid_in_degrees(file, name, heights, _edges_in_degrees(edges, heights.shape[0]))
+    return make_degree_raster(file, name, heights, _edges_in_degrees(edges, heights.shape[0]))
 
 
 def _edges_in_degrees(stated_edges: list[float], rows: int) -> tuple[float, float, float, float]:
@@ -164,9 +164,9 @@ _OPENERS: dict[str, Callable[[Path, str], RasterFile]] = {".tif": open_geotiff, 
 
 
 def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
-    """Open an elevation file, a folder or .vrt of tiles, or an embedded name.  Relative paths start at ``base``.
+    """Open an elevation file, a folder or .vrt of tiles, or the built-in file of a name.
 
-    datum: the vertical datum of the heights; None takes the datum that the file states.
+    base: folder of relative paths.  datum: vertical datum of the heights; None for the datum that the file states.
     Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`, and for
     heights above an ellipsoid that this machine cannot convert.
 
@@ -251,10 +251,11 @@ _HOLES_PER_STEP = 2**16
 
 
 def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
-    """Read the window of ``raster`` over map bounds [[e0, e1], [n0, n1]] and a buffer around them, m, as `Terrain`.
+    """Read the part of a raster that covers an area of the map and a buffer around it.
 
-    Raises TerrainError if the bounds extend beyond the tile, if data is missing inside them, or if the window is too
-    large.  The buffer is clipped at the tile's edge without a message.
+    bounds: area, [[e0, e1], [n0, n1]] m.  buffer: width of the buffer, m; it is clipped at the tile's edge without a
+    message.
+    Raises TerrainError if the area extends beyond the tile, if data is missing inside it, or if it has too many pixels.
 
     >>> raster = open_raster("jacksboro")
     >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
@@ -378,7 +379,7 @@ def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
 def _outline_window(
     raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
-    """Return the range of columns and rows that the outline of a map box covers: (col0, col1, row0, row1)."""
+    """Return the range of columns and rows that a map box and a buffer around it cover: (col0, col1, row0, row1)."""
     ramp = np.linspace(0.0, 1.0, 41)
     (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
@@ -396,7 +397,9 @@ def _window_pixels(
 
 
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Return the largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
+    """Return the largest map box, with sides to the east and north, inside the tile: [[e0, e1], [n0, n1]] m.
+
+    Its size is found to within half a percent.
 
     Raises TerrainError if no box fits.
 
@@ -422,7 +425,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 
 
 def cover_text(raster: RasterFile) -> str:
-    """Return the range of latitude and longitude of the tile, for messages.
+    """Return the tile's range of latitudes and longitudes as text, for messages.
 
     >>> cover_text(open_raster("jacksboro"))
     'latitude 36.160..36.446, longitude -84.413..-84.078'

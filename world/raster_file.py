@@ -30,13 +30,14 @@ HIGHEST_GROUND_M = 9000.0
 class RasterFile:
     """Elevation file that was opened and checked; its heights are not read yet.
 
-    to_pixels: map from longitude, latitude (deg) to fractional (col, row) of pixel centres; to_lon_lat: its inverse.
+    to_pixels: function from longitude and latitude (deg) to fractional (col, row) of pixel centres.
+    to_lon_lat: inverse of `to_pixels`.
     shape: (rows, cols).
     corners: (n, 2) longitude, latitude along the outline of the pixel centres, deg.
     grid: affine coefficients (a, b, c, d, e, f) from columns and rows of pixel corners to the reference
         system; to degrees if the file has none.
-    read: rows and columns (top, bottom, left, right), half-open, to a float32 block with NaN for missing data, heights
-    as stored in the file.
+    read: function of a half-open window (top, bottom, left, right) of rows and columns that returns the heights as
+        stored in the file, float32, with NaN for missing data.
     crs: the file's reference system as WKT; None if it has none.
     datum: vertical datum of the heights.
     """
@@ -61,7 +62,7 @@ class RasterFile:
 
 
 def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return a mask of the heights, m, that are ground, and not NaN or a value for missing data.
+    """Return a mask that is True for heights (m) of ground, and False for NaN and values that mark missing data.
 
     >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
     [False, True, False]
@@ -76,7 +77,7 @@ def longitude_near(lon: NDArray[np.float64] | float, centre: float) -> Floats:
 
 
 def outline(cols: int, rows: int) -> tuple[Floats, Floats]:
-    """Return columns and rows, (84,) each, along the outline of a raster's pixel centres."""
+    """Return the columns and rows of points along the outline of a raster's pixel centres, (84,) each."""
     fractions = np.linspace(0.0, 1.0, 21)
     zeros, ones = np.zeros(21), np.ones(21)
     col = np.concatenate([fractions, fractions, zeros, ones]) * (cols - 1)
@@ -95,7 +96,7 @@ def shift_grid(grid: Grid, rows: int, cols: int) -> Grid:
 
 
 def require_min_pixels(name: str | Path, shape: tuple[int, int]) -> None:
-    """Raise TerrainError for too few rows or columns to interpolate heights."""
+    """Raise TerrainError if a raster has too few rows or columns to interpolate heights.  shape: (rows, cols)."""
     if min(shape) < 2:
         raise TerrainError.at(name, "rows, columns", shape, "expected at least 2 x 2 pixels")
 

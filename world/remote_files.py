@@ -84,9 +84,9 @@ class RemoteFile:
         return [(part_begin, part_end) for part_begin, part_end in parts if part_begin < part_end]
 
     def fetch(self, begin: int, end: int, on_bytes: OnBytes = lambda _: None) -> None:
-        """Fetch the missing parts of [begin, end).
+        """Fetch the bytes of [begin, end) that the copy does not contain yet.
 
-        on_bytes: called with the number of bytes of each chunk.
+        on_bytes: function that is called with the size of each received chunk, bytes.
         Raises TerrainError.
         """
         for part_begin, part_end in self.missing_parts(begin, min(end, self.size)):
@@ -150,8 +150,9 @@ class RemoteFile:
 
 
 def find_remote(url: str, folder: Path) -> RemoteFile | None:
-    """Return a file on a server with its copy in the cache; None if the server has no such file.
+    """Find a file on a server; return it with its local copy, or None if the server has no such file.
 
+    folder: cache folder for the copies.
     Raises TerrainError if the server cannot be reached, and OSError if the cache cannot be written.
     """
     answer: http.client.HTTPResponse | None = None
@@ -194,12 +195,12 @@ class _TimedHead(http.client.HTTPConnection):
         """Return the answer after its head has arrived.  Raises OSError if the head does not arrive in time."""
         is_late = threading.Event()
 
-        def cut() -> None:
+        def shut_down_connection() -> None:
             is_late.set()
             with contextlib.suppress(OSError):
                 self.sock.shutdown(socket.SHUT_RDWR)
 
-        timer = threading.Timer(_ANSWER_TIMEOUT_S, cut)
+        timer = threading.Timer(_ANSWER_TIMEOUT_S, shut_down_connection)
         timer.daemon = True
         timer.start()
         try:
@@ -210,7 +211,7 @@ class _TimedHead(http.client.HTTPConnection):
             raise
         finally:
             timer.cancel()
-        # A head that is cut looks like a shorter one.
+        # A truncated head looks like a complete, shorter head.
         if is_late.is_set():
             answer.close()
             raise TimeoutError("timed out")

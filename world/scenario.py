@@ -56,7 +56,7 @@ from world.threats import Threats
 from world.wind import Wind
 
 # ----------------------------------------------------------------------
-# The scenario, from an embedded name, a file, a plan or a log.
+# The scenario, from a built-in name, a file, a plan or a log.
 
 # Radius of a threat below which a note asks for its unit, m; no missile or radar has one as small.
 MIN_PLAUSIBLE_RADIUS_M = 10.0
@@ -68,7 +68,7 @@ _Class = TypeVar("_Class")
 
 
 def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
-    """Let a call with wrong arguments raise an ArgumentError that names the functions that make a scenario."""
+    """Decorate a class: wrong arguments raise an ArgumentError that names the function that makes a scenario."""
     initialise = scenario_class.__init__
 
     @wraps(initialise)
@@ -215,8 +215,9 @@ def embedded_scenarios() -> dict[str, ScenarioFile]:
 
 
 def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
-    """Read a scenario by its embedded name or from a TOML file; ``terrain`` names a file that replaces its terrain.
+    """Read a scenario by its built-in name or from a TOML file.
 
+    terrain: elevation file that replaces the scenario's terrain; None to keep that terrain.
     Raises ScenarioError for a file that is missing or has a fault, and TerrainError for its elevation file.
 
     >>> scenario = load_scenario("tight")
@@ -234,7 +235,7 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
         is_missing = True
     if is_missing:
         suggestion = did_you_mean(name_or_path, [*names, *_sibling_toml_files(path)])
-        message = f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(names)}){suggestion}"
+        message = f"{name_or_path}: no such file, and not a built-in scenario ({', '.join(names)}){suggestion}"
         raise ScenarioError(message, file=name_or_path)
     spec = parse_scenario(read_scenario_text(path), str(path))
     return from_spec(spec, str(path), base=path.parent, terrain=terrain)
@@ -311,7 +312,7 @@ def from_spec(
             ground = _make_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
-    spec = spec.model_copy(update={"flight": _with_whole_paths(spec.flight, base)})
+    spec = spec.model_copy(update={"flight": _with_absolute_paths(spec.flight, base)})
     # Values taken from the tile are stored, so that a log without the tile makes the same scenario.
     origin_table = checked_table(
         lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin"
@@ -325,8 +326,8 @@ def from_spec(
     return _assemble_scenario(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
 
 
-def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
-    """Return the table with absolute paths of the aircraft's folder and the parameter file."""
+def _with_absolute_paths(flight: FlightTable, base: Path | None) -> FlightTable:
+    """Return a copy of the table in which the paths of the aircraft's folder and the parameter file are absolute."""
     changes = {}
     if names_folder(flight.aircraft):
         changes["aircraft"] = absolute_path(Path(base or "", flight.aircraft))
@@ -336,7 +337,10 @@ def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
 
 
 def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
-    """Replace the terrain by a file and keep the map's origin, which may be the centre of the old tile."""
+    """Return a scenario's file with its terrain replaced by an elevation file and its map origin kept.
+
+    A scenario without a stated origin has the centre of the replaced tile as its origin, which is then stated.
+    """
     changes: dict[str, Any] = {
         "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "terrain"),
     }
@@ -351,7 +355,7 @@ def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path |
 def _with_file_zones(
     spec: ScenarioFile, file_zones: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
-    """Add those zones of other files to a scenario that are near its area, and notes on the others."""
+    """Return a scenario's file with the zones of zone files that are near its area, and a note on the other zones."""
     if not file_zones.zones and not file_zones.notes:
         return spec
     zones_nearby = select_near_zones(file_zones.zones, source, origin, bounds)
@@ -374,7 +378,7 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
-    """Open a scenario's elevation file, and return it with a table of its path and hash."""
+    """Open a scenario's elevation file; return it and the [terrain] table with its absolute path and SHA-256."""
     paths = [str(table.path)] if not isinstance(table.path, list) else table.path
     path_text = ", ".join(paths)
     try:
@@ -383,8 +387,8 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
         raise TerrainError.from_error(error, source, "terrain.path", path_text) from error
     if table.sha256 not in (None, raster.sha256):
         raise ScenarioError.at(source, "terrain.path", path_text, "the file has changed since (its SHA-256 differs)")
-    whole_paths = [path if path in EMBEDDED else absolute_path(Path(base or "", path)) for path in paths]
-    stored_path = whole_paths if isinstance(table.path, list) else whole_paths[0]
+    absolute_paths = [path if path in EMBEDDED else absolute_path(Path(base or "", path)) for path in paths]
+    stored_path = absolute_paths if isinstance(table.path, list) else absolute_paths[0]
     return raster, table.model_copy(update={"path": stored_path, "sha256": raster.sha256})
 
 
@@ -398,7 +402,10 @@ def _assemble_scenario(
     external: bool,
     replaced: bool,
 ) -> Scenario:
-    """Make a scenario from its file, map and terrain.  replaced: True if its terrain was replaced."""
+    """Make a scenario from its file, map and terrain.
+
+    replaced: True if the scenario's own terrain was replaced.
+    """
     area = spec.area
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
     max_ground = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
@@ -450,6 +457,7 @@ def _assemble_scenario(
 
 
 def _make_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
+    """Make the flat or hilly terrain that a table describes; return None for any other kind."""
     if table.kind == "flat":
         return make_flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
     if table.kind == "peaks":
@@ -487,9 +495,9 @@ def with_terrain(scenario: Scenario, terrain: str) -> Scenario:
 
 
 def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
-    """Return a scenario's JSON data with its ends at the altitudes of these points (m AMSL).
+    """Return a scenario's JSON data with the altitudes of two points as the altitudes of its start and destination.
 
-    start, destination: (3,).  The altitude replaces a height above ground (`height_m`).
+    start, destination: (3,) m, altitude AMSL.  The altitude replaces a height above ground (`height_m`).
 
     >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
     >>> with_absolute_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
@@ -530,7 +538,7 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
 
 
 def with_link(scenario: Scenario, **entries: Any) -> Scenario:
-    """Return a scenario with other entries of [link]; None keeps the present value.
+    """Return a scenario with changed entries of [link]; None keeps the present value.
 
     A position in degrees replaces a position in metres.  Raises ScenarioError for an entry that is not allowed in a
     scenario file, and for a link without frequency, power or sensitivity.
@@ -550,7 +558,7 @@ def with_link(scenario: Scenario, **entries: Any) -> Scenario:
 
 
 def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
-    """Return a scenario with other entries of [flight]; None keeps the present value.
+    """Return a scenario with changed entries of [flight]; None keeps the present value.
 
     A guidance law replaces an autopilot and its parameters, and an autopilot or parameters replace a guidance law.
     Raises ScenarioError for a value that is not allowed in a scenario file.
@@ -666,7 +674,7 @@ def with_threats(
 
 
 def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
-    """Return a scenario with other keys of [planner]; ``source`` names them in messages.
+    """Return a scenario with changed keys of [planner]; ``source`` names the change in messages.
 
     Raises ScenarioError for a value that is not allowed in a scenario file.
 

@@ -91,7 +91,7 @@ def make_draft(
     autopilot: str = "ardupilot",
     version: str | None = None,
 ) -> Draft:
-    """Make the draft of a scenario from a start to a destination.
+    """Make the draft of a scenario for a flight from a start to a destination.
 
     height: height of start and destination above ground, m.
     raster: elevation file; None for flat ground.  terrain: path of that file as the scenario file states it.
@@ -127,12 +127,12 @@ def make_draft(
 def _survey_ground(
     raster: RasterFile, origin: GeoOrigin, positions: Mapping[str, GeoPosition], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
-    """Return an area (2, 2) with elevation data around start and destination, and its highest ground, m.
+    """Return an area around start and destination that has elevation data, (2, 2) m, and its highest ground, m.
 
-    positions: start and destination, keyed by their keywords.  endpoints: (2, 2) the same on the map, m.
-    margin: width of ground on all sides, m.
+    positions: start and destination, by their keywords.  endpoints: the same two positions on the map, (2, 2) m.
+    margin: largest width of the area around the positions, m; smaller widths are tried if data is missing.
 
-    Raises ArgumentError for a position that the file does not cover, and TerrainError.
+    Raises ArgumentError for a position that the file does not cover, and TerrainError if every width lacks data.
     """
     for fraction in _MARGIN_REDUCTIONS:
         bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
@@ -149,17 +149,17 @@ def _survey_ground(
 
 
 def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
-    """Return the box (2, 2) around two positions (2, 2) and a margin, m."""
+    """Return the box around two positions with a margin (m) on all sides, (2, 2) m.  endpoints: (2, 2) m."""
     return np.stack([endpoints.min(axis=0) - margin, endpoints.max(axis=0) + margin], axis=1)
 
 
-def _position_text(place: GeoPosition, length: float | None = None) -> str:
-    position = f"{place.lat:g},{place.lon:g}"
-    return position if length is None else f"{position}, {length / 1000.0:,.3g} km away"
+def _position_text(position: GeoPosition, distance: float | None = None) -> str:
+    text = f"{position.lat:g},{position.lon:g}"
+    return text if distance is None else f"{text}, {distance / 1000.0:,.3g} km away"
 
 
 def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Clip a box (2, 2) to the area that the file covers."""
+    """Clip a box, (2, 2) m, to the largest box that the elevation file covers."""
     if is_covered(raster, origin, area):
         return area
     tile_area = tile_bounds(raster, origin)
@@ -173,8 +173,8 @@ def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats
 def draft_text(draft: Draft) -> str:
     """Write the scenario file of a draft as TOML text.
 
-    >>> place, there = GeoPosition(46.5, 8.0), GeoPosition(46.55, 8.05)
-    >>> print(draft_text(make_draft("site", place, there, 120.0)).split("[area]")[0])
+    >>> start, destination = GeoPosition(46.5, 8.0), GeoPosition(46.55, 8.05)
+    >>> print(draft_text(make_draft("site", start, destination, 120.0)).split("[area]")[0])
     # From 46.5, 8 to 46.55, 8.05.  Lines that begin with "# " and a key are examples; remove the "# " to use them.
     # All keys: docs/scenario-file.md of planfly.
     name = "site"
@@ -213,7 +213,8 @@ def _number_text(value: float) -> str:
     return f"{value:.8g}"
 
 
-def _entry(key: str, value: str, comment: str = "") -> str:
+def _entry_line(key: str, value: str, comment: str = "") -> str:
+    """Return a line "key = value", followed by an aligned comment if there is one."""
     return f"{f'{key} = {value}':<30}# {comment}" if comment else f"{key} = {value}"
 
 
@@ -236,18 +237,18 @@ def _terrain_text(draft: Draft) -> str:
     if draft.terrain is None:
         return f"""\
 [terrain]
-{_entry("kind", '"flat"', "no elevation file was named, so the ground is flat, without hills")}
-{_entry("amsl_m", "0", "height of the ground above mean sea level")}
+{_entry_line("kind", '"flat"', "no elevation file was named, so the ground is flat, without hills")}
+{_entry_line("amsl_m", "0", "height of the ground above mean sea level")}
 # For measured ground use these lines instead of the two above:
 # kind = "dem"
-{_entry("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
+{_entry_line("# path", '"dem.tif"', "an elevation file, a folder of tiles, or a .vrt")}
 """
     comment = "the tile that planfly ships" if draft.terrain in EMBEDDED else "relative to this file's folder"
     return f"""\
 [terrain]
 kind = "dem"
-{_entry("path", _quote(draft.terrain), comment)}
-{_entry("# vertical_error_m", "5", "as stated by its source; clearance is then also shown minus this")}
+{_entry_line("path", _quote(draft.terrain), comment)}
+{_entry_line("# vertical_error_m", "5", "as stated by its source; clearance is then also shown minus this")}
 """
 
 
@@ -262,14 +263,14 @@ def _area_and_ends_text(draft: Draft) -> str:
 [{key}]
 lat_deg = {_number_text(place.lat)}
 lon_deg = {_number_text(place.lon)}
-{_entry("height_m", _number_text(draft.height), "above ground; amsl_m is above mean sea level")}
-{_entry("# course_deg", "0", course)}
+{_entry_line("height_m", _number_text(draft.height), "above ground; amsl_m is above mean sea level")}
+{_entry_line("# course_deg", "0", course)}
 """)
     return f"""\
 [area]                        # where a path may lead, m from [origin]
 east_m = [{east0}, {east1}]
 north_m = [{north0}, {north1}]
-{_entry("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
+{_entry_line("ceiling_amsl_m", _number_text(draft.ceiling), "above mean sea level")}
 
 """ + "\n".join(ends)
 
@@ -277,31 +278,32 @@ north_m = [{north0}, {north1}]
 def _limits_text(draft: Draft) -> str:
     return f"""\
 [limits]                      # turns and slopes: what the aircraft can do, unless a number is given
-{_entry("min_clearance_m", _number_text(draft.clearance), "above ground")}
-{_entry("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
-{_entry("# max_turn_deg", "60", "at a waypoint")}
-{_entry("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
+{_entry_line("min_clearance_m", _number_text(draft.clearance), "above ground")}
+{_entry_line("# max_height_m", _number_text(max(400.0, 2.0 * draft.height)), "above ground")}
+{_entry_line("# max_turn_deg", "60", "at a waypoint")}
+{_entry_line("# corridor_m", "60", "half width about the legs; by default as wide as the autopilot requires")}
 """
 
 
 def _flight_text(draft: Draft) -> str:
     autopilots = """"ardupilot", "px4", or "planfly": planfly's own guidance"""
+    airspeed = _number_text(draft.airspeed)
     key = "px4_version" if draft.autopilot == "px4" else "arduplane_version"
     version = "" if draft.version is None else f"\n{key} = {_quote(draft.version)}"
     return f"""\
 [flight]
-{_entry("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
-{_entry("autopilot", _quote(draft.autopilot), autopilots)}{version}
-{_entry("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
-{_entry("# airspeed_mps", _number_text(draft.airspeed), "equivalent, for planfly's guidance true; the default is this")}
+{_entry_line("aircraft", _quote(draft.aircraft), "an aircraft listed by 'planfly aircraft', or a folder of your own")}
+{_entry_line("autopilot", _quote(draft.autopilot), autopilots)}{version}
+{_entry_line("# params", '"mine.param"', "parameter file of the autopilot, as saved by a ground station")}
+{_entry_line("# airspeed_mps", airspeed, "equivalent, for planfly's guidance true; the default is this")}
 
 [wind]
-{_entry("speed_mps", "0", "your forecast, 0 to 40")}
-{_entry("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
-{_entry("turbulence", '"none"', '"light" or "moderate"')}
+{_entry_line("speed_mps", "0", "your forecast, 0 to 40")}
+{_entry_line("from_deg", "0", "direction the wind comes from; 270 is a west wind")}
+{_entry_line("turbulence", '"none"', '"light" or "moderate"')}
 
 [planner]
-{_entry("seed", "1", "the same seed finds the same path")}
+{_entry_line("seed", "1", "the same seed finds the same path")}
 """
 
 
@@ -318,10 +320,10 @@ def _examples_text(draft: Draft) -> str:
 # name = "battery"
 # lat_deg = {threat.lat:.5f}
 # lon_deg = {threat.lon:.5f}
-{_entry("# kill_radius_m", _number_text(radius))}
-{_entry("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
-{_entry("# detection_radius_m", _number_text(2.0 * radius))}
-{_entry("# detection_scale_m", _number_text(round(radius / 2.0)))}
+{_entry_line("# kill_radius_m", _number_text(radius))}
+{_entry_line("# kill_scale_m", _number_text(round(radius / 4.0)), "how softly its reach ends")}
+{_entry_line("# detection_radius_m", _number_text(2.0 * radius))}
+{_entry_line("# detection_scale_m", _number_text(round(radius / 2.0)))}
 
 # A zone to keep out of ("inclusion": to stay in); files of zones: zones_file = "airspace.geojson" above all tables.
 # [[zones]]
@@ -329,8 +331,8 @@ def _examples_text(draft: Draft) -> str:
 # kind = "exclusion"
 # lat_deg = {zone.lat:.5f}
 # lon_deg = {zone.lon:.5f}
-{_entry("# radius_m", _number_text(radius))}
-{_entry("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
+{_entry_line("# radius_m", _number_text(radius))}
+{_entry_line("# ceiling_agl_m", "300", "it may be flown over above this height above ground")}
 
 # Requirements on the way home.
 # [returns]
@@ -339,7 +341,10 @@ def _examples_text(draft: Draft) -> str:
 
 
 def _example_positions(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return a position on each side of the straight line, a third of its length from each end, m."""
+    """Return two positions for examples, (east, north) m: one on each side of the line from start to destination.
+
+    Each is a third of the line's length from one end, and half of ``radius`` (m) off the line.
+    """
     endpoints = np.array([to_map(draft.origin, *place) for place in (draft.start, draft.destination)])
     straight_line = endpoints[1] - endpoints[0]
     offset = np.array([-straight_line[1], straight_line[0]]) / (math.hypot(*straight_line) or 1.0) * radius * 0.5

@@ -19,9 +19,9 @@ MAX_BYTES = 16 * 2**20
 
 
 def parse_scenario(text: str, source: str) -> ScenarioFile:
-    """Check the text of a TOML scenario file; ``source`` names it in messages.
+    """Parse and check the text of a TOML scenario file; ``source`` names the file in messages.
 
-    `aircraft_by_default` is set if the text names no aircraft.
+    Sets `aircraft_by_default` if the text names no aircraft.
 
     Raises ScenarioError with one line: file, key, value and what is allowed.
     """
@@ -42,9 +42,9 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
 
 
 def check_scenario(data: Any, source: str) -> ScenarioFile:
-    """Check a scenario that is already a dictionary (from a plan or a log).
+    """Check the data of a scenario, which must be a dictionary, from a plan or a log.
 
-    ``source`` names it in messages.
+    source: name of the plan or log in messages.
     Raises ScenarioError as `parse_scenario` does.
     """
     if not isinstance(data, dict):
@@ -58,7 +58,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
 
 
 def checked_table(make_table: Callable[[], Table], source: str) -> Table:
-    """Make a table of values from outside a checked file; a ScenarioError begins with ``source``."""
+    """Return the table that a function makes; convert pydantic's error to a ScenarioError about ``source``."""
     try:
         return make_table()
     except ValidationError as error:
@@ -87,9 +87,9 @@ class Fault(NamedTuple):
     text: str
 
     def at(self, source: str, part: str = "") -> dict[str, Any]:
-        """Return the arguments of a `PlanflyError` with this fault.
+        """Return the arguments of a `PlanflyError` about this fault.
 
-        source: the file.  part: the part of the file with the fault.
+        source: name of the file.  part: part of the file that has the fault; "" for the whole file.
         """
         location = f"{source}: {part}" if part else source
         message = f"{location}: {self.text}"
@@ -128,7 +128,7 @@ def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel]
     value = first_error.get("input")
     if isinstance(value, dict | list):
         value = None
-    value_text = "" if isinstance(first_error.get("input"), dict | list) else f": {_shown_text(value)}"
+    value_text = "" if isinstance(first_error.get("input"), dict | list) else f": {_value_text(value)}"
     if first_error["type"] == "extra_forbidden":
         message = f"unknown key{_spelling_suggestion(first_error['loc'], model)}"
         value_text = ""
@@ -165,7 +165,7 @@ def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
 
 
 def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of a location that are keys of the data, without pydantic's names of the branches of unions."""
+    """Return the parts of a location that are keys of the data; omit the names of pydantic's union branches."""
     keys = []
     for part in parts:
         known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()
@@ -175,7 +175,8 @@ def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
     return keys
 
 
-def _shown_text(value: Any) -> str:
+def _value_text(value: Any) -> str:
+    """Return a value as JSON text for a message, shortened to 60 characters."""
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     text = json.dumps(value, default=str)

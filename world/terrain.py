@@ -58,15 +58,15 @@ class Terrain:
         return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
-        """Return the ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
+        """Return the ground height at map positions of any shape, m AMSL; NaN outside the raster or without data."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
         return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
-        """Return the smallest height above ground on the segment a-b, and the fraction of the segment there.
+        """Return the smallest height of the segment a-b above ground, m, and its position as a fraction of the segment.
 
-        a, b: (3,) m.  The height is exact for the bilinear surface, and NaN if the segment leaves the raster or its
-        data.
+        a, b: (3,) m.  The height is exact for the bilinearly interpolated ground, and NaN if the segment leaves the
+        raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         clearance, fraction = segment_clearance(self.heights, self.to_pixel.record, start, end)
@@ -81,7 +81,7 @@ def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
 
 @inlined
 def pixel_height(heights: Heights, col: float, row: float) -> float:
-    """Return the bilinear height at fractional pixel coordinates, NaN outside the raster.
+    """Return the bilinearly interpolated height at fractional pixel coordinates, m; NaN outside the raster.
 
     The raster extends `EDGE_TOLERANCE` beyond the outer pixel centres.
     """
@@ -103,7 +103,7 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 
 @compiled
 def steepest_slopes(heights: Heights, pitch: float) -> Heights:
-    """Return the steepest possible slope of the bilinear ground in each tile, m per m.
+    """Return an upper bound of the slope of the bilinearly interpolated ground in each tile, m per m.
 
     A tile has `TILE_PIXELS` x `TILE_PIXELS` cells.  Pixels without data (NaN) are ignored.
     pitch: distance between pixels, m.
@@ -144,9 +144,9 @@ def _ground_heights(
 
 @compiled
 def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the smallest height above the bilinear ground on the segment a-b, and the fraction of the segment there.
+    """Return the smallest height of the segment a-b above the bilinearly interpolated ground, m, and its position.
 
-    The height is NaN if the segment leaves the raster.
+    The position is a fraction of the segment.  The height is NaN if the segment leaves the raster.
     """
     piece_count = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE_M))
     min_clearance = math.inf
@@ -182,11 +182,11 @@ def _next_crossing(start: float, step: float, fraction: float) -> float:
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:
-    """Return the smallest height above ground on a piece that is straight in pixels, and the fraction there.
-
-    The height is NaN if the piece leaves the data.  Within a cell the height above the bilinear ground is a parabola.
+    """Return the smallest height above ground on a piece that is straight in pixels, m, and its position.
 
     col, row, up: coordinates of the two ends.
+    The position is a fraction of the piece.  The height is NaN if the piece leaves the data.  Within a pixel cell the
+    height above the bilinearly interpolated ground is a parabola.
     """
     delta_col, delta_row, delta_up = col1 - col0, row1 - row0, up1 - up0
     start_fraction = 0.0
@@ -238,7 +238,10 @@ def _piece_clearance(
 def make_gridded_terrain(
     heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str
 ) -> Terrain:
-    """Make terrain from heights (n, e), m, at the evenly increasing coordinates north (n,) and east (e,), m."""
+    """Make terrain from heights on a regular grid.
+
+    heights: (n, e) m.  east: (e,) and north: (n,) m, evenly increasing.
+    """
     step_e, step_n = east[1] - east[0], north[1] - north[0]
     to_pixel = fit_polymap(
         lambda e, n: ((e - east[0]) / step_e, (n - north[0]) / step_n),
@@ -249,7 +252,10 @@ def make_gridded_terrain(
 
 
 def make_flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
-    """Make level ground over bounds [[e0, e1], [n0, n1]] and a buffer around them, m."""
+    """Make level ground at an altitude (m AMSL).
+
+    bounds: [[e0, e1], [n0, n1]] m.  buffer: width of terrain around the bounds, m.
+    """
     east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
     north = np.linspace(bounds[1, 0] - buffer, bounds[1, 1] + buffer, 3)
     return make_gridded_terrain(

@@ -84,7 +84,10 @@ def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
 
 
 def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Return rows and columns (top, bottom, left, right) of an area.  Raises TerrainError if it is not covered."""
+    """Return the window (top, bottom, left, right) of rows and columns that covers an area.
+
+    Raises TerrainError if the raster does not cover the area.
+    """
     col, row = raster.to_pixels(*_outline(box))
     rows, cols = raster.shape
     if not (col.min() >= 0.0 and row.min() >= 0.0 and col.max() <= cols - 1 and row.max() <= rows - 1):
@@ -98,7 +101,7 @@ def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
 
 
 def _outline(box: Box) -> tuple[Floats, Floats]:
-    """Return longitudes and latitudes along the edge of an area."""
+    """Return longitudes and latitudes of points along the edge of an area, deg."""
     ramp = np.linspace(0.0, 1.0, 41)
     lons, lats = box.west + ramp * (box.east - box.west), box.south + ramp * (box.north - box.south)
     lon = np.concatenate([lons, lons, np.full(41, box.west), np.full(41, box.east)])
@@ -136,7 +139,7 @@ def tile_name(lat: int, lon: int) -> str:
 
 
 def degree_corners(box: Box) -> list[tuple[int, int]]:
-    """Return the south-west corners of the degrees that an area touches; longitudes in -180..179.
+    """Return the south-west corners of the one-degree squares that an area touches; longitudes in -180..179.
 
     >>> degree_corners(Box(46.9, 8.2, 47.1, 8.3)), degree_corners(Box(-0.1, 179.9, 0.0, 180.1))
     ([(46, 8), (47, 8)], [(-1, 179), (-1, -180), (0, 179), (0, -180)])
@@ -193,7 +196,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
 
 
 def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]) -> RasterFile:
-    """Return the copy of a tile with the blocks that cover an area.  Raises TerrainError.
+    """Fetch the blocks of a tile that cover an area, and open the tile's copy.  Raises TerrainError.
 
     A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
     """
@@ -242,7 +245,7 @@ def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Se
 
 
 def _padded_window(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
-    """Return rows and columns of a tile in an area, with a margin that interpolation to another grid may need."""
+    """Return the window of a tile that covers an area, with a margin for interpolation to another grid."""
     col, row = tile.to_pixels(*_outline(box))
     rows, cols = tile.shape
     ends = (
@@ -292,7 +295,7 @@ def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedT
 
 
 def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
-    """Return heights of an area on the grid of the finest tile, NaN where there is no tile, and the grid."""
+    """Return the heights of an area on the grid of the finest tile, and that grid; NaN where there is no tile."""
     finest = min(tiles, key=lambda tile: tile.dx)
     # First and last pixels whose centres enclose the area, relative to the first pixel of the finest tile.
     left = math.floor((box.west - finest.west) / finest.dx - 0.5 + _PIXEL_TOLERANCE)
@@ -351,7 +354,7 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
 
 
 def _fill_sea(heights: Heights, grid: Sequence[float], sea_degrees: Sequence[tuple[int, int]]) -> None:
-    """Set missing heights to 0 m in the degrees ``sea_degrees``, which have no tile."""
+    """Set missing heights to 0 m in one-degree squares at sea.  sea_degrees: their south-west corners."""
     dx, _, west, _, dy, north = grid
     lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
     for south_degree, west_degree in sea_degrees:

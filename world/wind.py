@@ -61,7 +61,9 @@ class Wind:
         return -speed * math.sin(self.from_course), -speed * math.cos(self.from_course)
 
     def velocities_at(self, amsl: Floats) -> Floats:
-        """Return the east and north components of the mean wind at altitudes (n,) m AMSL: (n, 2) m/s.
+        """Return the east and north components of the mean wind at altitudes, m/s, shape (n, 2).
+
+        amsl: (n,) m AMSL.
 
         >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).velocities_at(np.array([300.0, 700.0]))
         array([[ -0.,  -6.],
@@ -71,11 +73,14 @@ class Wind:
         return np.column_stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)])
 
     def max_speed_at(self, amsl: Floats) -> float:
-        """Return the highest mean wind speed at these altitudes (m AMSL), m/s."""
+        """Return the highest mean wind speed at any of these altitudes (m AMSL), m/s."""
         return max(math.hypot(*self.velocity_at(float(altitude))) for altitude in amsl)
 
     def components_on_course(self, course: float, amsl: float) -> tuple[float, float]:
-        """Return the tailwind and crosswind on a course (rad) at an altitude (m AMSL), m/s; positive from the left."""
+        """Return the tailwind and the crosswind on a course (rad) at an altitude (m AMSL), m/s.
+
+        A crosswind from the left is positive.
+        """
         east, north = self.velocity_at(amsl)
         return (
             east * math.sin(course) + north * math.cos(course),

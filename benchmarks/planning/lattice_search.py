@@ -222,7 +222,7 @@ def lattice_search(task: Task) -> tuple[float, Floats | None]:
     frame = rotated_frame(data.start, data.destination)
     best: tuple[float, Floats | None] = (math.inf, None)
     for route in lattice_routes(task):
-        points = frame.rotate(route)
+        points = frame.to_frame(route)
         # The encoding cannot represent a route that turns back, so that such parts are flattened.
         points[:, 0] = np.maximum.accumulate(points[:, 0])
         path = fit_waypoints(data, frame, points, encoding.waypoints)

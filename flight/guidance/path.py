@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.items import LANDINGS, PLACES, TAKEOFFS, Command, Mission, MissionItem
-from flight.mission.itinerary import loiter_of, pass_by_distance
+from flight.mission.itinerary import pass_by_distance, stated_loiter
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
@@ -494,7 +494,7 @@ def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionIte
     last: index of the last waypoint before the RTL.
     """
     item = items.get(int(waypoints["item"][last]))
-    if item is not None and item.has_position and loiter_of(item) is not None:
+    if item is not None and item.has_position and stated_loiter(item) is not None:
         bearing = _bearing_to_origin(item) % (2.0 * math.pi)
         waypoints["exit_bearing"][waypoints["stop"] == waypoints["stop"][last]] = bearing or 2.0 * math.pi
 
@@ -533,7 +533,7 @@ def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
     waypoints["loiter_time"] = math.nan
     for k in np.flatnonzero(waypoints["loiter_radius"]).tolist():
         item = items.get(int(waypoints["item"][k]))
-        loiter = None if item is None else loiter_of(item)
+        loiter = None if item is None else stated_loiter(item)
         if loiter is None:
             continue
         waypoints["exits_on_tangent"][k] = loiter.exits_on_tangent

@@ -166,7 +166,7 @@ class ArmingState:
         self.is_judging, self.mission_state = True, NOT_STARTED
 
     def on_mission_judged(self, verdict: MissionJudged) -> str:
-        """Store a verdict, disarm if it does not allow flight, and return the reason for that, or ""."""
+        """Store a verdict; disarm if the verdict does not allow a flight, and return the reason for it, or ""."""
         self.is_judging = False
         self.last_verdict = verdict
         self.mission_state = NOT_STARTED
@@ -193,7 +193,7 @@ class ArmingState:
         self.mode, self.loiter_center = MANUAL, None
 
     def _arming_refusal(self, is_forced: bool) -> str:
-        """Return the reason why arming is refused, or ""."""
+        """Return the reason why arming is refused, or "" if it is not.  is_forced: True to allow a failed verdict."""
         if self.last_verdict is None:
             return ""
         if not self.last_verdict.possible:

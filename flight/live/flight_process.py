@@ -296,7 +296,7 @@ class _RequestQueue:
         return self._queued.popleft() if self._queued else self._connection.recv()
 
     def poll(self) -> object:
-        """Return the next request without blocking, or None; return EndFlight(quit=True) if the link is gone."""
+        """Return the next request, or None if none has arrived; return EndFlight(quit=True) if the link is gone."""
         if not self._queued and not self._connection.poll():
             return None
         try:
@@ -305,7 +305,7 @@ class _RequestQueue:
             return EndFlight(quit=True)
 
     def is_ending(self) -> bool:
-        """Return True if the process must end, because of a request or a closed link; keep all requests."""
+        """Return True if the process must end, because of a request or a closed link; all requests stay queued."""
         try:
             while self._connection.poll():
                 self._queued.append(self._connection.recv())
@@ -317,7 +317,7 @@ class _RequestQueue:
 def _run_flight(
     connection: Connection, requests: _RequestQueue, prepared: PreparedFlight, factory: FlightFactory
 ) -> bool:
-    """Fly in real time; return False if the process must end."""
+    """Fly a prepared mission in real time, log and judge it; return False if the process must end."""
     try:
         # A diverted flight continues in the same instance of JSBSim.
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map, engine="jsbsim")

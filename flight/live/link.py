@@ -364,7 +364,7 @@ def check_access(access: Access) -> None:
 
 
 def is_loopback(host: str) -> bool:
-    """Return True if an IP address is this machine's own."""
+    """Return True if an IP address is a loopback address, which only this machine can reach."""
     return ipaddress.ip_address(host).is_loopback
 
 
@@ -520,7 +520,7 @@ class Link:
         return peer
 
     def _frame_sequence(self, address: Address) -> Any:
-        """Return the encoder of an address, which numbers the frames."""
+        """Return the encoder that numbers the frames to an address."""
         return self._expected_stations.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod

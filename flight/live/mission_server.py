@@ -318,7 +318,7 @@ class _FinishedUpload:
 
 
 def _deny_go_to(_item: MissionItem) -> str:
-    """Deny a go-to, as a vehicle that is not in flight."""
+    """Return the refusal of a go-to by a vehicle that is not in flight."""
     return "go-to denied: not in flight"
 
 
@@ -360,7 +360,7 @@ class MissionServer:
         return handler(self, message, station, kind, now) if handler else []
 
     def tick(self, now: float) -> list[MissionReply]:
-        """Repeat requests for missing items, or for the last item, and abandon uploads of silent stations."""
+        """Return repeated requests for items that did not arrive, and abandon the uploads of silent stations."""
         replies = []
         for kind, upload in list(self._uploads.items()):
             if now - upload.last_message_time > UPLOAD_TIMEOUT_S:
@@ -449,7 +449,7 @@ class MissionServer:
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOAT_WARNING if is_float else "")]
 
     def _send_count(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
-        """Return the number of items of a list (MISSION_REQUEST_LIST)."""
+        """Return the reply with the number of items of a list (MISSION_REQUEST_LIST)."""
         count = len(self.lists[kind])
         return [
             MissionReply(
@@ -458,7 +458,7 @@ class MissionServer:
         ]
 
     def _send_item(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
-        """Return an item of a list (MISSION_REQUEST_INT or MISSION_REQUEST)."""
+        """Return the reply with an item of a list (MISSION_REQUEST_INT or MISSION_REQUEST)."""
         items = self.lists[kind]
         if not message.seq < len(items):
             return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]

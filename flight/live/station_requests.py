@@ -180,7 +180,7 @@ def vehicle_parameters(
     >>> parameters.set(b"WP_RADIUS", 70.0), parameters["WP_RADIUS"]
     ((13, ''), 70.0)
     >>> parameters.set(b"TRIM_PITCH_CD", 3.0)[1]
-    'TRIM_PITCH_CD is read, but no flight shows it: 2 kept'
+    'TRIM_PITCH_CD is read, but has no effect on a flight: 2 kept'
     """
     vehicle_entries = [
         Parameter("AIRSPEED_CRUISE", airspeed),
@@ -200,7 +200,7 @@ def vehicle_parameters(
     unflown_names = set(not_flown)
     for name, value in autopilot_values({}).items():
         entries[name] = Parameter(
-            name, value, fixed_reason="is read, but no flight shows it", is_simulated=name not in unflown_names
+            name, value, fixed_reason="is read, but has no effect on a flight", is_simulated=name not in unflown_names
         )
     return Parameters([entries[name] for name in sorted(entries)], autopilot_values)
 
@@ -316,6 +316,7 @@ class Requests:
     def _run_message_command(
         self, number: int, message: Any, peer: Peer, now: float
     ) -> tuple[CommandResult, list[Any]]:
+        """Run a command about messages and their rates; return its result and the messages to send."""
         implied_number = _MESSAGE_COMMANDS[number]
         requested_number = _to_integer(message.param1) if implied_number is None else implied_number
         message_class = mavlink.mavlink_map.get(requested_number)

@@ -108,7 +108,7 @@ class SnapshotMaker:
         return self.snapshot(row)
 
     def snapshot(self, row: Record) -> Snapshot:
-        """Return the snapshot of a flown row, a record of `flight.simulation.track.TRACK_ROW`."""
+        """Return the snapshot of one row of the flight's track, a record of `flight.simulation.track.TRACK_ROW`."""
         east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course plus the convergence.

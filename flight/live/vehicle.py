@@ -504,6 +504,7 @@ class Vehicle:
             self._handle_verdict(MissionJudged(self._mission_number, False, False, (text,)))
 
     def _handle_event(self, event: Snapshot | Event) -> None:
+        """Handle an event of the flight process."""
         if isinstance(event, Snapshot):
             if event.is_finite:
                 self.status.snapshot = event

@@ -358,10 +358,10 @@ MARKS = frozenset({C.DO_RETURN_PATH_START, C.DO_LAND_START, C.DO_GO_AROUND, C.JU
 _UNKNOWN = Support(_REFUSED, _REFUSED, "no autopilot accepts it in a mission")
 
 
-def support_of(command: int) -> Support:
+def command_support(command: int) -> Support:
     """Return the treatment of a command in a mission by each autopilot.
 
-    >>> support_of(Command.DO_JUMP).px4, support_of(Command.JUMP_TAG).px4, support_of(50_000).arduplane
+    >>> command_support(Command.DO_JUMP).px4, command_support(Command.JUMP_TAG).px4, command_support(50_000).arduplane
     (<Treatment.FLOWN: 'flown'>, <Treatment.REFUSED: 'refused'>, <Treatment.REFUSED: 'refused'>)
     """
     # An unknown number is not found.

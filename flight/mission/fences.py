@@ -102,7 +102,7 @@ def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[Mis
 
 
 def _joined_names(names: list[str]) -> str:
-    """Return up to three names, the number of the others, and the verb "is" or "are"."""
+    """Return up to three names as the subject of a sentence, with the number of the other names and its verb."""
     remainder = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + remainder + (" is" if len(names) == 1 else " are")
 
@@ -144,7 +144,7 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
 def fence_problem(
     fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float
 ) -> tuple[str, int] | None:
-    """Return the first fence that a position violates, as text and number of its first item, or None.
+    """Return the first fence that a position violates: its description and the number of its first item; or None.
 
     fences: items 5001..5004, a polygon's corners together.
     east, north: m on the map about ``origin``.
@@ -231,7 +231,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
 
 
 def _missile_zones(scenario: Scenario) -> list[Zone]:
-    """Return the area that each missile reaches on the map."""
+    """Return an exclusion zone for each missile: a cylinder with the missile's kill radius."""
     threats = scenario.threats
     return [
         Zone(str(name), "exclusion", make_cylinder(float(position[0]), float(position[1]), float(radius)))
@@ -243,7 +243,7 @@ def _missile_zones(scenario: Scenario) -> list[Zone]:
 def _omit_crossed_exclusions(
     zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest
 ) -> tuple[list[Zone], list[str]]:
-    """Return the zones without the exclusions whose outline the mission crosses, and the names of those exclusions."""
+    """Return the zones without the exclusions that the mission passes through on the map, and the exclusions' names."""
     remaining, crossed_names = [], []
     for zone in zones:
         if zone.kind == "exclusion" and passes(number_items(zone_fences([zone], origin)[0])):
@@ -275,7 +275,10 @@ def _ends_as_rally_points(mission: Mission) -> list[MissionItem]:
 
 
 def _home_offset(item: MissionItem, home: Home) -> float:
-    """Return the altitude to subtract from an item's altitude for its height above home, m."""
+    """Return the altitude to subtract from an item's altitude to get its height above home, m.
+
+    The result is home's altitude for an altitude AMSL, and 0 for a height above home.
+    """
     return home.alt if item.frame in (Frame.GLOBAL, Frame.GLOBAL_INT) else 0.0
 
 

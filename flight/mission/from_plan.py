@@ -132,7 +132,10 @@ def _home_position(plan: Plan) -> Home:
 
 
 def _rally_items(origin: GeoOrigin, points: Floats, home: Home) -> Iterator[MissionItem]:
-    """Yield rally points (n, 3) m as items, with heights above home, as ground stations write them."""
+    """Yield a mission item for each rally point, with a height above home, as ground stations write it.
+
+    points: (n, 3) m.
+    """
     for number, (east, north, up) in enumerate(points.tolist()):
         lat, lon = to_geo(origin, east, north)
         position = round_to_grid(float(lat)), round_to_grid(float(lon)), _round_to_thousandths(up - home.alt)
@@ -164,12 +167,12 @@ def acceptance_radii(
 
 
 def _fly_by_offsets(turns: Floats, radius: float) -> Floats:
-    """Return the distances (m) at which arcs of a radius (m) pass the corners of turns (rad)."""
+    """Return the distance between the corner and the fly-by arc of each turn (rad), m.  radius: of the arcs, m."""
     return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
 def _acceptance_for_tracking(scenario: Scenario, points: Floats, airspeed: float, tracking: TrackingError) -> Floats:
-    """Return the acceptance radii with the autopilot's smallest tracking error, (w,) whole m.
+    """Return the acceptance radii for which the autopilot's tracking error is smallest, (w,) whole m.
 
     Each radius applies to the highest ground speed in the turn at its waypoint.
     """
@@ -181,7 +184,9 @@ def _acceptance_for_tracking(scenario: Scenario, points: Floats, airspeed: float
 
 
 def corner_speeds(scenario: Scenario, points: Floats, airspeed: float) -> list[float]:
-    """Return the highest ground speed (m/s) in the turn at each of the w - 2 corners of a path (w, 3).
+    """Return the highest ground speed in the turn at each of the w - 2 corners of a path, m/s.
+
+    points: (w, 3) m.
 
     airspeed: equivalent, m/s.
 

@@ -54,7 +54,7 @@ class TakeOff:
     acceleration: float
 
     def release(self) -> tuple[Floats, Floats]:
-        """Return the position and velocity at release from rail or hand, (3,) m and m/s, east, north, up.
+        """Return the position, m, and velocity, m/s, at release from rail or hand: east, north, up, (3,) each.
 
         On a runway the position is on the ground; the caller adds the height at which the aircraft stands.
         """
@@ -103,11 +103,14 @@ class Approach:
     home_altitude: float
 
     def distances_from_landing_point(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return the distances of positions (n, 3) past the landing point and right of its course, (n,) m each."""
+        """Return the distances of positions (n, 3) past the landing point and to the right of the landing course, m.
+
+        Both results have the shape (n,).
+        """
         return _along_and_right(position, self.point, self.course)
 
     def distances_from_strip_center(self, position: Floats) -> tuple[Floats, Floats]:
-        """Return the distances of positions (n, 3) from the strip's center along it and to its right, (n,) m each.
+        """Return the distances of positions (n, 3) from the strip's center: along the strip and to its right, m, (n,).
 
         The strip has its stated course, or the landing's course if none is stated. A landing against the stated course
         uses the same strip.
@@ -119,7 +122,7 @@ class Approach:
 
 
 def _along_and_right(position: Floats, start: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return the distances of positions (n, 3) from a point along a course (rad) and to the right of it, m."""
+    """Return the distances of positions (n, 3) from a start point: along a course (rad), and to the right of it, m."""
     east, north = position[..., 0] - start[0], position[..., 1] - start[1]
     sin, cos = math.sin(course), math.cos(course)
     return east * sin + north * cos, east * cos - north * sin
@@ -187,7 +190,7 @@ def _find_take_off(
 
 
 def climb_pitch(item: MissionItem) -> float:
-    """Return the minimum climb pitch that a take-off item states, rad."""
+    """Return the minimum climb pitch that a take-off item states, rad; `DEFAULT_CLIMB_PITCH` if it states none."""
     pitch = item.params[0]
     return math.radians(pitch) if pitch > 0.0 else DEFAULT_CLIMB_PITCH
 

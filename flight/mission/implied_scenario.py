@@ -36,12 +36,12 @@ class ImpliedScenario:
 def implied_scenario(
     mission: Mission, terrain_path: str | None, flight: FlightTable | None = None, *, vertical_legs: bool = False
 ) -> ImpliedScenario:
-    """Build a scenario for a mission without one, with ``external`` set.
+    """Build a scenario around a mission that came without one: an area, no threats and default limits.
 
-    It has the mission's surroundings, no threats and default limits.
+    The scenario's ``external`` is True.
 
-    terrain_path: an elevation file or embedded name, None for no terrain.
-    flight: the aircraft and how it flies, defaults if None.
+    terrain_path: an elevation file or a built-in name; None for no terrain.
+    flight: the scenario's [flight] table; None for the defaults.
     vertical_legs: see `flight.mission.placing.place_stops`.
 
     The area is the bounding box of the mission's positions and loiters, with a margin of 2 km, clipped at the edge of
@@ -134,7 +134,10 @@ def _area_and_flown_box(mission: Mission, itinerary: Itinerary, origin: GeoOrigi
 def _load_terrain(
     path: str | None, origin: GeoOrigin, area: Floats, flown_box: Floats
 ) -> tuple[Terrain | None, TerrainTable, Floats]:
-    """Return the terrain, its table, and the area clipped at the tile's edge."""
+    """Return the terrain, the scenario's [terrain] table, and the area clipped at the edge of the terrain's file.
+
+    Raises TerrainError if the file does not cover ``flown_box``.
+    """
     if path is None:
         return None, TerrainTable(kind="none"), area
     raster = open_raster(path)
@@ -159,7 +162,7 @@ def _position_text(lats: Floats, lons: Floats) -> str:
 
 
 def _raised_above_ground(position: Position, terrain: Terrain | None) -> EndTable:
-    """Return a position, raised to 1 m above the ground if it is lower."""
+    """Return a position as the table of a scenario's end, raised to 1 m above the ground if it is lower."""
     east, north, amsl = position
     if terrain is not None:
         amsl = max(amsl, float(terrain.height(east, north)) + 1.0)

@@ -36,13 +36,13 @@ class Notes:
         lines = []
         for text, items in self._items.items():
             numbers = sorted(set(items))
-            label = f"item{'s' if len(numbers) > 1 else ''} {_ranges(numbers)}: " if numbers else ""
+            label = f"item{'s' if len(numbers) > 1 else ''} {_range_text(numbers)}: " if numbers else ""
             lines.append(label + text)
         return tuple(lines)
 
 
-def _ranges(numbers: list[int]) -> str:
-    """Return sorted numbers as "3-5, 9"."""
+def _range_text(numbers: list[int]) -> str:
+    """Return sorted numbers as text in which consecutive numbers are joined: "3-5, 9"."""
     ranges: list[list[int]] = []
     for number in numbers:
         if not ranges or number > ranges[-1][1] + 1:
@@ -305,7 +305,7 @@ def renumber_items(mission: Mission) -> Mission:
 
 
 def with_shifted_numbers(items: Iterable[MissionItem], shift: int) -> tuple[MissionItem, ...]:
-    """Return items with a number added to each seq, and to the targets of jumps.
+    """Return items with ``shift`` added to each item number and to each jump target.
 
     >>> jump = MissionItem(3, int(Command.DO_JUMP), 2, (1.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
     >>> [(item.seq, item.params[0]) for item in with_shifted_numbers([jump], 1)]
@@ -380,7 +380,7 @@ def item_problem(item: MissionItem) -> ItemProblem | None:
 
 
 def _count_problem(item: MissionItem) -> ItemProblem | None:
-    """Return the fault of an item's parameters that are counts, sizes or jump targets, or None."""
+    """Return the fault of a parameter that is a count, a size or a jump target, or None if there is no fault."""
     p1, p2 = item.params[:2]
     if item.command in JUMPS:
         if not (p1 >= 0 and p1 == int(p1)):

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-from flight.mission.commands import CAMERA_REASON, MARKS, Command, Treatment, support_of
+from flight.mission.commands import CAMERA_REASON, MARKS, Command, Treatment, command_support
 from flight.mission.items import (
     AMSL,
     JUMPS,
@@ -103,8 +103,8 @@ def arduplane_turns(stated_turns: float) -> float:
     return stated_turns if stated_turns <= 1.0 else float(min(_MAX_BYTE_TURNS, math.floor(stated_turns)))
 
 
-def loiter_of(item: MissionItem) -> Loiter | None:
-    """Return the loiter that an item states, or None for any other command."""
+def stated_loiter(item: MissionItem) -> Loiter | None:
+    """Return the loiter that an item states, or None if the item's command is not a loiter."""
     param1, param2, param3, param4 = (0.0 if math.isnan(value) else value for value in item.params)
     if item.command == Command.NAV_LOITER_UNLIM:
         return Loiter(param3, seconds=ENDLESS_LOITER_TIME_S, endless=True)
@@ -333,15 +333,15 @@ def _add_command_limits(mission: Mission, steps: "_Steps", builder: "_ItineraryB
 class _Step(NamedTuple):
     """The next navigation item, and the commands before it.
 
-    between: commands before the item, following jumps, as PX4 runs them.
-    before_leg: command that ArduPlane runs before the leg to the item, or None.
-    on_leg: commands that ArduPlane runs on the leg to the item.
+    commands: commands before the item, following jumps, as PX4 runs them.
+    command_before_leg: command that ArduPlane runs before the leg to the item, or None.
+    commands_on_leg: commands that ArduPlane runs on the leg to the item.
     target: the navigation item; None at the mission's end.
     """
 
-    between: tuple[MissionItem, ...]
-    before_leg: MissionItem | None
-    on_leg: tuple[MissionItem, ...]
+    commands: tuple[MissionItem, ...]
+    command_before_leg: MissionItem | None
+    commands_on_leg: tuple[MissionItem, ...]
     target: MissionItem | None
 
 
@@ -407,7 +407,7 @@ class _Steps:
         return commands
 
     def _next_item(self, index: int, *, counting: bool) -> int | None:
-        """Return the index of the next item that is no jump, following jumps, or None at the end (`get_next_cmd`).
+        """Return the index of the next item that is not a jump, following jumps; None at the end (`get_next_cmd`).
 
         counting: True to count jumps, as when a navigation item is reached; False to look ahead.
         """
@@ -441,7 +441,7 @@ class _Steps:
         return None
 
     def _count_item(self, item: MissionItem) -> None:
-        """Note an item as reached. Raises MissionError if jumps lead through too many items."""
+        """Add an item to the reached items. Raises MissionError if jumps lead through too many items."""
         self.reached.add(item.seq)
         self._step_count += 1
         if self._step_count > _MAX_STEPS:
@@ -495,22 +495,22 @@ class _ItineraryBuilder:
 
     def process_step(self, step: _Step) -> None:
         """Process the commands before a navigation item, and the item."""
-        for item in step.between:
+        for item in step.commands:
             self._run_as_px4(item)
-        arduplane_commands = () if step.before_leg is None else (step.before_leg, *step.on_leg)
+        arduplane_commands = () if step.command_before_leg is None else (step.command_before_leg, *step.commands_on_leg)
         for index, item in enumerate(arduplane_commands):
             # A home that is set on a leg does not change the altitude of the item at its end.
             if index == 0 or item.command != Command.DO_SET_HOME:
                 self._run_as_arduplane(item, arduplane_commands[index + 1 :])
-        for item in step.on_leg:
-            if item not in step.between:
+        for item in step.commands_on_leg:
+            if item not in step.commands:
                 self.notes.arduplane.add(
                     f"{command_name(item.command)}: run one loop early, as ArduPlane does", item.seq
                 )
         if step.target is not None:
             self._fly_item(step.target)
         else:
-            for item in step.between[1:]:
+            for item in step.commands[1:]:
                 text = f"{command_name(item.command)}: not run, as no waypoint follows it"
                 self.notes.arduplane.add(text, item.seq)
         for item in arduplane_commands[1:]:
@@ -551,7 +551,7 @@ class _ItineraryBuilder:
             else:
                 self.notes.arduplane.add(text, item.seq)
         else:
-            self._note_not_flown(item, as_px4=False)
+            self._note_unsimulated_command(item, as_px4=False)
 
     def _run_as_px4(self, item: MissionItem) -> None:
         """Run a command as PX4 does."""
@@ -562,11 +562,11 @@ class _ItineraryBuilder:
         elif item.command == Command.CONDITION_GATE:
             self._add_gate(item)
         else:
-            self._note_not_flown(item, as_px4=True)
+            self._note_unsimulated_command(item, as_px4=True)
 
-    def _note_not_flown(self, item: MissionItem, *, as_px4: bool) -> None:
-        """Note a command that is not simulated."""
-        name, support = command_name(item.command), support_of(item.command)
+    def _note_unsimulated_command(self, item: MissionItem, *, as_px4: bool) -> None:
+        """Record a command that is not simulated: as an open item if it may change the path, otherwise as a note."""
+        name, support = command_name(item.command), command_support(item.command)
         treatment = support.px4 if as_px4 else support.arduplane
         notes = self.notes.px4 if as_px4 else self.notes.arduplane
         if treatment == Treatment.OPEN:
@@ -601,12 +601,12 @@ class _ItineraryBuilder:
         elif item.command in LANDINGS:
             self._add_landing(item)
         else:
-            self._note_not_flown(item, as_px4=False)
-            self._note_not_flown(item, as_px4=True)
+            self._note_unsimulated_command(item, as_px4=False)
+            self._note_unsimulated_command(item, as_px4=True)
 
     def _make_stop(self, item: MissionItem, acceptance: float = 0.0) -> RoutePoint:
         """Return the stop of an item, with the current speeds, and with the gates since the last stop."""
-        lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, loiter_of(item), item.alt, item.frame
+        lat, lon, loiter, alt, frame = item.lat_deg, item.lon_deg, stated_loiter(item), item.alt, item.frame
         gates, self.gates = tuple(self.gates), []
         if self.home is not self.first_home and frame in OVER_HOME:
             alt, frame = self.home.alt + alt, int(Frame.GLOBAL)
@@ -664,7 +664,7 @@ class _ItineraryBuilder:
     def _add_stop(self, item: MissionItem) -> None:
         """Add the stop of a waypoint or loiter, with notes on the parts that are not flown as written."""
         name = command_name(item.command)
-        is_later_loiter = loiter_of(item) is not None and bool(self.stops)
+        is_later_loiter = stated_loiter(item) is not None and bool(self.stops)
         if is_later_loiter and item.alt == 0.0 and item.frame in OVER_HOME | OVER_TERRAIN:
             # `Location::sanitize`, which ArduPlane's `do_loiter_*` call, takes such an altitude for the present one.
             text = f"{name} at a height of 0 m: flown at the altitude of the item before, which ArduPlane keeps"
@@ -707,7 +707,7 @@ class _ItineraryBuilder:
             self.notes.arduplane.add(
                 f"{name} with {item.params[0]:g} turns: flown as {turns:g}, as in ArduPlane", item.seq
             )
-        elif loiter_of(item) is None:
+        elif stated_loiter(item) is None:
             self.add_open_item(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):
             self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)

@@ -44,12 +44,12 @@ DefaultRadius = Callable[[float, float], float]
 
 
 def item_radius(loiter: Loiter) -> float:
-    """Return the radius that a loiter's item states, m; 0 if the item states none."""
+    """Return the radius that a loiter's item states, m, without a sign for its direction; 0 if it states none."""
     return abs(loiter.radius)
 
 
 def unit_scale(up: float) -> float:
-    """Return 1 as the ratio of a loiter's radius at an altitude (m AMSL) to the stated radius."""
+    """Return 1: the flown radius of a loiter equals the stated radius at every altitude.  up: m AMSL."""
     return 1.0
 
 
@@ -92,7 +92,7 @@ class LoiterRules:
     rtl_exit_note: str = ""
 
     def end_note(self) -> str:
-        """Return a note on the loiter after the mission's end.
+        """Return a note for an autopilot that loiters after the mission's end about the last waypoint.
 
         >>> LoiterRules(80.0, "NAV_LOITER_RAD", ends_in_circle=True).end_note()
         'after the last waypoint the aircraft circles it without end, with NAV_LOITER_RAD, 80 m: flown once'
@@ -195,7 +195,7 @@ def _make_nodes(
     rules: LoiterRules,
     unjoined: list[UnjoinedStop],
 ) -> list[Node]:
-    """Return points and circles in flying order, each joined to the next by a tangent.
+    """Return the points and loiter circles of a route in flying order, each joined to the next by a tangent.
 
     Append the stops that no tangent joins to ``unjoined``.
 
@@ -293,7 +293,7 @@ def _signed_radius(
 
 
 def is_joined(a: Node, b: Node) -> bool:
-    """Return True if a tangent joins two circles or points, or if both are the same circle."""
+    """Return True if a tangent leads from one circle or point to the other, or if both are the same circle."""
     distance = a.distance_to(b)
     return distance > abs(b.signed_radius - a.signed_radius) + _MIN_TANGENT_CLEARANCE_M or (
         distance < 1.0 and abs(a.signed_radius - b.signed_radius) < 1.0
@@ -311,9 +311,9 @@ def tangent_course(a: Node, b: Node) -> float:
 
 
 def point_on_circle(node: Node, course: float, radius_ratio: float = 1.0) -> tuple[float, float]:
-    """Return the point (east, north, m) of a circle at which the course along it is ``course``.
+    """Return the point of a circle, east and north in m, at which an aircraft on the circle has a course (rad).
 
-    radius_ratio: distance of the point from the center, as a ratio to the radius.
+    radius_ratio: distance of the point from the center, as a ratio to the radius; 1 for a point on the circle.
     """
     return (
         node.east - node.signed_radius * radius_ratio * math.cos(course),

@@ -25,9 +25,9 @@ from flight.mission.itinerary import (
     OpenItem,
     Position,
     RoutePoint,
-    loiter_of,
     make_itinerary,
     pass_by_distance,
+    stated_loiter,
 )
 from flight.mission.return_path import LandingStart, ReturnPoint
 from world.arrays import Floats
@@ -266,7 +266,7 @@ def landing_sequence(
 def _stops_to_landing(
     items: Sequence[MissionItem], origin: GeoOrigin, heights: "_AltitudeConverter"
 ) -> tuple[LandingStart, ...]:
-    """Return the stops of items up to the first landing."""
+    """Return the stops of the items before the first landing item."""
     stops = []
     for item in items:
         if item.command in LANDINGS:
@@ -282,14 +282,15 @@ def _is_navigation_target(item: MissionItem) -> bool:
 
 
 def _item_position(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> tuple[float, float, float]:
+    """Return an item's position on the map, m; an item without an altitude gets the altitude of home."""
     stop = RoutePoint(item.seq, item.command, item.lat_deg, item.lon_deg, item.alt, item.frame, math.nan)
     east, north = project_stops(heights.source, (stop,), origin)[0].tolist()
     return east, north, heights.amsl(stop, east, north, heights.home_amsl())
 
 
 def _landing_stop(item: MissionItem, origin: GeoOrigin, heights: "_AltitudeConverter") -> LandingStart:
-    """Return a landing sequence that starts at an item, with the item's position as reference and no next stops."""
-    position, loiter = _item_position(item, origin, heights), loiter_of(item)
+    """Return a landing sequence that starts at an item, measured to the item's position and without next stops."""
+    position, loiter = _item_position(item, origin, heights), stated_loiter(item)
     radius = (loiter or Loiter(0.0)).radius
     return LandingStart(
         *(item.seq, position, position, loiter is not None, radius),
@@ -478,7 +479,10 @@ class _AltitudeConverter:
         return self.ground_at_home() if math.isnan(self.home.alt) else self.home.alt
 
     def _find_home_amsl(self, home: Home) -> float:
-        """Return home's stated altitude, or the ground there, or 0; add a note if it is doubtful or not stated."""
+        """Return home's altitude: as stated, otherwise the ground at home, otherwise 0 m AMSL.
+
+        Add a note if the altitude is not stated, or if it is far from the ground at home.
+        """
         ground = self.ground_at_home()
         if not math.isnan(home.alt):
             if abs(home.alt - ground) > _HOME_ALTITUDE_TOLERANCE_M:

@@ -60,7 +60,7 @@ def preflight_notes(
 
 
 def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note tail wind at a launch or a landing that the scenario states."""
+    """Yield a note on the tailwind at a launch or a landing that the scenario states."""
     courses = leg_courses(route.waypoints)
     launch, landing = scenario.launch, scenario.landing
     ends = []
@@ -76,7 +76,7 @@ def _note_tail_winds(route: Route, scenario: Scenario) -> Iterator[str]:
 
 
 def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
-    """Note a mission's home that is far from the launch at the scenario's home."""
+    """Yield a note if the mission's home is far from the scenario's home."""
     home, scenario_home = mission.home, scenario.home
     if home is None or scenario_home is None:
         return
@@ -92,7 +92,7 @@ def _note_distant_home(mission: Mission, scenario: Scenario) -> Iterator[str]:
 def _note_rally_points(
     points: tuple[ReturnPoint, ...], route: Route, scenario: Scenario, rules: ReturnRules
 ) -> Iterator[str]:
-    """Note rally points below ground, and rally points beyond the distance limit of any RTL from the route."""
+    """Yield notes on rally points below ground, and on rally points too distant for any RTL from the route."""
     for point in points:
         name = f"rally point {point.number}"
         ground = math.nan if scenario.terrain is None else float(scenario.terrain.height(point.east, point.north))
@@ -119,7 +119,7 @@ def _distance_from_path(waypoints: Floats, point: tuple[float, float]) -> float:
 
 
 def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: ReturnRules) -> Iterator[str]:
-    """Note an RTL to home whose altitude is below the ground under its loiter."""
+    """Yield a note if the altitude of an RTL to home is not above the ground within the RTL's loiter."""
     if not home or scenario.terrain is None or math.isnan(rules.height):
         return
     radius = max(MIN_RTL_LOITER_RADIUS_M, abs(rules.radius))
@@ -137,7 +137,7 @@ def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: R
 
 
 def _note_forbidden_landing_sequence(mission: Mission, parameters: Mapping[str, float]) -> Iterator[str]:
-    """Note a landing sequence that a parameter forbids: ArduPlane's check before arming (AP_Arming.cpp)."""
+    """Yield a note on a landing sequence with which ArduPlane does not arm because of RTL_AUTOLAND (AP_Arming.cpp)."""
     start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:
         yield f"item {start_numbers[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
@@ -148,15 +148,15 @@ _LEVEL_TEXT = "is level"
 
 
 def _slope_text(slope: float) -> str:
-    """Return a description of a slope of the ground (m per m)."""
+    """Describe a slope of the ground (m per m) as the predicate of a sentence."""
     percent_text = f"{abs(slope):.1%}"
     return _LEVEL_TEXT if percent_text == "0.0%" else f"{'rises' if slope > 0.0 else 'falls'} by {percent_text}"
 
 
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
-    """Return the slopes of the ground along and across a landing without a stated strip, m per m.
+    """Return the ground slopes along and across a landing for which the scenario has no strip, m per m.
 
-    The slopes are NaN if the ground is unknown; the result is None without such a landing.
+    The slopes are NaN if the ground is unknown.  Returns None if the mission has no such landing.
     """
     last_item = int(route.items[-1])
     has_landing = any(item.seq == last_item and item.command == Command.NAV_LAND for item in mission.items)
@@ -169,7 +169,7 @@ def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[
 
 
 def _note_landing_ground(mission: Mission, route: Route, scenario: Scenario) -> Iterator[str]:
-    """Note the ground at a landing without a stated strip."""
+    """Yield a note on the wind and the ground at a landing for which the scenario has no strip."""
     last_item = int(route.items[-1])
     slopes = landing_slopes(mission, route, scenario)
     if slopes is None:

@@ -84,7 +84,7 @@ class LandingStart(NamedTuple):
 
 
 def nearest_landing_sequence(position: Position, landings: Sequence[LandingStart]) -> LandingStart | None:
-    """Return the landing sequence that ArduPlane chooses at a position (east, north, up), or None without sequences.
+    """Return the landing sequence that ArduPlane chooses at a position (east, north, up), or None if there is none.
 
     ArduPlane chooses the sequence with the shortest distance in 3D (`AP_Mission::get_landing_sequence_start` in
     libraries/AP_Mission/AP_Mission.cpp).
@@ -480,9 +480,10 @@ class _ReturnBuilder:
             self._add_waypoint(*point_on_circle(node, exit_course), 0.0, on_circle=True)
 
     def _turn_to_tangent(self, course: float, radius: float) -> tuple[Node, float, float] | None:
-        """Return the circle, angle and final course of the arc to a tangent of the target's loiter.
+        """Return the arc from the current position to a tangent of the target's loiter, in the shorter direction.
 
-        Choose the shorter direction; return None if there is no such tangent.
+        course: at the start of the arc, rad.  radius: m.
+        Returns the arc's circle, its angle, rad, and the course at its end, rad; None if there is no such tangent.
         """
         course_error = float(wrap(_course(self._position, (self._circle.east, self._circle.north, 0.0)) - course))
         turn_sign = math.copysign(1.0, course_error)
@@ -494,7 +495,7 @@ class _ReturnBuilder:
         return next((arc for arc in arcs if arc[1] < _MAX_TURN_ANGLE_RAD), None)
 
     def _turn_on_side(self, course: float, signed_radius: float) -> tuple[Node, float, float] | None:
-        """Return `_turn_to_tangent` for a turn to one side: to the right if the radius is positive."""
+        """Return the arc of `_turn_to_tangent` for a turn to one side, to the right if the radius is positive."""
         east, north, up = self._position
         node = Node(
             self._stop,
@@ -514,7 +515,7 @@ class _ReturnBuilder:
             self._add_waypoint(east, north, abs(node.signed_radius), on_circle=on_circle)
 
     def _add_waypoint(self, east: float, north: float, arc: float, *, on_circle: bool = False) -> None:
-        """Add a waypoint at the altitude of the RTL at this position."""
+        """Add a waypoint at the altitude that the RTL has there.  arc: radius of its turn, m, 0 for a sharp corner."""
         distance = math.hypot(east - self._position[0], north - self._position[1])
         altitude, climb_altitude = self._position[2], max(self._circle.up, self._first_climb_altitude)
         if climb_altitude >= altitude:
@@ -526,7 +527,7 @@ class _ReturnBuilder:
         self.points.append(self._stop.at(self._position, arc))
 
     def _slope_altitude(self, east: float, north: float) -> float:
-        """Return the altitude of the slope to the target at a point; for a step, the target's altitude."""
+        """Return the altitude of the slope to the target at a point, m AMSL; for a step, the target's altitude."""
         start_altitude, end_altitude = self._slope_start[2], self._circle.up
         if self._is_step:
             return end_altitude
@@ -536,7 +537,7 @@ class _ReturnBuilder:
         )
 
     def _slope_fraction(self, east: float, north: float) -> float:
-        """Return the fraction of the slope's length up to a point."""
+        """Return the fraction of the slope, from its start to the target, that lies before a point."""
         start_east, start_north, _ = self._slope_start
         slope_east, slope_north = self._circle.east - start_east, self._circle.north - start_north
         return ((east - start_east) * slope_east + (north - start_north) * slope_north) / max(
@@ -545,7 +546,10 @@ class _ReturnBuilder:
 
 
 def _rim_point_ahead(position: Position, course: float, circle: Node) -> tuple[float, float, float]:
-    """Return the point where a straight path from inside a circle meets it, and the course along the circle there."""
+    """Return the point where a straight path from inside a circle reaches it, and the course along the circle there.
+
+    course: of the straight path, rad.  Returns east and north, m, and the course, rad.
+    """
     offset_east, offset_north = position[0] - circle.east, position[1] - circle.north
     distance_past_center = offset_east * math.sin(course) + offset_north * math.cos(course)
     distance = -distance_past_center + math.sqrt(
@@ -568,7 +572,7 @@ def _course(a: Position, b: Position) -> float:
 
 
 def _distance(a: Position, b: Position | ReturnPoint) -> float:
-    """Return the horizontal distance, m."""
+    """Return the horizontal distance between two positions, m."""
     return math.hypot(b[0] - a[0], b[1] - a[1])
 
 

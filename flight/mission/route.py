@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, turn_radius_between
 from flight.mission.items import LANDINGS, OVER_TERRAIN, PLACES, Command, Mission, Notes, command_name
-from flight.mission.itinerary import NEVER_REACHED, Itinerary, OpenItem, RoutePoint, loiter_of
+from flight.mission.itinerary import NEVER_REACHED, Itinerary, OpenItem, RoutePoint, stated_loiter
 from flight.mission.loiter_circles import (
     DEFAULT_LOITER_RULES,
     DEFAULT_SPIRAL_SLOPE,
@@ -157,7 +157,7 @@ def ends_at_plain_waypoint(route: Route, mission: Mission) -> bool:
     return (
         final_item is not None
         and final_item.command in PLACES
-        and loiter_of(final_item) is None
+        and stated_loiter(final_item) is None
         and route.rtl_loiter is None
     )
 
@@ -228,7 +228,7 @@ def fly_over_waypoints(
     limits: Limits | None,
     turn_distance: Callable[[float, float], float] | None = None,
 ) -> NDArray[np.bool_]:
-    """Return True for each waypoint that is flown over, because the fly-by arc at the bank limit misses it, (w,).
+    """Return a mask of the waypoints that must be flown over, (w,), because a fly-by arc would pass too far from them.
 
     points: (w, 3) m.
     airspeed: (w - 1,) m/s.
@@ -353,7 +353,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
 def _lead_point(
     point: np.ndarray, course: float, leg_course: float, limits: Limits, end_sign: float
 ) -> np.ndarray | None:
-    """Return the outer end of a lead-in or lead-out leg, or None if no turn is needed.
+    """Return the outer end of a lead-in or lead-out leg, (3,) m, or None if no such leg is needed.
 
     point: (3,) m, end of the route.
     course: the scenario's course there, rad.
@@ -439,12 +439,12 @@ def route_through_stops(
     mission, notes = placed_mission.mission, Notes()
     return_rules, loiter_rules, reads_as_px4, turn_distance, acceptance_limit = rules
     all_stops = _insert_gates(placed_mission, notes) if reads_as_px4 else placed_mission.stops
-    read = partial(_read_stops, default_airspeed, reads_as_px4)
-    placed_stops = read(all_stops, 0)
+    read_stops = partial(_read_stops, default_airspeed, reads_as_px4)
+    placed_stops = read_stops(all_stops, 0)
     return_stop = placed_stops.pop() if placed_mission.itinerary.ends_with_rtl else None
     direct_landing = _find_direct_landing(placed_mission, placed_stops, return_rules, notes)
     if direct_landing is not None:
-        placed_stops += read(direct_landing.stops, len(all_stops))
+        placed_stops += read_stops(direct_landing.stops, len(all_stops))
     lay_out = partial(_lay_out_waypoints, mission.source, limits, loiter_rules, notes)
     points, unjoined = lay_out(placed_stops)
     _note_unsimulated_loiters(placed_mission.itinerary, placed_stops, loiter_rules, notes)
@@ -452,7 +452,7 @@ def route_through_stops(
     if return_stop is not None and direct_landing is None:
         return_fields, landing = _append_return(placed_mission, return_stop, points, return_rules, limits, notes)
         if landing is not None:
-            points += lay_out(read(landing.stops, len(all_stops)))[0]
+            points += lay_out(read_stops(landing.stops, len(all_stops)))[0]
     _check_point_count(mission.source, len(points))
     waypoints, arcs = np.array([point.map_position for point in points]), np.array([point.arc for point in points])
     airspeed = np.array([point.airspeed for point in points[1:]])
@@ -482,7 +482,7 @@ def route_through_stops(
 
 
 def _columns_with_nan(points: list[RoutePoint], home_up: float) -> dict[str, Any]:
-    """Return the columns of `ROUTE_COLUMNS_WITH_NAN`.
+    """Return the columns `ROUTE_COLUMNS_WITH_NAN` of a route by their names.
 
     home_up: altitude of home for a stop that states none, m AMSL.
     """
@@ -523,6 +523,7 @@ def _open_items(itinerary: Itinerary, landing: PlacedLanding | None, reads_as_px
 def _lay_out_waypoints(
     source: str, limits: Limits | None, loiters: LoiterRules, notes: Notes, stops: list[RoutePoint]
 ) -> tuple[list[RoutePoint], tuple[UnjoinedStop, ...]]:
+    """Lay out waypoints as `lay_out_waypoints` does, with loiters and spirals within the limits of the aircraft."""
     return lay_out_waypoints(
         source, stops, notes, _default_radius_function(limits), _spiral_slope_function(limits), loiters
     )
@@ -694,9 +695,9 @@ def _gate_fraction(a: Floats, b: Floats, gate: tuple[Any, Any]) -> float:
 def _read_stops(
     default_airspeed: float, as_px4: bool, stops: Sequence[RoutePoint], first_number: int
 ) -> list[RoutePoint]:
-    """Return placed stops, numbered, with the airspeed that the autopilot reads from the mission, or the default, m/s.
+    """Return placed stops with their numbers, and with the airspeed that the autopilot reads from the mission.
 
-    first_number: number of the first stop.
+    default_airspeed: airspeed for a stop without a stated one, m/s.  first_number: number of the first stop.
     """
     stated_airspeeds = [stop.px4_airspeed if as_px4 else stop.airspeed for stop in stops]
     return [

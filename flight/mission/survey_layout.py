@@ -272,13 +272,13 @@ def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, orig
         return None
     direction = np.array([math.sin(course), math.cos(course)])
     right = np.array([direction[1], -direction[0]])
-    lateral, along = hull @ right, hull @ direction
+    lateral, longitudinal = hull @ right, hull @ direction
     count = max(1, round((lateral.max() - lateral.min()) / survey.spacing))
     margin = 0.5 * (lateral.max() - lateral.min() - (count - 1) * survey.spacing)
     first_line, line_ends = lines[0], list[Floats]()
     for number in range(count):
         offset = float(lateral.min()) + margin + number * survey.spacing
-        crossings = _line_within_outline(lateral, along, offset)
+        crossings = _line_within_outline(lateral, longitudinal, offset)
         if crossings is None or crossings[1] - crossings[0] < _MIN_LINE_LENGTH_M:
             continue
         line_ends.append(np.array([offset * right + distance * direction for distance in crossings]))
@@ -323,23 +323,30 @@ def _is_bent(corners: Floats) -> bool:
     return bool(np.abs(lateral_offsets).max() > _BEND_TOLERANCE_M)
 
 
-def _line_within_outline(lateral: Floats, along: Floats, offset: float) -> tuple[float, float] | None:
-    """Return where a line enters and leaves a convex outline, m along the line, or None if they do not cross."""
+def _line_within_outline(lateral: Floats, longitudinal: Floats, offset: float) -> tuple[float, float] | None:
+    """Return where a line enters and leaves a convex outline, m along the line, or None if they do not cross.
+
+    lateral, longitudinal: coordinates of the outline's corners across and along the line, m.
+    offset: lateral coordinate of the line, m.
+    """
     crossings = []
     for index in range(len(lateral)):
         start_distance, end_distance = lateral[index - 1] - offset, lateral[index] - offset
         if start_distance * end_distance <= 0.0 and start_distance != end_distance:
             crossings.append(
                 float(
-                    along[index - 1]
-                    + (along[index] - along[index - 1]) * start_distance / (start_distance - end_distance)
+                    longitudinal[index - 1]
+                    + (longitudinal[index] - longitudinal[index - 1]) * start_distance / (start_distance - end_distance)
                 )
             )
     return (min(crossings), max(crossings)) if len(crossings) >= 2 else None
 
 
 def _move_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -> tuple[MissionItem, ...]:
-    """Return a line's items moved to another line: its first and last waypoint at the new ends, without any other."""
+    """Return a line's items moved to another line; its waypoints between the first and the last are left out.
+
+    ends: ends of the other line, (2, 2) m.
+    """
     waypoint_indices = [index for index, item in enumerate(items) if is_navigation(item.command)]
     moved = []
     for index, item in enumerate(items):

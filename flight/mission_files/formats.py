@@ -41,7 +41,7 @@ _UTF16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> FileKind:
-    """Return the form of a mission file by its suffix. Raises MissionError for an unknown suffix.
+    """Return the form of a mission file, judged by its suffix. Raises MissionError for an unknown suffix.
 
     >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
     ('plan', 'waypoints')

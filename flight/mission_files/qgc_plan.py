@@ -62,29 +62,30 @@ def expand_items(items: list[Any], source: str, warnings: list[str], plans: list
     for index, item in enumerate(items):
         kind = item.get("type", "SimpleItem") if isinstance(item, dict) else "SimpleItem"
         if kind == "SimpleItem":
-            simple_items.append(_to_present_form(item, f"{source}: mission.items.{index}", warnings))
+            simple_items.append(_to_current_form(item, f"{source}: mission.items.{index}", warnings))
             continue
-        place = f"mission.items.{index}"
+        location = f"mission.items.{index}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
         if name in _TRANSECT_KINDS:
-            replacements = _transect_items(item, source, place, name)
-            plans.append(_survey_plan(item["TransectStyleComplexItem"], replacements, f"{source}: {place}", warnings))
+            replacements = _transect_items(item, source, location, name)
+            settings = item["TransectStyleComplexItem"]
+            plans.append(_survey_plan(settings, replacements, f"{source}: {location}", warnings))
         elif name == _LANDING_KIND:
-            replacements = _landing_items(item, source, place, _last_number(simple_items) + 1)
+            replacements = _landing_items(item, source, location, _last_number(simple_items) + 1)
         else:
             read_kinds = f"only SimpleItem, {', '.join(_TRANSECT_KINDS)} and {_LANDING_KIND} are read"
             allowed = f"{read_kinds}; convert it to items in the ground station first"
             kind_text = f"{json.dumps(kind)[:40]} {name!r}"
-            raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=kind_text)
+            raise MissionError.at(source, f"{location}.type", name or kind, allowed, shown=kind_text)
         warnings.append(
-            f"{source}: {place}: {name} replaced by the {len(replacements)} simple items that it represents"
+            f"{source}: {location}: {name} replaced by the {len(replacements)} simple items that it represents"
         )
         simple_items += replacements
     return simple_items
 
 
-def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
-    """Convert a simple item of an older version, or without altitude, to QGroundControl's present form.
+def _to_current_form(item: Any, location: str, warnings: list[str]) -> Any:
+    """Convert a simple item of an older version, or without an altitude, to QGroundControl's current form.
 
     Until 2018 a position was in ``coordinate``, next to four parameters (`MissionItem::_convertJsonV2ToV3`). An
     altitude that QGroundControl computes from the terrain is null in the parameters until it knows the terrain; it is
@@ -104,16 +105,16 @@ def _to_present_form(item: Any, place: str, warnings: list[str]) -> Any:
         and has_height
     ):
         warnings.append(
-            f"{place}: QGroundControl has not calculated its altitude: taken as {height:g} m above the terrain there"
+            f"{location}: QGroundControl has not calculated its altitude: taken as {height:g} m above the terrain there"
         )
         return {**item, "frame": int(Frame.GLOBAL_TERRAIN_ALT), "params": [*params[:6], height]}
     return item
 
 
-def _transect_items(item: dict[str, Any], source: str, place: str, name: str) -> list[Any]:
+def _transect_items(item: dict[str, Any], source: str, location: str, name: str) -> list[Any]:
     """Return the simple items that a survey or corridor scan contains.
 
-    place: location of the item in the file, for messages.
+    location: location of the item in the file, for messages.
     name: kind of the ComplexItem.
 
     Raises MissionError if the item contains none.
@@ -121,7 +122,7 @@ def _transect_items(item: dict[str, Any], source: str, place: str, name: str) ->
     settings = item.get("TransectStyleComplexItem")
     items = settings.get("Items") if isinstance(settings, dict) else None
     if not isinstance(items, list) or not items:
-        field, shown = f"{place}.TransectStyleComplexItem.Items", f"{name!r} without its items"
+        field, shown = f"{location}.TransectStyleComplexItem.Items", f"{name!r} without its items"
         allowed = "expected a list; save the plan again in the ground station"
         raise MissionError.at(source, field, items, allowed, shown=shown)
     return items
@@ -154,8 +155,11 @@ class _CameraCalc(BaseModel):
         return Camera(across, along, front_overlap, side_overlap, self.MinTriggerInterval or 0.0)
 
 
-def _survey_plan(settings: dict[str, Any], items: list[Any], place: str, warnings: list[str]) -> SurveyPlan:
-    """Return the settings that a survey stores in addition to its items: line extension and camera."""
+def _survey_plan(settings: dict[str, Any], items: list[Any], location: str, warnings: list[str]) -> SurveyPlan:
+    """Return the settings that a survey stores in addition to its items: line extension and camera.
+
+    An invalid camera is left out, and a warning is added.
+    """
     turn_around = settings.get("TurnAroundDistance")
     if isinstance(turn_around, bool) or not isinstance(turn_around, int | float) or not 0.0 <= turn_around <= 1e5:
         turn_around = 0.0
@@ -168,12 +172,12 @@ def _survey_plan(settings: dict[str, Any], items: list[Any], place: str, warning
             fault = error.errors()[0]
             field = ".".join(map(str, fault["loc"]))
             shown = "missing" if fault["type"] == "missing" else json.dumps(fault["input"])[:40]
-            warnings.append(f"{place}: CameraCalc.{field}: {shown}: its camera is ignored, and no overlap is judged")
+            warnings.append(f"{location}: CameraCalc.{field}: {shown}: its camera is ignored, and no overlap is judged")
     return SurveyPlan(_trigger_distance(items), float(turn_around), camera)
 
 
 def _trigger_distance(items: list[Any]) -> float:
-    """Return the longest distance between photos that items state, m, or 0 if none does."""
+    """Return the longest distance between photos that the items state, m, or 0 if no item states one."""
     distances = [0.0]
     for item in items:
         params = item.get("params") if isinstance(item, dict) else None
@@ -185,34 +189,34 @@ def _trigger_distance(items: list[Any]) -> float:
 
 
 def _last_number(items: list[Any]) -> int:
-    """Return the number of the last item read."""
+    """Return the number of the last item; if the item states none, return the number of items."""
     number = items[-1].get("doJumpId") if items and isinstance(items[-1], dict) else None
     return number if isinstance(number, int) else len(items)
 
 
-def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -> list[Any]:
+def _landing_items(item: dict[str, Any], source: str, location: str, number: int) -> list[Any]:
     """Return the items of a landing pattern as QGC sends them: DO_LAND_START, the approach, NAV_LAND.
 
     The approach is a descending loiter or a waypoint.
 
-    place: location of the item in the file, for messages.
+    location: location of the item in the file, for messages.
     number: number of the first returned item.
     """
 
-    def read(key: str) -> list[Any] | None:
-        return _read_coordinate(item, key, source, place)
+    def read_position(key: str) -> list[Any] | None:
+        return _read_coordinate(item, key, source, location)
 
-    approach = read("landingApproachCoordinate") or read("loiterCoordinate")
-    land = read("landCoordinate")
+    approach = read_position("landingApproachCoordinate") or read_position("loiterCoordinate")
+    land = read_position("landCoordinate")
     if approach is None or land is None:
         key = "landCoordinate" if land is None else "landingApproachCoordinate"
-        raise MissionError.at(source, f"{place}.{key}", None, _COORDINATE_TEXT, shown="missing")
+        raise MissionError.at(source, f"{location}.{key}", None, _COORDINATE_TEXT, shown="missing")
     relative = item.get("altitudesAreRelative", True)
     frame = Frame.GLOBAL_RELATIVE_ALT if relative else Frame.GLOBAL
     radius = item.get("loiterRadius", 0.0)
     if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0.0 <= radius <= 1e5:
         shown = json.dumps(radius)[:40]
-        raise MissionError.at(source, f"{place}.loiterRadius", radius, "expected 0..100000 m", shown=shown)
+        raise MissionError.at(source, f"{location}.loiterRadius", radius, "expected 0..100000 m", shown=shown)
     signed_radius = float(radius) if item.get("loiterClockwise", True) else -float(radius)
     is_spiral = item.get("useLoiterToAlt", True)
     approach_command = (
@@ -238,8 +242,8 @@ def _landing_items(item: dict[str, Any], source: str, place: str, number: int) -
     ]
 
 
-def _read_coordinate(item: dict[str, Any], key: str, source: str, place: str) -> list[Any] | None:
-    """Return latitude, longitude and altitude under a key, or None without this key.
+def _read_coordinate(item: dict[str, Any], key: str, source: str, location: str) -> list[Any] | None:
+    """Return the latitude, longitude and altitude under a key of an item, or None if the key is missing or null.
 
     Raises MissionError for anything but three values.
     """
@@ -247,7 +251,7 @@ def _read_coordinate(item: dict[str, Any], key: str, source: str, place: str) ->
     if value is None:
         return None
     if not isinstance(value, list) or len(value) != 3 or None in value:
-        raise MissionError.at(source, f"{place}.{key}", value, _COORDINATE_TEXT, shown=json.dumps(value)[:40])
+        raise MissionError.at(source, f"{location}.{key}", value, _COORDINATE_TEXT, shown=json.dumps(value)[:40])
     return value
 
 
@@ -273,7 +277,7 @@ _Pair = Annotated[list[_Number], Field(min_length=2, max_length=2)]
 
 
 class _Item(_Table):
-    # A ComplexItem has none of a SimpleItem's keys; `_check_kind` reports it first.
+    # A ComplexItem has none of a SimpleItem's keys; `_expand_complex_items` replaces it first.
     autoContinue: bool = True
     command: Annotated[int, Field(ge=0, le=65535)]
     doJumpId: Annotated[int, Field(ge=0, le=65535)] | None = None
@@ -349,8 +353,8 @@ def _check_vehicle(kind: int | None, source: str) -> None:
         raise MissionError.at(source, "mission.vehicleType", kind, allowed)
 
 
-def _autopilot_of(firmware: int | None, source: str) -> str:
-    """Return the name in scenarios of a firmwareType's autopilot; "" if the plan names none.
+def _autopilot_name(firmware: int | None, source: str) -> str:
+    """Return the name that scenarios use for the autopilot of a firmwareType; "" if the plan names no autopilot.
 
     Raises MissionError for an unknown firmwareType.
     """
@@ -372,13 +376,13 @@ def parse_plan_file(text: str, source: str) -> Mission:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
         raise MissionError(f"{source}: not valid JSON: {_first_line(error)}", file=source) from error
-    warnings, plans = _check_kind(data, source)
+    warnings, plans = _expand_complex_items(data, source)
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
         raise MissionError(**first_fault(error, data).at(source)) from error
     _check_vehicle(file.mission.vehicleType, source)
-    autopilot = _autopilot_of(file.mission.firmwareType, source)
+    autopilot = _autopilot_name(file.mission.firmwareType, source)
     items = [_read_item(item, index, source) for index, item in enumerate(file.mission.items)]
     if not (items or file.geoFence.circles or file.geoFence.polygons or file.rallyPoints.points):
         raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
@@ -412,10 +416,10 @@ def parse_plan_file(text: str, source: str) -> Mission:
     return renumber_items(mission)
 
 
-def _check_kind(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
-    """Raise MissionError if JSON data is no plan; otherwise expand its items in place.
+def _expand_complex_items(data: Any, source: str) -> tuple[list[str], list[SurveyPlan]]:
+    """Replace the ComplexItems in a plan's JSON data, in place, by the simple items that they stand for.
 
-    Return warnings and survey settings.
+    Returns warnings, and the settings of each survey.  Raises MissionError if the data is not a plan.
     """
     if not isinstance(data, dict):
         message = f'{source}: expected a JSON object with fileType "Plan", got {type(data).__name__}'
@@ -464,7 +468,7 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
     """Return the fence items of a plan. Raises MissionError for an invalid position."""
     fences: list[MissionItem] = []
 
-    def add(command: Command, p1: float, point: list[float], place: str) -> None:
+    def add(command: Command, p1: float, point: list[float], location: str) -> None:
         item = MissionItem(
             len(fences),
             int(command),
@@ -476,7 +480,7 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(**problem.at(source, f"{source}: geoFence.{place}"))
+            raise MissionError(**problem.at(source, f"{source}: geoFence.{location}"))
         fences.append(item)
 
     for index, shape in enumerate(fence.polygons):
@@ -569,6 +573,7 @@ def _cruise_speed(mission: Mission) -> float:
 
 
 def _item_json(item: MissionItem) -> dict[str, Any]:
+    """Return an item as a SimpleItem of a `.plan`."""
     numbers = [_nan_as_null(value) for value in (*item.params, item.lat_deg, item.lon_deg, item.alt)]
     data: dict[str, Any] = {
         "autoContinue": item.autocontinue,
@@ -585,6 +590,7 @@ def _item_json(item: MissionItem) -> dict[str, Any]:
 
 
 def _fence_json(fences: tuple[MissionItem, ...]) -> dict[str, Any]:
+    """Return fence items as the geoFence of a `.plan`."""
     circles: list[dict[str, Any]] = []
     polygons: list[dict[str, Any]] = []
     for shape in fence_shapes(fences):

@@ -181,7 +181,10 @@ def _parse_number(location: TextLine, name: str, text: str) -> float:
 
 
 def _renumbered_rows(rows: list[_Row]) -> list[_Row]:
-    """Return the rows with items numbered by their lines; without a home line the first item is number 1."""
+    """Return the rows with items numbered in the order of their lines, from 0 if the file has a home line, else from 1.
+
+    Fence and rally items without a home line are numbered from 0, too.
+    """
     first_number = 0 if _begins_with_home(rows) or rows[0].item.command in _COMMANDS_WITH_OWN_FILES else 1
     return [replace(row, item=replace(row.item, seq=seq)) for seq, row in enumerate(rows, first_number)]
 
@@ -195,7 +198,7 @@ def _begins_with_home(rows: list[_Row]) -> bool:
 
 
 def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
-    """Return home, or None if the file states no valid one, and the rows of all items."""
+    """Return home and the rows of all items; home is None if the file states no valid position for it."""
     if not _begins_with_home(rows):
         return None, rows
     home_item = rows[0].item
@@ -365,7 +368,7 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
 
 
 def _content_lines(text: str) -> list[tuple[int, str]]:
-    """Return the lines that are neither empty nor comments, with their numbers."""
+    """Return the number and the text of each line that is neither empty nor a comment."""
     lines = enumerate(text.removeprefix("\ufeff").splitlines(), 1)
     return [(number, line.strip()) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 

@@ -124,12 +124,12 @@ def autopilot_parameters(scenario: Scenario, stated_values: Mapping[str, float])
 
 def fly_process(connection: Connection, options: ServeOptions) -> None:
     """Fly missions on request until the connection closes; the main function of a flight process."""
-    in_service = threading.Event()
-    end_with_parent(in_service)
+    detects_parent_end = threading.Event()
+    end_with_parent(detects_parent_end)
     factory = ServedFlights(options)
     factory.warm_up()
     # A signal to the process group also reaches the link, which orders this process to end after closing its log.
-    in_service.set()
+    detects_parent_end.set()
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     send_event(connection, ProcessReady())
     serve_flights(connection, factory)

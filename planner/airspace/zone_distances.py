@@ -104,9 +104,10 @@ def zone_excess(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the shift that moves a line `required_distance` m away from exclusion z, and its fractions abreast of z.
+    """Return the depth of a line in exclusion z, enlarged by `required_distance`, m, and two fractions of the line.
 
-    The shift is 0 m if the line already is that far away.
+    The depth is the shift of the line that would move it to `required_distance` (m) from the zone; 0 if the line is far
+    enough away.  The part of the line that is abreast of the zone is between the two fractions.
     """
     view = view_shape(records, z, line, required_distance)
     if not view.inside and view.distance >= required_distance:
@@ -125,7 +126,7 @@ def penetration_depth(
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return a line's shortfall of distance inside inclusion z, integrated over its length, m x km."""
+    """Return how far a line is from being `required_distance` (m) inside inclusion z, integrated along it, m x km."""
     view = view_shape(records, z, line, required_distance)
     if view.inside and view.distance >= required_distance:
         return 0.0
@@ -143,7 +144,10 @@ def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_d
 
 @inlined
 def altitude_band(start_altitude: float, end_altitude: float, error_below: float, error_above: float) -> AltitudeBand:
-    """Return the vertical range of a straight line over unknown ground; error_below, error_above: tracking error, m."""
+    """Return the vertical range of a straight line over unknown ground, with the tracking error added.
+
+    error_below, error_above: vertical tracking error, m.
+    """
     min_altitude, max_altitude = (
         min(start_altitude, end_altitude) - error_below,
         max(start_altitude, end_altitude) + error_above,
@@ -163,7 +167,11 @@ def _sampled_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the vertical range of a-b between two fractions of its length, with sampled heights above ground."""
+    """Return the vertical range of a part of the line a-b, with heights above ground at samples.
+
+    first_fraction, last_fraction: limits of the part, as fractions of the line.
+    If the ground is unknown at a sample, the heights above ground are not limited.
+    """
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     band = altitude_band(a[2] + first_fraction * dz, a[2] + last_fraction * dz, error_below, error_above)
     first_column, first_row = polymap(to_pixel, a[0] + first_fraction * dx, a[1] + first_fraction * dy)
@@ -186,9 +194,10 @@ def _sampled_altitude_band(
 
 @inlined
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:
-    """Return the distance of a vertical range below a zone's floor or above its ceiling, m; negative between them.
+    """Return the distance of a vertical range below a zone's floor or above its ceiling, m.
 
-    The distance is the smallest over the range for an exclusion, and the largest for an inclusion.
+    The distance is negative between floor and ceiling.  It is the smallest distance of any height of the range for an
+    exclusion, and the largest for an inclusion.
     """
     floor_min, floor_max = band.min_altitude, band.max_altitude
     if zone.floor_above_ground:
@@ -292,15 +301,19 @@ def _update_margin(zone: Record, required: Record, z: int, horizontal: float, ve
 
 @inner
 def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> float:
-    """Return the distance from violating a zone, given the horizontal and vertical distances, m."""
+    """Return the distance that is left before a zone is violated, m; negative if it is violated.
+
+    horizontal: distance outside an exclusion or inside an inclusion, m.  vertical: distance outside its band, m.
+    """
     return max(horizontal, vertical) if zone.exclusion else min(horizontal, -vertical)
 
 
 @inner
 def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, max_distance: float) -> float:
-    """Return the smallest horizontal distance of a-b outside an exclusion or inside an inclusion, m; else negative.
+    """Return the smallest horizontal distance of the line a-b outside an exclusion or inside an inclusion, m.
 
-    Distances above `max_distance` may be inf.
+    The distance is negative for a line that enters the exclusion or leaves the inclusion.  Distances above
+    `max_distance` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     view = view_shape(records, z, line, max_distance)
@@ -324,7 +337,10 @@ def _exact_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the vertical range along a-b, also above the ground within the lateral error (2,) m of a-b."""
+    """Return the vertical range of the line a-b, with exact heights above the ground below it and on both sides of it.
+
+    lateral_error: (2,) distance of the ground on both sides that is included, at a and at b, m.
+    """
     band = altitude_band(a[2], b[2], error_below, error_above)
     horizontal_length = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     ux, uy = (b[0] - a[0]) / horizontal_length, (b[1] - a[1]) / horizontal_length

@@ -53,9 +53,9 @@ class ZoneMargins(NamedTuple):
 
 
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
-    """Return zones with the given margins, reduced for zones with a fixed end inside the margin.
+    """Return zones with margins; the margin of a zone is reduced if a fixed end violates it.
 
-    ends: (k, 3) m. An end inside an exclusion, or outside an inclusion, makes its margin 0.
+    ends: (k, 3) m. The margin is 0 for an exclusion that contains an end, and for an inclusion that does not.
 
     >>> from world.airspace.zones import Cylinder
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
@@ -84,9 +84,9 @@ def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, ma
 def _reduce_margins(
     records: ZoneRecords, ends: Floats, ground_heights: Floats, fraction: float, required: Records
 ) -> None:
-    """Reduce margins to a fraction of the distances of the ends (k, 3).
+    """Reduce the margins that a fixed end violates to a fraction of the end's distance from the zone.
 
-    ground_heights: (k,) ground heights at the ends, m.
+    ends: (k, 3) m.  ground_heights: (k,) ground heights at the ends, m.
     """
     for z in range(required.shape[0]):
         zone, margin = records.zones[z], required[z]
@@ -108,7 +108,7 @@ def _reduce_margins(
 
 @inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:
-    """Return the index of the first exclusion that may extend as far east as `west` (m)."""
+    """Return the index of the first exclusion that may reach a position `west` (m), the western edge of a search."""
     low, high = zones.inclusions, zones.required.shape[0]
     while low < high:
         middle = (low + high) // 2

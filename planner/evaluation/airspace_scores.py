@@ -43,7 +43,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `AIRSPACE_PIECE` records for the legs of a path (w, 3), followed by those for its corners."""
+    """Return `AIRSPACE_PIECE` records of a path (w, 3): first those of its legs, then those of its corners."""
     pieces = (
         tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
     )
@@ -248,7 +248,9 @@ def _swath_excess_height(
     above: float,
     max_excess: float,
 ) -> float:
-    """Return the largest excess over the maximum height, among a line and the lines offset to both sides, m x km.
+    """Return the excess of a line over the maximum height, integrated along it, m x km.
+
+    The excess is the largest among the line and two lines that are offset by `lateral` (m) to both sides.
 
     If the excess is larger than `max_excess`, return a lower bound that is larger than `max_excess`, too.
     """
@@ -279,8 +281,9 @@ def _cut_segment(
 
 
 def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
-    """Count the leg pieces, six per leg, that violate a zone or the maximum height in each path (n, w, 3), (n,).
+    """Return the number of leg pieces, six per leg, that violate a zone or the maximum height in each path, (n,).
 
+    paths: (n, w, 3) m.
     The paper counts points, six per leg, and has no zones; a path could pass through a zone between two points, so
     pieces are tested along their full length.
 
@@ -300,7 +303,7 @@ def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
 
 @compiled
 def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:
-    """Return the number of pieces (n,) in each path (n, w, 3) that violate a zone or the maximum height."""
+    """Implement `airspace_counts` for contiguous paths (n, w, 3)."""
     path_count, waypoints, _ = paths.shape
     counts = np.zeros(path_count, np.int64)
     a, b = np.empty(3), np.empty(3)

@@ -74,7 +74,7 @@ _MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
-    """Return one line on faults of one kind, with the worst fault and the other places; no line without faults."""
+    """Return one line about faults of one kind, with the worst fault and the other places; no line if there is none."""
     if not faults:
         return []
     (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
@@ -104,7 +104,7 @@ def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) ->
 
 
 def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest length of a leg that remains between its turns, m, and append too short legs to `problems`.
+    """Return the smallest length of any leg between its two turns, m, and append legs that are too short to `problems`.
 
     Return inf if legs need not be as long as their turns.
     """

@@ -56,7 +56,7 @@ END_DISTANCE_M = 100.0
 
 @inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records for the legs of a path (w, 3), followed by those for its corners."""
+    """Return `TRACKED_PIECE` records of a path (w, 3): first those of its legs, then those of its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind_vector(data.aircraft), data.tracking.across
@@ -102,7 +102,10 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _piece_ends(decay: float, horizontal_length: float) -> Floats:
-    """Return the end fractions of a leg's pieces, increasing; the last is 1."""
+    """Return the fractions of a leg at which its pieces end, in increasing order; the last is 1.
+
+    decay: length of the leg in lengths of the height lag.
+    """
     fractions = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
         fractions[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
@@ -193,7 +196,9 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
 
 @compiled
 def with_courses(data: ProblemArrays, path: Floats) -> Floats:
-    """Add a distant point on the prescribed course before the start of a path, and another after its destination.
+    """Return a path with a distant point added before its start, and another after its destination.
+
+    Both points are on the prescribed courses there.
 
     Without a prescribed course the point is on the extension of the leg, so that no turn results.
     """
@@ -217,7 +222,7 @@ def with_courses(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the lengths that each leg's turns, and the roll from one turn into the other, take up, (w - 1,) m each."""
+    """Return two lengths that each leg needs, m, (w - 1,) each: for its turns, and for the roll between the turns."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
@@ -244,7 +249,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `CERTIFIED_PIECE` records for the legs of a path (w, 3), followed by those for its arcs or corners."""
+    """Return `CERTIFIED_PIECE` records of a path (w, 3): first those of its legs, then those of its arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
     leg_count = waypoints.shape[0] - 1

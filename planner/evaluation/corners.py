@@ -169,7 +169,10 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 def fly_by_vertices(
     aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
-    """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`."""
+    """Return vertices (k, 3) of the flown path past `waypoint`, at the blend length of its altitude.
+
+    See `blended_vertices`.
+    """
     return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
 
@@ -239,7 +242,10 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
 def legs_about(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
 ) -> Floats:
-    """Return the parts of both legs next to `waypoint`, of the given lengths (m), as vertices (3, 3)."""
+    """Return the parts of both legs next to `waypoint` as vertices, (3, 3) m, with the waypoint in the middle.
+
+    length_before, length_after: lengths of both parts, m, at most the whole leg.
+    """
     vertices = np.empty((3, 3))
     for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):
         horizontal_length = math.hypot(waypoint[0] - neighbour[0], waypoint[1] - neighbour[1])
@@ -260,7 +266,7 @@ def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> 
 
 @compiled
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
-    """Return the radius of the fly-by arc at each waypoint, (w,) m; 0 at the ends and where the path goes straight on.
+    """Return the radius of the fly-by arc at each waypoint, m, (w,); 0 at the ends and where there is no turn.
 
     Where only a number limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have
     radius 0: the corners are evaluated as drawn, and the simulated flight shows how the aircraft flies them. A

@@ -43,11 +43,11 @@ class WaypointFrames(NamedTuple):
     sine: Floats
     edges: Floats
 
-    def restore(self, points: ArrayLike) -> Floats:
-        """Return the world positions of points (..., n, 3) in along, across, up.
+    def to_world(self, points: ArrayLike) -> Floats:
+        """Convert points (along, across, up) in the waypoints' frames, (..., n, 3), to world positions.
 
         >>> frames = frames_along(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]]))
-        >>> frames.restore([[60.0, 5.0, 9.0], [120.0, 5.0, 9.0]]).round(6).tolist()
+        >>> frames.to_world([[60.0, 5.0, 9.0], [120.0, 5.0, 9.0]]).round(6).tolist()
         [[60.0, 5.0, 9.0], [95.0, 20.0, 9.0]]
         """
         points = np.asarray(points, dtype=np.float64)
@@ -58,8 +58,8 @@ class WaypointFrames(NamedTuple):
         out[..., 2] = points[..., 2]
         return out
 
-    def rotate(self, points: ArrayLike) -> Floats:
-        """Return world positions (..., n, 3) as points in along, across, up; the inverse of `restore`."""
+    def to_frame(self, points: ArrayLike) -> Floats:
+        """Convert world positions (..., n, 3) to (along, across, up) in the waypoints' frames; inverts `to_world`."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         return np.stack(
@@ -88,7 +88,10 @@ def frames_along(route: Floats) -> WaypointFrames:
 
 
 def straight_frames(east: float, north: float, cosine: float, sine: float, edges: Floats) -> WaypointFrames:
-    """Return the same frame for all waypoints: its origin (m), its angle from east, and n + 1 edges along (m)."""
+    """Return frames of n waypoints that all have the same origin and axes.
+
+    east, north: origin, m.  cosine, sine: of the angle from east to the axis.  edges: (n + 1,) along the axis, m.
+    """
     count = edges.size - 1
     ones = np.ones(count)
     return WaypointFrames(east * ones, north * ones, cosine * ones, sine * ones, edges)
@@ -130,15 +133,15 @@ class RotatedFrame(NamedTuple):
     sine: float
     length: float
 
-    def rotate(self, points: ArrayLike) -> Floats:
-        """Return world positions (..., 3) as points in along, across, up (eq. 12)."""
+    def to_frame(self, points: ArrayLike) -> Floats:
+        """Convert world positions (..., 3) to (along, across, up) in this frame (eq. 12)."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         c, s = self.cosine, self.sine
         return np.stack([c * east + s * north, c * north - s * east, points[..., 2]], axis=-1)
 
-    def restore(self, points: ArrayLike) -> Floats:
-        """Return the world positions of points (..., 3) in along, across, up; the inverse of `rotate`."""
+    def to_world(self, points: ArrayLike) -> Floats:
+        """Convert points (along, across, up) in this frame, (..., 3), to world positions; inverts `to_frame`."""
         points = np.asarray(points, dtype=np.float64)
         along, across = points[..., 0], points[..., 1]
         c, s = self.cosine, self.sine
@@ -150,11 +153,14 @@ class RotatedFrame(NamedTuple):
 
 
 def rotated_frame(start: Floats, destination: Floats) -> RotatedFrame:
-    """Return the frame of a mission. Raises ValueError if start and destination coincide on the map."""
+    """Return the frame along the line from start to destination, (3,) m each.
+
+    Raises ValueError if start and destination coincide on the map.
+    """
     step = destination[:2] - start[:2]
     length = math.hypot(step[0], step[1])
     if length == 0.0:
-        raise ValueError("start and destination have the same place: there is no direction along the path")
+        raise ValueError("start and destination are at the same place, so the path has no direction")
     east, north = step / length
     return RotatedFrame(float(start[0]), float(start[1]), float(east), float(north), length)
 
@@ -225,7 +231,7 @@ def rotated(space: Space, waypoints: int) -> Encoding:
     upper = np.column_stack([edges[1:], max_across, np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
-        return _add_ends(space, frame.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
+        return _add_ends(space, frame.to_world(vectors.reshape(len(vectors), waypoints - 2, 3)))
 
     frames = straight_frames(*frame[:4], edges)
     return Encoding("rotated", waypoints, lower.ravel(), upper.ravel(), decode, frames)
@@ -245,12 +251,12 @@ def route_encoding(space: Space, route: Floats) -> Encoding:
     upper = np.column_stack([frames.edges[1:], np.full(waypoints - 2, half_width), np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
-        return _add_ends(space, frames.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
+        return _add_ends(space, frames.to_world(vectors.reshape(len(vectors), waypoints - 2, 3)))
 
     return Encoding("route", waypoints, lower.ravel(), upper.ravel(), decode, frames)
 
 
-def frames_of(encoding: Encoding) -> WaypointFrames:
+def require_frames(encoding: Encoding) -> WaypointFrames:
     """Return the frames of an encoding's waypoints. Raises ValueError for an encoding without frames."""
     if encoding.frames is None:
         raise ValueError(f"{encoding.name}: an encoding without frames along a route")
@@ -259,14 +265,14 @@ def frames_of(encoding: Encoding) -> WaypointFrames:
 
 def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
     """Return vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
-    inner_points = rotated_frame(space.start, space.destination).rotate(paths[:, 1:-1])
+    inner_points = rotated_frame(space.start, space.destination).to_frame(paths[:, 1:-1])
     return np.clip(inner_points.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
 def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
-    """Return the lower and upper limits across, (k,) each, of the map between consecutive edges (k + 1,) along.
+    """Return the lower and upper limits of `across` in each interval between two consecutive edges, m, (k,) each.
 
-    The limits are -across and across if the space states a half-width.
+    edges: (k + 1,) along the axis, m.  The limits are the map's edges, or the half-width that the space states.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
@@ -335,7 +341,7 @@ def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *,
         course = np.cumsum(steps[..., 1], axis=1) if turning else steps[..., 1]
         along = np.cumsum(steps[..., 0] * np.cos(course), axis=1)
         across = np.cumsum(steps[..., 0] * np.sin(course), axis=1)
-        return _add_ends(space, frame.restore(np.stack([along, across, steps[..., 2]], axis=-1)))
+        return _add_ends(space, frame.to_world(np.stack([along, across, steps[..., 2]], axis=-1)))
 
     return Encoding(name, waypoints, np.tile(lower, waypoints - 2), np.tile(upper, waypoints - 2), decode)
 

@@ -37,9 +37,10 @@ class Value(IntEnum):
 
 
 def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
-    """Return the values of paths (n, w, 3) in the order of `Value`, (n, 5) m, s, m, s, J.
+    """Return the values of each path in the order of `Value`, (n, 5), in m, s, m, s and J.
 
     energy: the cost of energy, with any weight (`make_travel_cost`); if None, energy is NaN.
+    paths: (n, w, 3) m.
     """
     out = np.zeros((len(paths), len(Value)))
     energy_cost = TIME_COST if energy is None else energy._replace(length=0.0, time=0.0, energy=1.0)

@@ -25,7 +25,7 @@ PATHS_PER_BLOCK = 128
 
 
 def _block_rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
-    """Return record fields with these names and one value of a type for each path of a block."""
+    """Return the definitions of record fields with these names, each with one value for each path of a block."""
     return [(name, kind, (PATHS_PER_BLOCK,)) for name in names]
 
 
@@ -76,7 +76,7 @@ def copy_point(source: Record, target: Record, size: int) -> None:
 
 @inlined
 def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
-    """Fill the step from one point of each path to another."""
+    """Fill `out` with the step from one point of each path to another."""
     for b in range(size):
         out.east[b] = end.east[b] - start.east[b]
         out.north[b] = end.north[b] - start.north[b]
@@ -86,8 +86,8 @@ def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
 
 
 @inlined
-def divide_legs(start: Record, step: Record, fraction: float, size: int, out: Record) -> None:
-    """Fill the point of each path's leg at this fraction of the step from its beginning."""
+def interpolate_legs(start: Record, step: Record, fraction: float, size: int, out: Record) -> None:
+    """Fill `out` with the point of each path's leg at a fraction of the leg."""
     for b in range(size):
         out.east[b] = start.east[b] + fraction * step.east[b]
         out.north[b] = start.north[b] + fraction * step.north[b]
@@ -400,7 +400,7 @@ def _arc_slope_excess(
 
 @inlined
 def _violation(excess: float, by_amount: bool) -> float:
-    """Return the violation of an excess: the excess itself if `by_amount`, otherwise 1; 0 without an excess."""
+    """Return the score of an excess over a limit: the excess itself if `by_amount`, otherwise 1; 0 for no excess."""
     if by_amount:
         return excess
     return 1.0 if excess > 0.0 else 0.0

@@ -21,7 +21,7 @@ from planner.evaluation.leg_constraints import (
     add_leg_violations,
     clear_sums,
     copy_point,
-    divide_legs,
+    interpolate_legs,
     load_waypoints,
     precompute_limits,
     subtract_points,
@@ -123,7 +123,7 @@ def _score_block(
         # Departure from the paper: eq. 6 never reaches the destination, which is the seventh point of the last leg
         # here.
         for j in range(POINTS_PER_LEG + (i == leg_count - 1)):
-            divide_legs(block.begin, block.step, j * (1.0 / POINTS_PER_LEG), size, block.point)
+            interpolate_legs(block.begin, block.step, j * (1.0 / POINTS_PER_LEG), size, block.point)
             _find_ground(data.heights, size, block)
             _add_terrain(limits.required, size, j < POINTS_PER_LEG, block)
             _find_nearby_units(data.threat_cells, size, block)

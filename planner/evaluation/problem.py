@@ -201,7 +201,7 @@ def required_clearance(data: ProblemArrays) -> RequiredClearance:
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:
-    """Return the maximum height above ground as a required clearance, with the heights of path and ground negated."""
+    """Return the maximum height above ground as a required clearance, for negated heights of path and ground."""
     space = data.airspace
     return _make_required_clearance(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
 
@@ -452,14 +452,14 @@ def _or_nan(value: float | None) -> float:
 
 
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, fraction: float = 1.0) -> float:
-    """Return the buffer at a fixed end, m: the full buffer, or a fraction of the height available there."""
+    """Return the clearance buffer at a fixed end, m: the full buffer, or a fraction of the height available there."""
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
     available_height = height_above_ground - limits.min_clearance - 0.01
     return buffer if available_height >= buffer else fraction * max(0.0, available_height)
 
 
 def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
-    """Return upper bounds on the slope of the terrain: of all of it, and of each tile with its neighbours."""
+    """Return upper bounds on the slope of the terrain: for the whole terrain, and for each tile with its neighbours."""
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
     max_slope = float(slopes.max())
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.

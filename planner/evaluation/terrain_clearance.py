@@ -85,7 +85,7 @@ def measure_lags(
 
 @inlined
 def lag_at(lag: Record, fraction: float) -> float:
-    """Return the distance of the aircraft below a leg at a fraction of it, m; negative above."""
+    """Return the distance of the aircraft below a leg at a fraction of the leg, m; negative above the leg."""
     return lag.steady + lag.slant * (1.0 - fraction) + lag.rest * _remaining_fraction(fraction * lag.decay)
 
 
@@ -135,7 +135,9 @@ def _take_sample(
     altitude_change: float,
     pitch: float,
 ) -> tuple[float, float]:
-    """Return the height above the required clearance at a point of a line, and the step to the next sample.
+    """Return the height above the required clearance at a point of a line, m, and the step to the next sample.
+
+    The step is a fraction of the line.
 
     tiles, tile_side: see `SlopeBounds`. growth: see `RequiredClearance`. required_height: required clearance.
     max_further_height: largest further requirement elsewhere on the line, m.

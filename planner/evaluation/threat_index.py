@@ -57,9 +57,9 @@ class ThreatCells(NamedTuple):
 
 
 def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> ThreatCells:
-    """Make lists of the units (m, 3) whose sphere, seen from above, meets a cell.
+    """Make for each cell of a grid the list of units whose sphere, seen from above, meets the cell.
 
-    radius: (m,) radii of the spheres, m; 0 for none. bounds: (2, 2) map.
+    position: (m, 3) units. radius: (m,) radii of the spheres, m; 0 for none. bounds: (2, 2) map.
     """
     min_corner, max_corner = bounds[:, 0], bounds[:, 1]
     min_corner, max_corner = (
@@ -291,7 +291,10 @@ def kill_density(
 
 @inlined
 def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, float]:
-    """Return two fractions of a line in increasing order, clipped to it."""
+    """Sort two fractions along a line, and intersect the interval between them with [0, 1].
+
+    The first result exceeds the second if the interval lies off the line.
+    """
     start_fraction, end_fraction = (
         (start_fraction, end_fraction) if start_fraction < end_fraction else (end_fraction, start_fraction)
     )
@@ -311,7 +314,7 @@ def _shift_towards_missile(z: float, altitude_change: float, below: float, above
 
 @inlined
 def _cell_index(position: float, count: int) -> int:
-    """Return the index of the cell along one axis; -1 and `count` if outside."""
+    """Return the index of the cell of a position along one axis; -1 below the first cell, `count` above the last."""
     clipped = position if position > -1.0 else -1.0
     return math.floor(clipped if clipped < count else count)
 

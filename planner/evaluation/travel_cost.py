@@ -168,7 +168,7 @@ class _FlightConditions(NamedTuple):
 
 @inner
 def _conditions_at_altitude(travel: TravelCost, table: PerformanceTable, amsl: float) -> _FlightConditions:
-    """Return airspeed, wind and power at an altitude, m."""
+    """Return the airspeed, the wind and the power coefficients at an altitude, m AMSL."""
     airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
     if travel.energy == 0.0:
         return _FlightConditions(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
@@ -346,7 +346,10 @@ def _add_step_model(
     gradient: tuple[float, float, float],
     slope_factor: float,
 ) -> None:
-    """Convert curvature and gradient with respect to a leg's step to its ends (minus at the start), and add them."""
+    """Add a leg's curvature and gradient, given with respect to its step, to the arrays for its two ends.
+
+    The step is the end minus the start, so the gradient with respect to the start has the opposite sign.
+    """
     for axis in range(3):
         slopes[0, axis] -= slope_factor * gradient[axis]
         slopes[1, axis] += slope_factor * gradient[axis]

@@ -9,7 +9,7 @@ from world.arrays import Floats, Ints
 
 
 class BoxSearch(ABC):
-    """Population-based search in a box: `ask` returns samples to score, `tell` takes their scores.
+    """Base of population-based searches in a box: `ask` returns samples to score, `tell` takes their scores.
 
     lower, upper: (d,) box.
     rank: function of scores (n, c) for their ranks (n,); smaller is better.

@@ -80,7 +80,10 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
 
 @compiled
 def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
-    """Return marks (n, p), 1 if points (n, m) are at or below probes (m, p)."""
+    """Return marks (n, p): 1 if a point is at or below a probe in every objective, otherwise 0.
+
+    points: (n, m).  probes: (m, p).
+    """
     marks = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
     for n in range(points.shape[0]):
         for k in range(points.shape[1]):
@@ -114,7 +117,7 @@ def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
 
 @inner
 def _count_common_marks(marks: Marks, other_marks: Marks) -> int:
-    """Return the number of places (p,) with a mark in both arrays."""
+    """Return the number of probes (p,) that are marked in both arrays."""
     total = 0
     for p in range(marks.size):
         total += marks[p] & other_marks[p]

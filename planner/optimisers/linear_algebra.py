@@ -11,9 +11,10 @@ from world.kernels import compiled, inner
 
 @compiled
 def covariance(rows: Floats, first_column: int, second_column: int, size: int) -> Floats:
-    """Return the covariance (size, size) of two groups of columns of centred rows (n, d).
+    """Return the covariance of two groups of columns, (size, size).
 
-    first_column, second_column: index of the first column of each group.
+    rows: (n, d) samples minus their mean.  first_column, second_column: index of the first column of each group.
+    size: number of columns of a group.
     """
     out = np.zeros((size, size))
     for n in range(rows.shape[0]):
@@ -26,7 +27,10 @@ def covariance(rows: Floats, first_column: int, second_column: int, size: int) -
 
 @compiled
 def cholesky(matrix: Floats, ridge: float) -> Floats:
-    """Return the lower Cholesky factor (d, d) of a covariance (d, d) plus ridge x mean variance on its diagonal."""
+    """Return the lower Cholesky factor of a covariance (d, d), regularised on its diagonal.
+
+    ridge: value added to each variance, as a fraction of the mean variance.
+    """
     size = matrix.shape[0]
     trace = 0.0
     for i in range(size):
@@ -78,7 +82,7 @@ def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
 
 @inner
 def band_cholesky(matrix: Floats, out: Floats) -> None:
-    """Compute the lower Cholesky factor (d, b) of a positive definite band matrix (d, b) into `out`.
+    """Fill `out` with the lower Cholesky factor of a positive definite band matrix; both are stored as (d, b).
 
     Entry [i, k] of both belongs to row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
     """
@@ -93,7 +97,10 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:
 
 @inner
 def solve_band(factor: Floats, right_side: Floats, out: Floats) -> None:
-    """Solve a linear system, given the band factor (d, b) of its matrix, into `out` (d,)."""
+    """Fill `out` (d,) with the solution of a linear system.
+
+    factor: band factor of the matrix, as `band_cholesky` computes it.  right_side: (d,).
+    """
     size, width = factor.shape
     for i in range(size):
         total = right_side[i]

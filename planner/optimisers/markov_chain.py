@@ -46,7 +46,11 @@ class MarkovChain(Umda):
 
 @compiled
 def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
-    """Fit for each group (g, size, size) the regression on the previous one, and the residuals' Cholesky factor."""
+    """Fit a linear regression of each group of variables on the previous group.
+
+    rows: (n, d) samples minus their mean.  size: number of variables of a group.  ridge: see `cholesky`.
+    Returns the regression matrices and the Cholesky factors of the residuals' covariances, (g, size, size) each.
+    """
     group_count = rows.shape[1] // size
     slope, spread = np.zeros((group_count, size, size)), np.zeros((group_count, size, size))
     copy_into(spread[0].ravel(), cholesky(covariance(rows, 0, 0, size), ridge).ravel())
@@ -76,7 +80,10 @@ def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
 
 @compiled
 def draw_chain(normals: Floats, slope: Floats, spread: Floats) -> Floats:
-    """Compute samples (n, g size) of the chain from independent standard normal numbers."""
+    """Return samples of the chain, (n, d), computed from independent standard normal numbers (n, d).
+
+    slope, spread: results of `fit_chain`.
+    """
     group_count, size, _ = slope.shape
     out = np.zeros(normals.shape)
     for n in range(normals.shape[0]):

@@ -29,7 +29,7 @@ class NicheSampling:
     """Sampling of groups of variables (g, n, d), from the whole box to the niches of the best samples.
 
     lower, upper: (g, d) boxes.
-    allowed: function of samples (n, d) and their groups (n,) that returns if each sample is feasible, (n,).
+    allowed: function of samples (n, d) and their groups (n,) that returns True for each feasible sample, (n,).
     rng: random generator of all samples.
 
     >>> lower, upper = np.full((3, 2), -2.0), np.full((3, 2), 6.0)
@@ -114,7 +114,10 @@ class NicheSampling:
 def _select(
     rows: Floats, costs: Floats, elite: Floats, clearing_radius: Floats, max_cost: float, max_count: int
 ) -> tuple[Floats, Ints]:
-    """Select samples (g, number, d) of each group, the elite first, and return them with their counts (g,)."""
+    """Select the elite and the best samples of each group that are distinct from one another.
+
+    Returns the selected samples, (g, max_count, d), padded with zeros, and the number of samples of each group, (g,).
+    """
     groups, _, size = rows.shape
     selected, counts = np.zeros((groups, max_count, size)), np.ones(groups, dtype=np.int64)
     for g in range(groups):
@@ -135,7 +138,7 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
-    """Return True if a sample (d,) differs from each other sample by at least `clearing_radius` in some variable."""
+    """Return True if a sample (d,) differs from every other sample by the clearing radius or more in some variable."""
     for n in range(other_rows.shape[0]):
         is_near = True
         for d in range(row.size):

@@ -38,7 +38,7 @@ class Level:
 
 
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Return the number of rows that are preferred to each row of scores (n, c), counted level by level, (n,).
+    """Return the rank of each row of scores (n, c): the number of rows that are preferred to it, (n,).
 
     With every component raised to its goal, "u dominates v on U, or is equal there and v violates a goal outside U" is
     Pareto dominance on the level, and only rows equal on it proceed to the next: a component outside U is at its goal,
@@ -59,9 +59,9 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
 
 @compiled
 def _rank_rows(table: Floats, widths: Ints) -> Ints:
-    """Return the ranks (n,) of the columns of a table (c, n).
+    """Return the ranks (n,) of n candidates whose scores are the columns of a table (c, n).
 
-    widths: number of rows of each level in the table.
+    widths: number of rows of the table that belong to each level.
     """
     count = table.shape[1]
     row_ranks = np.zeros(count, dtype=np.int64)

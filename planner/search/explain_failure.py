@@ -19,7 +19,7 @@ from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS, limits_for
-from planner.search.infeasibility_proof import closing_missiles, highest_level_flight
+from planner.search.infeasibility_proof import blocking_missiles, highest_level_flight
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, height_outside_band, zone_records
 from world.arrays import Flags, Floats, Ints
 from world.kernels import compiled
@@ -105,7 +105,10 @@ def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
 
 
 def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
-    """Flag the open cells that can be reached from a cell through their sides; none if the cell is not open."""
+    """Return a mask of the open cells that a cell is connected to through sides of open cells.
+
+    The mask is empty if the cell itself is not open.
+    """
     is_reachable = np.zeros_like(is_open)
     is_reachable[start] = is_open[start]
     count = -1
@@ -115,7 +118,7 @@ def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
 
 
 def _grow_cells(cells: Flags) -> Flags:
-    """Flag the given cells, and all cells that share a side with a given cell."""
+    """Return a mask of the given cells and all cells that share a side with one of them."""
     grown = cells.copy()
     for axis in range(cells.ndim):
         target, source = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
@@ -134,7 +137,10 @@ def _close_cells(
     max_heights: Floats,
     cells: Ints,
 ) -> None:
-    """Store in open cells (heights, rows, columns) the first zone that closes them."""
+    """Set each open cell that a zone closes to the index of the first such zone.
+
+    cells: (heights, rows, columns), changed in place.
+    """
     for z in range(records.zones.shape[0]):
         zone = records.zones[z]
         for i in range(north.size):
@@ -299,12 +305,13 @@ def _describe_walls(scenario: Scenario) -> list[str]:
 
 
 def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield straight lines across the map between the ends: the distance from the start, m, and points (n, 2)."""
+    """Yield lines across the map between start and destination: the distance from the start, m, and points (n, 2)."""
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-half_width, half_width, POINTS_ACROSS)
     for along in np.linspace(0.0, frame.length, POINTS_ALONG)[1:-1]:
-        points = frame.restore(np.column_stack([np.full(POINTS_ACROSS, along), across, np.zeros(POINTS_ACROSS)]))[:, :2]
+        frame_points = np.column_stack([np.full(POINTS_ACROSS, along), across, np.zeros(POINTS_ACROSS)])
+        points = frame.to_world(frame_points)[:, :2]
         is_on_map = ((points >= scenario.bounds[:, 0]) & (points <= scenario.bounds[:, 1])).all(axis=1)
         if is_on_map.any():
             yield float(along), points[is_on_map]
@@ -349,9 +356,9 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:
-    """Name the missiles or the altitude that block every path; return no line if this is not proven."""
+    """Name the missiles or the altitude limit that block every path; return no line if no blockage is proven."""
     data, ceiling = problem.certified, "the ceiling"
-    missiles, max_level_altitude = closing_missiles(data), highest_level_flight(data)
+    missiles, max_level_altitude = blocking_missiles(data), highest_level_flight(data)
     if missiles is None:
         return []
     if max_level_altitude < data.ceiling:
@@ -374,7 +381,7 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
-    """Return the names of the exclusion zones a path (w, 3) enters and the inclusion zones it leaves.
+    """Return the names of the exclusion zones that a path (w, 3) enters, and of the inclusion zones that it leaves.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))

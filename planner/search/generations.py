@@ -172,7 +172,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     frame = rotated_frame(space.start, space.destination)
     lower, upper = encoding.lower.reshape(inner_count, 3), encoding.upper.reshape(inner_count, 3)
     data = search.problem.search
-    sampling = NicheSampling(lower, upper, lambda rows, _: free_points(data, frame.restore(rows)), search.rng)
+    sampling = NicheSampling(lower, upper, lambda rows, _: free_points(data, frame.to_world(rows)), search.rng)
     is_seeded, first_count = search.algorithm.seeded, _first_candidate_count(search, population)
     later_count = _later_candidate_count(first_count)
     interval = frame.length / inner_count
@@ -206,7 +206,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
 
 
 def _first_candidate_count(search: Search, population: int) -> int:
-    """Return the number of candidates per interval in the first generation of this population."""
+    """Return the number of candidates per interval in the first generation for a requested population."""
     max_count = int(math.sqrt(MAX_LEGS / (search.encoding.waypoints - 1)))
     return max(2, min(int(population * (SEEDED_POPULATION_FRACTION if search.algorithm.seeded else 1.0)), max_count))
 
@@ -217,7 +217,7 @@ def _later_candidate_count(first_count: int) -> int:
 
 
 def _limit_generations(search: Search, generations: int) -> int:
-    """Return the requested number of generations over waypoints, limited to the maximum."""
+    """Return the requested number of generations, limited to the maximum for a search of single waypoints."""
     return min(generations, SEEDED_GENERATIONS if search.algorithm.seeded else MAX_GENERATIONS)
 
 

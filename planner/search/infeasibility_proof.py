@@ -36,10 +36,9 @@ def column_side(data: ProblemArrays) -> float:
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
-    """Return True if no path stays above the clearance, below the ceiling and outside all missiles.
+    """Return True if it is proven that no path stays above the clearance, below the ceiling and outside all missiles.
 
     missiles: (m,) True for the `data.threats` to consider; None for all. margin: distance from their spheres, m.
-    Return False if nothing is proven.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -90,10 +89,10 @@ def highest_level_flight(data: ProblemArrays) -> float:
     return max_altitude if max_wind < min_speed else math.inf
 
 
-def closing_missiles(data: ProblemArrays) -> list[int] | None:
-    """Return the indices of a minimal set of missiles that block every path together with ground and ceiling.
+def blocking_missiles(data: ProblemArrays) -> list[int] | None:
+    """Return the indices of a minimal set of missiles that, together with ground and ceiling, block every path.
 
-    Return None if `is_closed` proves nothing, and no indices if ground and ceiling suffice.
+    The list is empty if ground and ceiling alone block every path.  Returns None if no blockage is proven.
     """
     if not is_closed(data):
         return None
@@ -119,7 +118,7 @@ def _index_mask(indices: Ints, count: int) -> Flags:
 
 @compiled
 def _is_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
-    """Implement `is_closed`.
+    """Implement `is_closed` for the missiles that are True in `missiles`.
 
     column_size: side of the square columns, m.
     """
@@ -160,7 +159,7 @@ def _is_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin:
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
-    """Return the lowest pixel under a column and next to it, m; -inf if any is missing."""
+    """Return the height of the lowest pixel under a column and next to it, m; -inf if any of them has no data."""
     first_column, first_row, last_column, last_row = math.inf, math.inf, -math.inf, -math.inf
     for corner in range(4):
         east, north = data.west + (i + corner % 2) * column_size, data.south + (j + corner // 2) * column_size

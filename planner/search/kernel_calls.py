@@ -99,7 +99,7 @@ def _call_side_routes(task: _Task) -> None:
 
 
 def _frame_and_span(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
-    """Return the frame of the direct line, and the range of waypoints across it, m."""
+    """Return the frame of the direct line, and the smallest and largest offset of waypoints across the line, m."""
     space, lower, upper = task.problem.space, task.encoding.lower, task.encoding.upper
     return rotated_frame(space.start, space.destination), (float(lower[1::3].min()), float(upper[1::3].max()))
 

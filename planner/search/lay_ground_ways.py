@@ -195,7 +195,7 @@ class _Site:
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_chain(self, chain: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
-        """Certify a chain (n, 3).
+        """Return the certificate of a path (n, 3), with a lower required height near two points.
 
         end_points: two points, (3,) m; if a point is closer to the ground than required, the required height is lower
             near the point.
@@ -279,7 +279,7 @@ def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
 
 
 def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: float) -> tuple[Floats, Floats]:
-    """Return distances from a start along a course, m, and the terrain altitudes there, m; NaN if unknown."""
+    """Return distances from a start along a course, m, and the terrain altitude at each, m AMSL; NaN if unknown."""
     distances = np.arange(0.0, length + _GROUND_SPACING_M, _GROUND_SPACING_M)
     east, north = start[0] + distances * math.sin(course), start[1] + distances * math.cos(course)
     return distances, terrain.height(east, north)
@@ -344,7 +344,7 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
 def _make_departure(
     site: _Site, course: float, points: list[MapPoint], takeoff_altitude: float
 ) -> ClimbOut | Certificate | None:
-    """Return the departure over these points, its certificate if it is rejected, or None if it cannot be flown.
+    """Return a departure over these points; its certificate if it is rejected; None if the climb is too steep.
 
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
     """
@@ -458,7 +458,10 @@ def _list_departures(
 
 
 def _list_lap_counts(site: _Site, height_change: float, is_descent: bool) -> list[int]:
-    """Return the lap counts to try, fewest first, for a climb (or a descent if `is_descent`) of `height_change` m."""
+    """Return the numbers of laps to try, in increasing order, for a climb or (if `is_descent`) a descent.
+
+    height_change: height to climb or descend, m.
+    """
     max_laps = math.ceil(
         site.min_path_length(height_change, is_descent) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
     )
@@ -677,7 +680,7 @@ def _scale_slope(site: _Site, factor: float, is_descent: bool, altitude: float, 
 
 
 def _min_go_around_height(site: _Site, final: _Final) -> float | None:
-    """Return the minimum height above home of a go-around that flies back to the line-up, m, or None.
+    """Return the minimum height above home for a go-around, m; None if no height is sufficient.
 
     The go-around climbs straight ahead from the landing point at `SLOPE_FRACTION` of the steepest climb, and then flies
     back to the line-up.
@@ -717,7 +720,10 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
 
 
 def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> float:
-    """Return the minimum height above ground between a go-around and the line-up, m; -inf if unknown."""
+    """Return the minimum height above ground on the way from the end of a go-around to the line-up, m.
+
+    turn_point: end of the go-around's climb, (3,) m.  Returns -inf if the ground is unknown.
+    """
     length = float(leg_runs(np.stack([turn_point, line_up]))[0])
     fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
     east, north = (turn_point[axis] + fractions * (line_up[axis] - turn_point[axis]) for axis in range(2))

@@ -250,13 +250,13 @@ class FrontTask(NamedTuple):
         return np.asarray(out)
 
     def vectors(self, paths: Floats) -> Floats:
-        """Return the inner waypoints of paths (n, w, 3) in the rotated frame, (n, 3 (w - 2))."""
-        return np.asarray(self.frame.rotate(paths[:, 1:-1]).reshape(len(paths), -1))
+        """Convert paths (n, w, 3) to vectors of their inner waypoints in the rotated frame, (n, 3 (w - 2))."""
+        return np.asarray(self.frame.to_frame(paths[:, 1:-1]).reshape(len(paths), -1))
 
     def paths(self, vectors: Floats) -> Floats:
-        """Return the paths (n, w, 3) of vectors (n, 3 (w - 2))."""
+        """Convert vectors (n, 3 (w - 2)) of inner waypoints to paths (n, w, 3) with both ends; inverts `vectors`."""
         data, count = self.problem.search, len(vectors)
-        inner_waypoints = self.frame.restore(vectors.reshape(count, -1, 3))
+        inner_waypoints = self.frame.to_world(vectors.reshape(count, -1, 3))
         ends = [np.broadcast_to(end, (count, 1, 3)) for end in (data.start, data.destination)]
         return np.ascontiguousarray(np.concatenate([ends[0], inner_waypoints, ends[1]], axis=1))
 
@@ -344,7 +344,7 @@ def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
         ratio=SPACING_ACROSS_STEPS,
     )
     bound = MAX_COST_RATIO * float(np.sqrt((np.diff(default, axis=0) ** 2).sum(axis=1)).sum())
-    return [frame.restore(route.points) for route in side_routes(data, frame, grid, bound, MAX_ROUTES)]
+    return [frame.to_world(route.points) for route in side_routes(data, frame, grid, bound, MAX_ROUTES)]
 
 
 def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
@@ -401,7 +401,7 @@ def make_sampling(
     """Make the estimation of distribution for paths of `waypoints` waypoints, with an archive of `size` solutions."""
     data, frame, inner_count = task.problem.search, task.frame, waypoints - 2
     corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
-    rotated = frame.rotate(corners)
+    rotated = frame.to_frame(corners)
     min_corner = np.array([rotated[:, 0].min(), rotated[:, 1].min(), data.floor])
     max_corner = np.array([rotated[:, 0].max(), rotated[:, 1].max(), data.ceiling])
     scales = np.array(
@@ -424,9 +424,9 @@ def make_sampling(
 
 
 def directions(inner_count: int, scales: Floats) -> Floats:
-    """Return noise directions (k, 3 inner), smooth modes of the whole path and bumps of up to four waypoints.
+    """Return directions of noise, (k, 3 inner_count): smooth modes of the whole path, and bumps of a few waypoints.
 
-    scales: (3,) largest deviations along, across and up.
+    scales: (3,) largest deviations along, across and up, m.
     """
     modes, deviations = bridge_modes(inner_count)
     waves = (modes * deviations / np.abs(modes[:, 0]).max()).T
@@ -443,7 +443,7 @@ def directions(inner_count: int, scales: Floats) -> Floats:
 
 
 def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
-    """Return the noticeable gains (4,) of the objectives relative to a default plan."""
+    """Return the smallest noticeable gain of each objective over a default plan, (4,)."""
     length, exposure, _, fourth_value = _objective_row(default, fourth)
     exposure_gain = NOTICEABLE_EXPOSURE_FRACTION * max(MIN_EXPOSURE_S, exposure)
     return np.array(

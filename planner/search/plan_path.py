@@ -244,7 +244,10 @@ def _prepare_retry(search: Search, attempt: int) -> None:
 
 
 def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> None:
-    """Search once, from the first population to the last generation."""
+    """Search once, from the first population to the last generation; store the results in `search`.
+
+    previous_path: older path to start from, or None.
+    """
     settings = search.problem.scenario.planner
     grids, population_factor = ATTEMPTS[attempt]
     population, algorithm = settings.population * population_factor, search.algorithm

@@ -81,7 +81,10 @@ def candidate_chains(
 
 
 def _lap_corners(start: MapPoint, course: float, signed_side: float, laps: int) -> list[MapPoint]:
-    """Return the corners of square laps that start and end at `start` on its course; left-hand for a negative side."""
+    """Return the corners of square laps that start and end at `start` on a course (rad).
+
+    signed_side: side of the square, m; negative for laps to the left.
+    """
     cross_course = course + math.copysign(0.5 * math.pi, signed_side)
     ahead_corner = _offset_point(start, course, abs(signed_side))
     far_corner = _offset_point(ahead_corner, cross_course, abs(signed_side))
@@ -174,7 +177,7 @@ def measure_path(points: Sequence[MapPoint], turn_lengths: TurnLengths) -> PathM
 def climb_altitudes(
     points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, min_altitude: float, end_altitude: float
 ) -> Floats:
-    """Return the altitudes (n,) at the n points of a path that climbs as steeply as allowed, m.
+    """Return the altitude at each point of a path that climbs as steeply as allowed, m AMSL, (n,).
 
     start_altitude: altitude at the first point, m.
     min_altitude: minimum altitude except at the end, m.
@@ -197,7 +200,7 @@ def climb_altitudes(
 def descent_altitudes(
     points: Sequence[MapPoint], start_altitude: float, climb: SlopeOnCourse, dive: SlopeOnCourse, end_altitude: float
 ) -> Floats:
-    """Return the altitudes (n,) at the n points of a path that descends late or climbs early, m.
+    """Return the altitude at each point of a path that descends late or climbs early, m AMSL, (n,).
 
     The first or the last altitude differs from the requested one if the path is too short.
 

@@ -120,13 +120,16 @@ def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
             ratio=GRID_SPACING_RATIO,
         )
         for route in side_routes(evaluation_data, frame, grid, bound, MAX_ROUTES, search.pause):
-            yield resample(frame.restore(route.points), count)
+            yield resample(frame.to_world(route.points), count)
 
 
 def _choose_cheaper(
     search: Search, evaluation_data: ProblemArrays, start: Floats, best_path: _CertifiedPath
 ) -> _CertifiedPath:
-    """Shorten a start path (w, 3), and return the cheaper of the result and the best path."""
+    """Return the result of shortening a start path if it is certified and cheaper; otherwise the best path.
+
+    Larger margins are tried until a shortened path is certified.
+    """
     path = start
     for extra_margin, slope_margin in EXTRA_MARGINS:
         stricter_data = evaluation_data._replace(angle_margin=evaluation_data.angle_margin + slope_margin)

@@ -53,12 +53,12 @@ def no_scores() -> Floats:
 
 
 def are_violated(scores: Floats) -> Flags:
-    """Flag the scores (..., 8) of paths that violate a constraint, (...,)."""
+    """Return a mask (...,) of the scores (..., 8) of paths that violate a constraint."""
     return np.asarray(scores[..., : len(Violation)].any(axis=-1))
 
 
 def are_safe(scores: Floats) -> Flags:
-    """Flag the scores (..., 8) of paths without violations and without exposure to missiles, (...,)."""
+    """Return a mask (...,) of the scores (..., 8) of paths without violations and without exposure to missiles."""
     return np.asarray(~are_violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
@@ -364,7 +364,7 @@ class Search:
         return math.inf if budget is None else budget
 
     def record_history(self) -> None:
-        """Append the best path to the history."""
+        """Append length ratio, kill exposure and violations of the best path to the history."""
         best_scores = self.archive.scores[0]
         violations = best_scores[: len(Violation)]
         count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()
@@ -375,7 +375,7 @@ class Search:
         self.history.append(row)
 
     def report_progress(self, remaining_generations: int) -> None:
-        """Report progress, with `remaining_generations` as the number of generations that may follow."""
+        """Report progress and the best path.  remaining_generations: number of generations that may follow."""
         if self.progress is not None:
             best_scores = self.archive.scores[0]
             remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best_scores[KILL]:.3g}"
@@ -389,8 +389,8 @@ class Search:
     def best_certified(self) -> tuple[Floats, Certificate]:
         """Return the first path of the archive that is certified with the full kill margin, and its certificate.
 
-        Otherwise return the certified path furthest from missiles, or the first path if none is certified. A search
-        that is asked to end examines only the first few.
+        Without such a path, return the certified path furthest from missiles, or the first path if none is certified.
+        A search that is asked to end examines only the first few paths.
         """
         first_path: tuple[Floats, Certificate] | None = None
         furthest_path: tuple[Floats, Certificate] | None = None

@@ -16,7 +16,7 @@ import numpy as np
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.encoding import (
     Encoding,
-    frames_of,
+    require_frames,
     rotated_frame,
     rotated_vectors,
     route_encoding,
@@ -61,7 +61,7 @@ def try_straight_line(search: Search) -> bool:
 def starting_vectors(
     search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, is_retry: bool = False
 ) -> Floats:
-    """Return the start vectors of a search, (n, d): the seed that is best after improvement, and the previous path.
+    """Return the start vectors of a search, (n, d): the seed with the best improved result, and the previous path.
 
     The marginals of several routes at once describe none of them, so only one seed is used. It is used in its form
     before the improvement: afterwards it is so close to every limit that hardly any sample around it is feasible.
@@ -116,7 +116,7 @@ def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: b
     )
     for route in routes:
         if should_shorten and search.has_safe():
-            search.shorten(resample(frame.restore(route.points), encoding.waypoints))
+            search.shorten(resample(frame.to_world(route.points), encoding.waypoints))
             if search.must_end():
                 break
             continue
@@ -195,7 +195,7 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
         for route in side_routes(data, frame, grid, bound, MAX_ROUTES, search.pause):
             if search.must_end():
                 return tried_paths
-            tried_paths.append(resample(frame.restore(route.points), encoding.waypoints))
+            tried_paths.append(resample(frame.to_world(route.points), encoding.waypoints))
             search.shorten(tried_paths[-1])
     return tried_paths
 
@@ -279,7 +279,10 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Search along a route that may turn back. Return the better of the path found and `best`, with its certificate."""
+    """Search along a route that may turn back.
+
+    Returns the better of the path found and the path of `best`, with its certificate.
+    """
     data, space = search.problem.search, search.problem.space
     frame, step = rotated_frame(space.start, space.destination), turning_step(data)
     lattices, remaining_states = (
@@ -312,7 +315,10 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
 
 
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Return the best path along the shortened, unsafe form of `best` if it is shorter; otherwise return `best`."""
+    """Shorten the best path without regard to its certificate, and search for a safe path along the result.
+
+    Returns the path found with its certificate if it is safe and shorter than `best`; otherwise returns `best`.
+    """
     if not search.can_shorten:
         return best
     for extra_margin in FOLLOWED_MARGINS_M:
@@ -344,8 +350,9 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, b
         search.improved,
         evaluations=search.evaluations,
     )
-    path = fit_points(inner_search.problem.search, frames_of(encoding), _candidate_points(route, encoding), CLOSE_FIT)
-    vector = np.clip(frames_of(encoding).rotate(path[1:-1]).ravel(), encoding.lower, encoding.upper)
+    frames = require_frames(encoding)
+    path = fit_points(inner_search.problem.search, frames, _candidate_points(route, encoding), CLOSE_FIT)
+    vector = np.clip(frames.to_frame(path[1:-1]).ravel(), encoding.lower, encoding.upper)
     with suppress(SearchEnded):
         _improve_along(inner_search, vector, (path, route))
     search.evaluations, search.end_reason = inner_search.evaluations, inner_search.end_reason
@@ -370,11 +377,14 @@ def _improve_along(search: Search, vector: Floats, routes: tuple[Floats, ...]) -
 
 
 def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
-    """Return candidate points for each waypoint in its frame, on its piece of a route (k, 3), (w - 2, k, 3)."""
+    """Return candidates for each inner waypoint in its frame, on its piece of a route, (w - 2, candidates, 3).
+
+    route: (k, 3) m.
+    """
     count = encoding.waypoints - 2
     dense_points, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)
     point_rows = np.arange(count)[:, None] * (CLOSE_FIT.candidates + 1) + 1 + np.arange(CLOSE_FIT.candidates)
-    frames = frames_of(encoding)
-    points = frames.rotate(dense_points[point_rows].transpose(1, 0, 2)).transpose(1, 0, 2)
+    frames = require_frames(encoding)
+    points = frames.to_frame(dense_points[point_rows].transpose(1, 0, 2)).transpose(1, 0, 2)
     points[..., 0] = np.clip(points[..., 0], frames.edges[:-1, None], frames.edges[1:, None])
     return points

@@ -92,7 +92,7 @@ def _fill_column(
 
 @inner
 def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, ground: float) -> _ClosedHeights:
-    """Return the heights that zones close to a horizontal step.
+    """Return the range of altitudes that zones close to a horizontal step, m AMSL.
 
     lateral: tracking error to add to the zones' margins, m.
     """
@@ -121,7 +121,10 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 
 @inner
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
-    """Return the tangents of a fraction of the climb and dive limits of each step at a height (m), (sideways, 2)."""
+    """Return the slopes that a grid uses for each lateral step: tangents of climb and dive, (sideways, 2).
+
+    step: length of a step along, m.  amsl: altitude of the slope limits, m.  fraction: fraction of the limits.
+    """
     slopes, a, b = np.zeros((2 * MAX_SIDE + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
@@ -144,9 +147,13 @@ def _set_cell_costs(
     extra: Floats,
     first_across: int,
     last_across: int,
-    price: Floats,
+    cell_costs: Floats,
 ) -> None:
-    """Fill the cost per m of a stage's cells (across, layers), inf for a cell that no path may enter."""
+    """Fill `cell_costs` (per m) for a range of a stage's cells; inf for a cell that no path may enter.
+
+    along: position of the stage, m.  extra: (across,) additional cost per m.
+    first_across, last_across: range of cells across, both included.  cell_costs: (across, layers).
+    """
     near_obstacles, horizontal2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(first_across, last_across + 1):
         column, count = columns[y], 0
@@ -161,16 +168,16 @@ def _set_cell_costs(
         for z in range(grid.layers):
             height = first_height + z * grid.pitch
             if not column.lowest <= height <= column.highest:
-                price[y, z] = math.inf
+                cell_costs[y, z] = math.inf
                 continue
-            price[y, z] = 1.0 + extra[y]
+            cell_costs[y, z] = 1.0 + extra[y]
             if grid.follows:
-                price[y, z] += EDGE_COST * ((height - mid_height) / max(half_height, 1e-6)) ** 2
+                cell_costs[y, z] += EDGE_COST * ((height - mid_height) / max(half_height, 1e-6)) ** 2
             for n in range(count):
                 obstacle = obstacles[near_obstacles[n]]
                 distance2 = horizontal2[n] + (height - obstacle.up) ** 2
                 if distance2 < obstacle.radius * obstacle.radius:
-                    price[y, z] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / obstacle.radius)
+                    cell_costs[y, z] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / obstacle.radius)
 
 
 @inner
@@ -182,12 +189,12 @@ def _relax_stage(
     previous_columns: Records,
     columns: Records,
     cost: Floats,
-    price: Floats,
+    cell_costs: Floats,
     next_cost: Floats,
     previous_parents: Codes,
     parents: Codes,
 ) -> None:
-    """Relax one stage, from the costs before it to the costs after it, (across, layers) each, and store parent cells.
+    """Compute the costs of the routes to the cells of a stage from the costs of the previous stage; store parent cells.
 
     previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this one. previous_parents:
     parents of the previous stage. Changes of course are counted along the cheapest route to a cell only, so the result
@@ -225,14 +232,14 @@ def _relax_stage(
                 highest_layer = min(grid.layers - 1, math.floor((height + climb - target_first_height) / grid.pitch))
                 for next_z in range(lowest_layer, highest_layer + 1):
                     # A step is at least as long as a level step; most cost too much even then, and need no square root.
-                    if base_cost + horizontal_length * price[target, next_z] >= next_cost[target, next_z]:
+                    if base_cost + horizontal_length * cell_costs[target, next_z] >= next_cost[target, next_z]:
                         continue
                     altitude_change = target_first_height + next_z * grid.pitch - height
                     end_height = height + altitude_change
                     if max(height, end_height) > closed_heights.low and min(height, end_height) < closed_heights.high:
                         continue
                     length = math.sqrt(horizontal_length * horizontal_length + altitude_change * altitude_change)
-                    total = base_cost + length * price[target, next_z]
+                    total = base_cost + length * cell_costs[target, next_z]
                     if total < next_cost[target, next_z]:
                         next_cost[target, next_z] = total
                         parents[target, next_z] = y * grid.layers + z
@@ -242,8 +249,9 @@ class AirspaceSearch(NamedTuple):
     """Resumable search for the cheapest route over a grid.
 
     obstacles: `OBSTACLE` records. columns: `COLUMN` records (stages + 1, across). cells: (stages + 1, across, layers),
-    the parent of each cell, as across x layers. cost, next_cost, price: (across, layers) of the last stage reached, and
-    scratch. centre_index: index across of both ends. stage: the last stage reached.
+    the parent of each cell, as across x layers. cost: (across, layers) costs of the routes to the cells of the last
+    stage reached. next_cost, cell_costs: scratch. centre_index: index across of both ends. stage: the last stage
+    reached.
     """
 
     obstacles: Records
@@ -251,7 +259,7 @@ class AirspaceSearch(NamedTuple):
     cells: Codes
     cost: Floats
     next_cost: Floats
-    price: Floats
+    cell_costs: Floats
     centre_index: int
     stage: int
 
@@ -317,7 +325,7 @@ def continue_airspace_route(
 ) -> AirspaceSearch:
     """Continue a search by up to `max_stages` stages, or until no route can continue, and return it."""
     stages, width, step = grid.stages, grid.across.size, frame.length / grid.stages
-    obstacles, columns, cells, cost, next_cost, price, centre_index, reached_stage = search
+    obstacles, columns, cells, cost, next_cost, cell_costs, centre_index, reached_stage = search
     last_stage, goal_distances = min(stages, reached_stage + max_stages), np.empty(width)
     for stage in range(reached_stage + 1, last_stage + 1):
         along, first, last = stage * step, width, -1
@@ -331,9 +339,9 @@ def continue_airspace_route(
         first, last = max(0, first - MAX_SIDE), min(width - 1, last + MAX_SIDE)
         for y in range(first, last + 1):
             _fill_column(data, frame, grid, along, grid.across[y], columns[stage, y])
-        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, price)
+        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, cell_costs)
         if stage == stages:
-            price[centre_index, _nearest_layer(grid, columns[stage, centre_index], data.destination[2])] = 1.0
+            cell_costs[centre_index, _nearest_layer(grid, columns[stage, centre_index], data.destination[2])] = 1.0
         next_cost[:] = math.inf
         _relax_stage(
             data,
@@ -343,7 +351,7 @@ def continue_airspace_route(
             columns[stage - 1],
             columns[stage],
             cost,
-            price,
+            cell_costs,
             next_cost,
             cells[stage - 1],
             cells[stage],
@@ -354,7 +362,7 @@ def continue_airspace_route(
                 if goal_distances[y] == math.inf or next_cost[y, z] + goal_distances[y] > bound:
                     next_cost[y, z] = math.inf
         cost, next_cost = next_cost, cost
-    return AirspaceSearch(obstacles, columns, cells, cost, next_cost, price, centre_index, last_stage)
+    return AirspaceSearch(obstacles, columns, cells, cost, next_cost, cell_costs, centre_index, last_stage)
 
 
 @compiled
@@ -406,7 +414,7 @@ MAX_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
-    """Return a grid with this many stages, or with fewer if the grid would be too large.
+    """Return a grid with a number of stages, which is reduced if the grid would be too large.
 
     span: limits across, m.
     """

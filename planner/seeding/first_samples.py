@@ -19,8 +19,9 @@ MAX_SPREAD_FRACTION = 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
-    """Return eigenvectors (inner, inner) and deviations (inner,) of the kernel min(s, t) - s t at equal steps.
+    """Return the modes of the kernel min(s, t) - s t of a Brownian bridge at equal steps.
 
+    inner: number n of inner points.  Returns the eigenvectors, (n, n), and their standard deviations, (n,).
     They have a closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines.
     Deviations are relative to the deviation of the first mode.
     """
@@ -31,7 +32,10 @@ def bridge_modes(inner: int) -> tuple[Floats, Floats]:
 
 
 def bridge_basis(inner: int) -> Floats:
-    """Return an orthogonal basis (3 inner, 3 inner) of bridge modes across and up, and unit vectors along."""
+    """Return an orthogonal basis of vectors of the rotated encoding: bridge modes across and up, unit vectors along.
+
+    inner: number n of inner waypoints; the basis has the shape (3 n, 3 n).
+    """
     modes, _ = bridge_modes(inner)
     basis = np.zeros((3 * inner, 3 * inner))
     basis[0::3, 0::3] = np.eye(inner)

@@ -76,7 +76,7 @@ def no_corners(count: int, margin: float) -> FlownCorners:
 def corners_near_ground(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
 ) -> FlownCorners:
-    """Return where the turns of a path (w, 3) pass close to the ground.
+    """Find the corners of a path (w, 3) that are flown close to the ground, or almost as steeply as possible.
 
     corners, lags: simulated turns at the waypoints, and altitude errors of the legs.
     margin: height added to the required clearance, m.
@@ -110,7 +110,7 @@ def corners_near_ground(
             lowered[i, 1] += lowering
         for k in range(SAMPLES_PER_CORNER):
             corner_point(data, path[i - 1], path[i], path[i + 1], radius, k, point)
-            if height_above_required(data, limits, point) < lowered[i, leg_of(k)] + NEAR_GROUND_HEIGHT_M:
+            if height_above_required(data, limits, point) < lowered[i, leg_index(k)] + NEAR_GROUND_HEIGHT_M:
                 flown.radii[i] = radius
     return flown
 
@@ -144,9 +144,10 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
 def arc_room(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float, sign: float, max_slope: float
 ) -> float:
-    """Return the arc's length past `waypoint` minus the length of its climb (sign 1) or descent (-1), m.
+    """Return the length of a corner's arc that exceeds the length needed for its climb or descent, m.
 
-    Slopes are those of `aircraft.path_limits.arc_slope`; max_slope: tangent of the maximum slope.
+    sign: 1 for a climb, -1 for a descent.  max_slope: tangent of the maximum slope.
+    Slopes are those of `aircraft.path_limits.arc_slope`.
     """
     length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux, uy, vx, vy = (
@@ -165,7 +166,7 @@ def arc_room(
 
 
 @inner
-def leg_of(sample: int) -> int:
+def leg_index(sample: int) -> int:
     """Return 0 for a sample on the leg before its corner, 1 for a sample on the leg after it."""
     return 2 * sample // SAMPLES_PER_CORNER
 
@@ -178,7 +179,7 @@ def _horizontal_length(start: Floats, end: Floats) -> float:
 
 @inner
 def height_above_required(data: ProblemArrays, limits: PrecomputedLimits, point: Floats) -> float:
-    """Return the height of a point (3,) above its minimum allowed height, m; NaN off the terrain."""
+    """Return the height of a point (3,) above the lowest allowed altitude there, m; NaN off the terrain."""
     column, row = polymap(data.to_pixel, point[0], point[1])
     ground: float = pixel_height(data.heights, column, row)
     return point[2] - ground - clearance_at(limits.required, point[0], point[1])
@@ -194,8 +195,9 @@ def corner_point(
     sample: int,
     out: Floats,
 ) -> None:
-    """Fill `out` (3,) with the position of a sample of the corner at `waypoint`, whose turn has this radius, m.
+    """Fill `out` (3,) with the position of a sample of the flown corner at `waypoint`.
 
+    radius: of the turn, m.  sample: number of the sample.
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
     """
     length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
@@ -213,7 +215,7 @@ def corner_point(
         tangent = radius * math.tan(0.5 * turn)
         side = offset if sample % 2 == 0 else -offset
         fraction = (sample // 2 % SAMPLES_PER_LEG) / (SAMPLES_PER_LEG - 1.0)
-        if leg_of(sample) == 0:
+        if leg_index(sample) == 0:
             along = -fraction * min(length_in, max(tangent, length_before))
             out[0], out[1] = waypoint[0] + ux * along - uy * side, waypoint[1] + uy * along + ux * side
             out[2] = waypoint[2] + along * slope_in
@@ -238,8 +240,9 @@ def corner_point(
 def corner_slopes(
     data: ProblemArrays, corner: Floats, radius: float, sample: int, gradient: Floats, point: Floats, slopes: Floats
 ) -> None:
-    """Fill the derivatives (3, 3) of a value by a corner's waypoints (3, 3), given its gradient (3,) at a sample.
+    """Fill `slopes` (3, 3) with the derivatives of a value at a sample with respect to the corner's waypoints.
 
+    corner: waypoints, (3, 3).  gradient: (3,) derivatives of the value with respect to the sample's position.
     point: scratch memory, (3,).
     """
     for row in range(3):
@@ -255,7 +258,7 @@ def corner_slopes(
 
 @inner
 def arc_room_slopes(corner: Floats, radius: float, sign: float, max_slope: float, slopes: Floats) -> None:
-    """Fill the derivatives (3, 3) of `arc_room` by the waypoints of a corner (3, 3)."""
+    """Fill `slopes` (3, 3) with the derivatives of `arc_room` with respect to the waypoints of a corner, (3, 3)."""
     for row in range(3):
         for axis in range(3):
             coordinate, slopes[row, axis] = corner[row, axis], 0.0
@@ -268,7 +271,10 @@ def arc_room_slopes(corner: Floats, radius: float, sign: float, max_slope: float
 
 @inner
 def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
-    """Fill the derivatives (3,) of the height above ground at a point; unknown horizontal derivatives are 0."""
+    """Fill `out` (3,) with the derivatives of the height above ground at a point.
+
+    Horizontal derivatives are 0 if the ground nearby is unknown.
+    """
     heights, to_pixel = data.heights, data.to_pixel
     column, row = polymap(to_pixel, x + GROUND_STEP_M, y)
     ground_height = pixel_height(heights, column, row)

@@ -71,7 +71,7 @@ class _PixelSteps(NamedTuple):
 
 @inner
 def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:
-    """Return the east and north of a point in the rotated frame."""
+    """Return the east and north coordinates of a point (along, across) in the rotated frame, m."""
     return (
         frame.east + frame.cosine * along - frame.sine * across,
         frame.north + frame.sine * along + frame.cosine * across,
@@ -87,8 +87,9 @@ def _min_height(
     across: float,
     steps: _PixelSteps,
 ) -> float:
-    """Return the minimum height in a cell, the highest ground of 3 x 3 samples plus the clearance; inf outside the map.
+    """Return the lowest allowed altitude in a cell, m: the highest of 3 x 3 ground samples plus the clearance.
 
+    The result is inf outside the map or without data.
     steps: steps between the samples; a step of 0 along the frame leaves only the middle sample.
     """
     east, north = position_of(frame, along, across)
@@ -112,7 +113,10 @@ def _min_height(
 
 @inner
 def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float) -> _PixelSteps:
-    """Return the raster steps that correspond to `pitch` m along and across the line, at this distance along."""
+    """Return the raster steps that correspond to steps of `pitch` (m) along and across the frame.
+
+    along: position in the frame at which the steps are computed, m.
+    """
     east, north = position_of(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
     east, north = position_of(frame, along + pitch, 0.0)
@@ -148,9 +152,12 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
 
 @inner
 def _add_kill_cost(
-    obstacles: Records, along: float, grid: Grid, first_across: int, last_across: int, price: Floats
+    obstacles: Records, along: float, grid: Grid, first_across: int, last_across: int, cell_costs: Floats
 ) -> None:
-    """Add the cost per m inside kill spheres, increasing inwards, to a range across of a stage's cells."""
+    """Add the cost of kill spheres, which increases inwards, to the cells `first_across` to `last_across` of a stage.
+
+    along: position of the stage, m.  cell_costs: (layers, across) cost per m.
+    """
     across, layers = grid.across, grid.layers
     pitch = across[1] - across[0] if across.size > 1 else 1.0
     for k in range(obstacles.shape[0]):
@@ -169,7 +176,7 @@ def _add_kill_cost(
             for y in range(first_y, last_y + 1):
                 distance2 = plane_distance2 + (across[y] - obstacle.across) ** 2
                 if distance2 < radius * radius:
-                    price[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / radius)
+                    cell_costs[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(distance2) / radius)
 
 
 @inner
@@ -183,9 +190,13 @@ def set_cell_costs(
     extra: Floats,
     first_across: int,
     last_across: int,
-    price: Floats,
+    cell_costs: Floats,
 ) -> None:
-    """Fill the cost per m of a range across of a stage's cells, inf for a cell too close to the ground."""
+    """Fill `cell_costs` (per m) for the cells `first_across` to `last_across` of a stage.
+
+    The cost is inf for a cell too close to the ground, and higher inside kill spheres.
+    extra: (stages + 1, across) additional cost per m.  cell_costs: (layers, across).
+    """
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
     steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)
@@ -196,8 +207,8 @@ def set_cell_costs(
         else:
             min_height = _min_height(data, required, frame, stage * step, across[y], steps)
         for z in range(layers.size):
-            price[z, y] = 1.0 + extra[stage, y] if layers[z] >= min_height else math.inf
-    _add_kill_cost(obstacles, stage * step, grid, first_across, last_across, price)
+            cell_costs[z, y] = 1.0 + extra[stage, y] if layers[z] >= min_height else math.inf
+    _add_kill_cost(obstacles, stage * step, grid, first_across, last_across, cell_costs)
 
 
 # --- Dynamic programme over stages ---
@@ -215,7 +226,10 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 @inner
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
-    """Return `STEP_LAYERS` records (sideways, layers) of the climb and descent of each step by course and height."""
+    """Return the steepest climb and descent of a step, in layers: `STEP_LAYERS` records (sideways, layers).
+
+    They depend on the course of the step, and on the layer in which the step begins.
+    """
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
     step_layers = np.zeros((2 * MAX_SIDE + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
@@ -233,26 +247,28 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
 
 
 @inner
-def relax(
+def relax_cells(
     cost: Floats,
-    price: Floats,
+    cell_costs: Floats,
     next_cost: Floats,
     parents: Codes,
     first_source: int,
     first_target: int,
-    first_price: int,
+    first_cell_cost: int,
     count: int,
     length: float,
 ) -> None:
-    """Relax `count` adjacent cells to as many cells of the next stage.
+    """Offer routes through `count` adjacent cells to as many cells of the next stage; keep those that are cheaper.
 
-    first_source, first_target, first_price: indices of the first cells, and of the first cell cost, in the flat arrays.
+    cost, next_cost: costs of the routes to the cells of both stages.  cell_costs: cost per m of the cells.
+    parents: cells from which the cheapest routes come.  length: of each step, m.
+    first_source, first_target, first_cell_cost: indices of the first cells, and of the first cell cost, in flat arrays.
     """
     for k in range(count):
         # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
         # vectorised.
         i, j = np.uintp(first_source) + np.uintp(k), np.uintp(first_target) + np.uintp(k)
-        total = cost[i] + length * price[np.uintp(first_price) + np.uintp(k)]
+        total = cost[i] + length * cell_costs[np.uintp(first_cell_cost) + np.uintp(k)]
         is_better = total < next_cost[j]
         next_cost[j] = total if is_better else next_cost[j]
         parents[j] = first_source + k if is_better else parents[j]
@@ -265,21 +281,22 @@ def relax_stage(
     parents: Codes,
     spans: Records,
     step_layers: Records,
-    price: Floats,
+    cell_costs: Floats,
     step: float,
     pitch: float,
     ratio: float,
 ) -> None:
-    """Relax one stage, from the costs before it to the costs after it, (layers, across) each, and store parent cells.
+    """Compute the costs of the routes to the cells of a stage from the costs of the previous stage; store parent cells.
 
+    cost, next_cost: (layers, across) costs of the routes to the cells of the previous stage and of this stage.
     spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: spacing of the layers, m.
     """
     layer_count, width = cost.shape
-    flat_cost, flat_next_cost, flat_parents, flat_price = (
+    flat_cost, flat_next_cost, flat_parents, flat_cell_costs = (
         cost.ravel(),
         next_cost.ravel(),
         parents.ravel(),
-        price.ravel(),
+        cell_costs.ravel(),
     )
     for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
@@ -294,9 +311,9 @@ def relax_stage(
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
-                relax(
+                relax_cells(
                     flat_cost,
-                    flat_price,
+                    flat_cell_costs,
                     flat_next_cost,
                     flat_parents,
                     source,
@@ -309,7 +326,10 @@ def relax_stage(
 
 @inner
 def fill_goal_distances(columns: int, home: int, remaining_stages: int, step: float, ratio: float, out: Floats) -> None:
-    """Fill the shortest horizontal distance from each position across to the destination, m."""
+    """Fill `out` with the shortest horizontal distance from each position across to the destination, m.
+
+    home: index across of the destination.  The distance is inf if the destination cannot be reached from there.
+    """
     for y in range(columns):
         offset = abs(y - home)
         if offset > MAX_SIDE * remaining_stages:
@@ -322,7 +342,7 @@ def fill_goal_distances(columns: int, home: int, remaining_stages: int, step: fl
 
 
 @inner
-def prune(
+def prune_cells(
     next_cost: Floats,
     spans: Records,
     goal_distances: Floats,
@@ -331,7 +351,7 @@ def prune(
     first_across: int,
     last_across: int,
 ) -> None:
-    """Drop cells without a route to the destination within the bound, and fill the remaining spans.
+    """Set the cost of cells without a route to the destination within the bound to inf, and fill the remaining spans.
 
     spans: `SPAN` records (layers,) to fill. goal_distances: (across,) horizontal distance to the destination, m.
     height_differences: (layers,) height differences to the destination, m.
@@ -355,9 +375,9 @@ def prune(
 class GridSearch(NamedTuple):
     """Resumable search for the cheapest route over a grid; arrays are (layers, across).
 
-    parents: (stages + 1, layers, across).  cost: costs of the last stage reached.  next_cost: scratch.  price: cost per
-    m, scratch.  spans: `SPAN` records (layers,) of the cells with a finite cost.  start_layer, goal_layer: layers of
-    the ends.  centre_index: index across of both ends.  stage: the last stage reached.
+    parents: (stages + 1, layers, across).  cost: costs of the last stage reached.  next_cost, cell_costs: scratch.
+    spans: `SPAN` records (layers,) of the cells with a finite cost.  start_layer, goal_layer: layers of the ends.
+    centre_index: index across of both ends.  stage: the last stage reached.
     """
 
     step_layers: Records
@@ -365,7 +385,7 @@ class GridSearch(NamedTuple):
     parents: Codes
     cost: Floats
     next_cost: Floats
-    price: Floats
+    cell_costs: Floats
     spans: Records
     start_layer: int
     centre_index: int
@@ -448,7 +468,7 @@ def continue_route(
         parents,
         cost,
         next_cost,
-        price,
+        cell_costs,
         spans,
         start_layer,
         centre_index,
@@ -465,11 +485,11 @@ def continue_route(
         if first > last:
             last_stage = stages
             break
-        set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, price)
+        set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, cell_costs)
         next_cost[:, first : last + 1] = np.inf
-        relax_stage(cost, next_cost, parents[stage], spans, step_layers, price, step, pitch, grid.ratio)
+        relax_stage(cost, next_cost, parents[stage], spans, step_layers, cell_costs, step, pitch, grid.ratio)
         fill_goal_distances(width, centre_index, stages - stage, step, grid.ratio, goal_distances)
-        prune(next_cost, spans, goal_distances, height_differences, bound, first, last)
+        prune_cells(next_cost, spans, goal_distances, height_differences, bound, first, last)
         cost, next_cost = next_cost, cost
     return GridSearch(
         step_layers,
@@ -477,7 +497,7 @@ def continue_route(
         parents,
         cost,
         next_cost,
-        price,
+        cell_costs,
         spans,
         start_layer,
         centre_index,
@@ -501,7 +521,7 @@ def end_route(search: GridSearch) -> tuple[Records, float]:
 
 @inner
 def trace_back(parents: Codes, layer: int, across: int) -> Records:
-    """Return `ROUTE_CELL` records from the start to this cell of the last stage.
+    """Return `ROUTE_CELL` records of the route from the start to a cell of the last stage.
 
     parents: (stages + 1, layers, across).
     """
@@ -543,9 +563,9 @@ class GridRoute:
 
 
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
-    """Return a grid with this many stages, square cells in the plane, and a layer at the start's height.
+    """Return a grid with square cells in the plane, and with a layer at the start's altitude.
 
-    span: limits across, m. The number of stages is reduced where the grid would become too large.
+    span: limits across, m.  stages: number of stages, which is reduced if the grid would be too large.
     """
     min_height, max_height = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level_point = np.array([*data.destination[:2], data.start[2]])
@@ -598,7 +618,7 @@ def grid_route(
 
 
 def proximity_cost(along: Floats, across: Floats, earlier_routes: tuple[GridRoute, ...]) -> Floats:
-    """Return the additional cost per m near earlier routes, at positions along (s,) and across (y,), m, as (s, y)."""
+    """Return the additional cost per m near earlier routes, (s, y).  along: (s,) and across: (y,) positions, m."""
     extra = np.zeros((along.size, across.size))
     width = max(ROUTE_SPACING_M, ROUTE_SPACING_STEPS * along[-1] / (along.size - 1))
     for route in earlier_routes:
@@ -614,7 +634,10 @@ def grid_routes(
     grids: tuple[tuple[int, int], ...],
     pause: Callable[[], None] = lambda: None,
 ) -> Iterator[GridRoute]:
-    """Yield routes for each grid (stages, number of different routes). pause: as in `cheapest_route`."""
+    """Yield the routes of each grid, cheapest first.
+
+    grids: number of stages and number of different routes of each grid.  pause: as in `cheapest_route`.
+    """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for stages, route_count in grids:
         grid = make_grid(data, frame, span, stages)

@@ -84,7 +84,7 @@ def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int
 
 @compiled
 def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:
-    """Return the maximum climb and descent (8, 2) of a step on each course, in layers."""
+    """Return the maximum climb and descent of a step on each of the eight courses, in layers, (8, 2)."""
     layers, start, end = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
     _set_position(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, start)
     for course in range(8):
@@ -124,7 +124,10 @@ def _expand_state(
     max_turn: int,
     open_states: list[tuple[float, int]],
 ) -> None:
-    """Expand a state by relaxing its successors, and push each with its cost plus its distance to the goal."""
+    """Expand a state: push each successor that the state reaches more cheaply than before to the open list.
+
+    A successor is pushed with its cost plus its distance to the goal.  max_turn: in units of 45 degrees.
+    """
     layer_limits, course, cell = table.layer_limits, state % 8, state // 8
     layer, position = cell % lattice.layers, cell // lattice.layers
     along, across = position // lattice.across, position % lattice.across
@@ -178,7 +181,7 @@ class LatticeSearch(NamedTuple):
 
 
 def begin_lattice_search(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> LatticeSearch:
-    """Return the search for a route from start to destination before its first step."""
+    """Return a new search for a route from start to destination, before its first expansion."""
     layer_limits = _climb_layers(data, frame, lattice)
     state_count = lattice.along * lattice.across * lattice.layers * 8
     width = int(layer_limits.max(axis=0).sum()) + 1
@@ -259,7 +262,7 @@ def _is_inside(data: ProblemArrays, point: Floats) -> bool:
 
 @compiled
 def trace_route(parents: Numbers, goal_state: int, lattice: Lattice) -> Records:
-    """Return `LATTICE_CELL` records from the start to a state."""
+    """Return `LATTICE_CELL` records of the route from the start to a state."""
     count, state = 0, goal_state
     while state >= 0:
         count, state = count + 1, parents[state] - 1
@@ -329,12 +332,13 @@ def turning_step(data: ProblemArrays) -> float:
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
-    """Return a lattice over the whole map, with points at both ends and steps of at most the given length.
+    """Return a lattice over the whole map, with points at both ends.
 
-    step: m. The step is increased where the lattice would have more than `MAX_LATTICE_STATES` states.
+    step: maximum spacing of the points, m; it is increased if the lattice would have more than `MAX_LATTICE_STATES`
+    states.
     """
     corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
-    min_corner, max_corner = frame.rotate(corners)[:, :2].min(axis=0), frame.rotate(corners)[:, :2].max(axis=0)
+    min_corner, max_corner = frame.to_frame(corners)[:, :2].min(axis=0), frame.to_frame(corners)[:, :2].max(axis=0)
     level_point = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level_point))))
     min_height = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
@@ -364,7 +368,7 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """Return `LATTICE_CELL` records of the cheapest route, empty without a route, and the number of expanded states.
+    """Return the cheapest route as `LATTICE_CELL` records (none if there is no route), and the expanded states' number.
 
     max_turn: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
     """
@@ -386,10 +390,10 @@ def lattice_route(
     pause: Callable[[], None] = lambda: None,
     max_states: int = MAX_EXPANDED,
 ) -> tuple[Floats, int]:
-    """Return world points (k, 3) of a route over a lattice of this step (m), and the number of expanded states.
+    """Find a route over a lattice; return its points, (k, 3) m, and the number of expanded states.
 
-    Return (0, 3) points without a route. pause: called after every `STATES_PER_PAUSE` states; an exception raised there
-    stops the search. max_states: maximum number of expanded states.
+    step: spacing of the lattice, m. pause: called after every `STATES_PER_PAUSE` states; an exception raised there
+    stops the search. max_states: maximum number of expanded states. If there is no route, k is 0.
     """
     lattice = make_lattice(data, frame, step)
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
@@ -399,7 +403,7 @@ def lattice_route(
         return np.empty((0, 3)), expanded_count
     positions = np.column_stack([cells["along"], cells["across"]]) * lattice.step
     heights = lattice.low + cells["layer"] * lattice.pitch
-    points = frame.restore(np.column_stack([positions, heights]))
+    points = frame.to_world(np.column_stack([positions, heights]))
     points[0], points[-1] = data.start, data.destination
     return np.asarray(simplify_route(data, np.ascontiguousarray(points))), expanded_count
 

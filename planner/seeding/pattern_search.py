@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planner.evaluation.encoding import Encoding, WaypointFrames, frames_of
+from planner.evaluation.encoding import Encoding, WaypointFrames, require_frames
 from planner.evaluation.graded_scores import (
     PathScratch,
     make_scratch,
@@ -104,7 +104,7 @@ def search_patterns(
     vector: (d,). evaluations: maximum number. must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; True
     ends the search with its present result.
     """
-    frames = frames_of(encoding)
+    frames = require_frames(encoding)
     inner_count = encoding.waypoints - 2
     interval = float(frames.edges[-1]) / inner_count
     moves, axes = _triangular_basis(inner_count)
@@ -129,7 +129,10 @@ def search_patterns(
 
 
 def merits(scores: Floats) -> Floats:
-    """Return the merits (n,) of scores (n, 8) by `planner.plan.Violation` and `Objective`, for minimisation."""
+    """Return the merit of each row of scores (n, 8), which a search minimises, (n,).
+
+    The columns of the scores are those of `planner.plan.Violation` and then of `planner.plan.Objective`.
+    """
     prices = np.array([TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE])
     count = len(prices)
     length_ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
@@ -141,7 +144,7 @@ def merits(scores: Floats) -> Floats:
 
 @cache
 def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
-    """Return triangular moves with half-widths of 1, 2, 4, ... waypoints, (k, 3 inner), and the axis of each, (k,)."""
+    """Return triangular moves of 1, 2, 4, ... waypoints half-width, (k, 3 inner_count), and the axis of each, (k,)."""
     moves: list[Floats] = []
     axes: list[int] = []
     positions = np.arange(inner_count, dtype=np.float64)
@@ -226,7 +229,10 @@ def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, boo
 
 @compiled
 def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, steps: Floats) -> _State:
-    """Return a new search at a vector (d,), with moves of the initial steps (k,), which the search modifies."""
+    """Return a new search that starts at a vector (d,).
+
+    steps: (k,) initial steps of the moves; the search changes this array.
+    """
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
     best_merit, is_feasible = _evaluate_merit(data, limits, frames, start, candidate, math.inf, math.inf)
     feasible_vector = np.full(start.size, np.inf)
@@ -250,7 +256,10 @@ def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, st
 def _fill_trial(
     box: _Box, moves: Floats, k: int, steps: Floats, round_start: Floats, vector: Floats, trial: Floats
 ) -> None:
-    """Fill a trial (d,) with the vector after move k, or after the round's whole displacement if there is no move k."""
+    """Fill a trial (d,) with the vector after move k, clipped to the box.
+
+    For the number after the last move, the displacement of the whole round is repeated instead.
+    """
     for d in range(vector.size):
         step = steps[k] * moves[k, d] if k < moves.shape[0] else vector[d] - round_start[d]
         trial[d] = min(box.upper[d], max(box.lower[d], vector[d] + step))

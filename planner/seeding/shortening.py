@@ -52,7 +52,7 @@ MIN_MOVE_M = 0.05
 def _newton_step(
     path: Floats, min_corner: Floats, max_corner: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:
-    """Fill the Newton step (n,) from a path within its box, and return the largest component of the step, m."""
+    """Fill `step` (n,) with the Newton step from a path within its box; return the step's largest component, m."""
     size = step.size
     for row in range(size):
         model.band[row, 0] += HESSIAN_DAMPING_PER_M
@@ -153,7 +153,10 @@ def _descend(
     penalty: float,
     descent: _Descent,
 ) -> int:
-    """Minimise the merit of a path (w, 3) in place, fill the final constraint values, and return the model count."""
+    """Minimise the merit of a path (w, 3) in place, and fill `values` with the final values of the constraints.
+
+    Returns the number of models evaluated.
+    """
     min_corner, max_corner, model, step, trial = (
         descent.min_corner,
         descent.max_corner,
@@ -244,7 +247,7 @@ def shorten_path(
 
 
 def resample(route: Floats, count: int) -> Floats:
-    """Return waypoints (count, 3) at equal distances along a route (k, 3).
+    """Return `count` waypoints at equal distances along a route (k, 3), ends included, (count, 3).
 
     >>> resample(np.array([[0.0, 0.0, 5.0], [30.0, 40.0, 5.0], [30.0, 90.0, 5.0]]), 5).tolist()
     [[0.0, 0.0, 5.0], [15.0, 20.0, 5.0], [30.0, 40.0, 5.0], [30.0, 65.0, 5.0], [30.0, 90.0, 5.0]]

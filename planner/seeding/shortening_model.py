@@ -41,7 +41,7 @@ from planner.seeding.flown_corners import (
     corners_near_ground,
     ground_slopes,
     height_above_required,
-    leg_of,
+    leg_index,
     no_corners,
 )
 from world.arrays import Floats, Ints
@@ -130,7 +130,10 @@ def active_constraints(
 def _fill_turn_lengths(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
 ) -> None:
-    """Fill the lengths of the legs that a turn takes up, divided by the tangent of half the turn, (w,)."""
+    """Fill the lengths of the legs before and after each waypoint that its turn takes up, (w,) each.
+
+    The lengths are divided by the tangent of half the turn.
+    """
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
         ux, uy, vx, vy = courses_at(data, legs, i)
@@ -156,7 +159,7 @@ def _fill_turn_lengths(
 def _find_near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:
-    """Return pairs of a leg and a missile near it, (p, 2), and the required distances from the centres, (p,) m."""
+    """Return pairs of a leg and a missile near it, (p, 2), and the required distance from each centre, m, (p,)."""
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
     for k in range(missiles.shape[0]):
@@ -196,7 +199,10 @@ def constraint_count(active: ActiveConstraints) -> int:
 def carry_multipliers(
     previous_active: ActiveConstraints, multipliers: Floats, next_active: ActiveConstraints
 ) -> Floats:
-    """Return the multipliers for the next active constraints; a new pair of leg and missile starts with 0."""
+    """Return the multipliers of the next active constraints, taken from the same constraints of the previous round.
+
+    A new pair of leg and missile gets the multiplier 0.
+    """
     new_multipliers, pair_count, previous_pair_count = (
         np.zeros(constraint_count(next_active)),
         next_active.pairs.shape[0],
@@ -410,7 +416,7 @@ def _add_corners(
             if radius <= 0.0:
                 continue
             corner_point(data, corner[0], corner[1], corner[2], radius, k, point)
-            value = height_above_required(data, limits, point) - flown.lowered[i, leg_of(k)]
+            value = height_above_required(data, limits, point) - flown.lowered[i, leg_index(k)]
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
                 ground_slopes(data, point[0], point[1], ground_gradient)
@@ -440,7 +446,7 @@ def _add_slopes(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the slope margins of legs, as m of height, and their lengths above the minimum; see `_add_ground`."""
+    """Add the slope margins of legs, as m of height, and the lengths of legs above the minimum; see `_add_ground`."""
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
         dx, dy, altitude_change = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
@@ -522,7 +528,10 @@ def _add_turns(
 
 @inner
 def _add_turn_derivatives(before_derivatives: Floats, after_derivatives: Floats, factor: float, slopes: Floats) -> None:
-    """Add the derivatives of a turn by its two legs, times a factor, to its derivatives by waypoints (3, 3)."""
+    """Add a multiple of a turn's derivatives to `slopes` (3, 3), the derivatives with respect to three waypoints.
+
+    before_derivatives, after_derivatives: derivatives of the turn with respect to the legs before and after it, (2,).
+    """
     for axis in range(2):
         slopes[0, axis] -= factor * before_derivatives[axis]
         slopes[1, axis] += factor * (before_derivatives[axis] - after_derivatives[axis])
@@ -540,7 +549,10 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Return the augmented length or cost of a path (w, 3), m, and fill the constraints' values and the model."""
+    """Return the augmented Lagrangian of a path (w, 3), m: its length or cost plus the terms of its constraints.
+
+    values: filled with the values of the constraints.  model: filled with gradient and Hessian.
+    """
     model.gradient[:], model.band[:] = 0.0, 0.0
     first_number = active.pairs.shape[0]
     minimises_length = data.travel.time == 0.0 and data.travel.energy == 0.0

@@ -23,8 +23,8 @@ from planner.seeding.grids import (
     find_obstacles,
     layers_per_step,
     make_grid,
-    prune,
-    relax,
+    prune_cells,
+    relax_cells,
     relax_stage,
     set_cell_costs,
     trace_back,
@@ -63,7 +63,7 @@ class GridCosts(NamedTuple):
 @inner
 def _relax_stage_back(
     goal_costs: Floats,
-    price: Floats,
+    cell_costs: Floats,
     previous_goal_costs: Floats,
     successors: Codes,
     spans: Records,
@@ -72,16 +72,17 @@ def _relax_stage_back(
     pitch: float,
     ratio: float,
 ) -> None:
-    """Relax one stage backwards, from the costs after it to the costs before it, (layers, across) each.
+    """Compute the costs of the routes from the cells of a stage to the destination from the costs of the next stage.
 
+    goal_costs, previous_goal_costs: (layers, across) costs from the cells of the next stage and of this stage.
     spans: `SPAN` records (layers,) of the cells before it that are within the bound.
     """
     layer_count, width = goal_costs.shape
-    flat_goal_costs, flat_previous, flat_successors, flat_price = (
+    flat_goal_costs, flat_previous, flat_successors, flat_cell_costs = (
         goal_costs.ravel(),
         previous_goal_costs.ravel(),
         successors.ravel(),
-        price.ravel(),
+        cell_costs.ravel(),
     )
     for z in range(layer_count):
         first, last = spans[z].first, spans[z].last
@@ -96,9 +97,9 @@ def _relax_stage_back(
             for next_z in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
-                relax(
+                relax_cells(
                     flat_goal_costs,
-                    flat_price,
+                    flat_cell_costs,
                     flat_previous,
                     flat_successors,
                     target,
@@ -111,7 +112,10 @@ def _relax_stage_back(
 
 @inner
 def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Records, bound: float) -> None:
-    """Drop cells (layers, across) of one stage through which no route is within the bound."""
+    """Set `goal_costs` to inf for the cells of a stage through which no route is within the bound.
+
+    start_costs, goal_costs: (layers, across) costs from the start and to the destination.
+    """
     for z in range(start_costs.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
             if not start_costs[z, y] + goal_costs[z, y] <= bound:
@@ -121,7 +125,7 @@ def _drop_cells_above_bound(start_costs: Floats, goal_costs: Floats, spans: Reco
 class SideSearch(NamedTuple):
     """Resumable search for the costs of partial routes, first from the start, then from the destination.
 
-    price: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
+    cell_costs: cost per m of the cells, (stages + 1, layers, across). spans: `SPAN` records (stages + 1, layers) of the
     cells within the bound. stages_done: number of completed stages, forwards and then backwards; at the
     end twice the number of stages of the grid.
     """
@@ -129,7 +133,7 @@ class SideSearch(NamedTuple):
     costs: GridCosts
     step_layers: Records
     obstacles: Records
-    price: Floats
+    cell_costs: Floats
     spans: Records
     centre_index: int
     goal: int
@@ -187,7 +191,7 @@ def continue_grid_costs(
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
     pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
-    costs, step_layers, obstacles, price, spans, centre_index, goal, done = search
+    costs, step_layers, obstacles, cell_costs, spans, centre_index, goal, done = search
     start_costs, parents, goal_costs, successors = costs
     height_differences, goal_distances, extra = (
         grid.layers - grid.layers[goal],
@@ -205,7 +209,7 @@ def continue_grid_costs(
             if first > last:
                 end_number = 2 * stages
                 break
-            set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, price[stage])
+            set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, cell_costs[stage])
             previous_costs, stage_costs = start_costs[stage - 1], start_costs[stage]
             relax_stage(
                 previous_costs,
@@ -213,13 +217,13 @@ def continue_grid_costs(
                 parents[stage],
                 spans[stage - 1],
                 step_layers,
-                price[stage],
+                cell_costs[stage],
                 step,
                 pitch,
                 grid.ratio,
             )
             fill_goal_distances(width, centre_index, stages - stage, step, grid.ratio, goal_distances)
-            prune(start_costs[stage], spans[stage], goal_distances, height_differences, bound, first, last)
+            prune_cells(start_costs[stage], spans[stage], goal_distances, height_differences, bound, first, last)
             continue
         if step_number == stages:
             goal_costs[stages, goal, centre_index] = 0.0
@@ -227,7 +231,7 @@ def continue_grid_costs(
         next_costs, stage_costs = goal_costs[stage + 1], goal_costs[stage]
         _relax_stage_back(
             next_costs,
-            price[stage + 1],
+            cell_costs[stage + 1],
             stage_costs,
             successors[stage],
             spans[stage],
@@ -237,7 +241,7 @@ def continue_grid_costs(
             grid.ratio,
         )
         _drop_cells_above_bound(start_costs[stage], goal_costs[stage], spans[stage], bound)
-    return SideSearch(costs, step_layers, obstacles, price, spans, centre_index, goal, end_number)
+    return SideSearch(costs, step_layers, obstacles, cell_costs, spans, centre_index, goal, end_number)
 
 
 @inlined
@@ -294,7 +298,9 @@ SAME_ROUTE_DISTANCE_M = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Return the sides on which a route (s, 3) along, across, up passes obstacles, (k,); -1 beyond its ends.
+    """Return the side on which a route passes each obstacle, (k,); -1 for an obstacle beyond the route's ends.
+
+    points: (s, 3) along, across, up, m.
 
     Routes with the same sides can be deformed into each other without touching an obstacle. Routes with different sides
     are assumed not to be, although a route over a sphere on the ground can be moved to either side.

@@ -74,8 +74,9 @@ def waypoint_chains(
     pause: Callable[[], None] = lambda: None,
     max_legs: int = ALL_LEGS,
 ) -> WaypointChains:
-    """Return the best paths through candidates (w, k, 3) world m; only the first candidate of each end is used.
+    """Return the best path through each candidate of each waypoint.
 
+    candidates: (w, k, 3) m; only the first candidate of each end is used.
     bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_PER_PAUSE`
     legs; an exception raised there stops the work. max_legs: if more legs have to be evaluated, no path is returned.
     """
@@ -87,7 +88,9 @@ def waypoint_chains(
     sweeps, cursor = _Sweeps(forward, before, backward, after), np.zeros(1, dtype=_CURSOR)
     cursor["step"], cursor["waypoint"] = 1, 1
     evaluated_legs = 0
-    while not _advance(data, candidates, legs, bound, sweeps, cursor, min(LEGS_PER_PAUSE, max_legs - evaluated_legs)):
+    while not _advance_sweeps(
+        data, candidates, legs, bound, sweeps, cursor, min(LEGS_PER_PAUSE, max_legs - evaluated_legs)
+    ):
         pause()
         evaluated_legs = int(cursor["legs"][0])
         if evaluated_legs >= max_legs:
@@ -96,10 +99,10 @@ def waypoint_chains(
 
 
 @compiled
-def _advance(
+def _advance_sweeps(
     data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, max_legs: int
 ) -> bool:
-    """Continue from the cursor until `max_legs` legs have been evaluated, and return True if all is done.
+    """Continue both sweeps from the cursor until `max_legs` legs have been evaluated; return True if both are done.
 
     legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative. cursor: a `_CURSOR` record (1,).
     """
@@ -247,7 +250,7 @@ def _corner_cost(
     next_waypoint: Floats,
     corners: Records,
 ) -> float:
-    """Return the cost of a waypoint's turn, for its excess over the limit and for missing leg length.
+    """Return the cost of a waypoint's turn beyond the limit, and of legs that are too short for the turn, m of path.
 
     corners: scratch, one record.
     """
@@ -285,7 +288,9 @@ def _corner_cost(
 
 @compiled
 def free_points(data: ProblemArrays, points: Floats) -> Flags:
-    """Flag the points (n, 3), world m, that are on the map, above the clearance and outside all kill spheres.
+    """Return a mask of the points that are on the map, above the clearance and outside all kill spheres, (n,).
+
+    points: (n, 3) m.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from planner.evaluation.airspace_scores import airspace_excess
-from planner.evaluation.encoding import Encoding, RotatedFrame, WaypointFrames, frames_of, straight_frames
+from planner.evaluation.encoding import Encoding, RotatedFrame, WaypointFrames, require_frames, straight_frames
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
 from planner.evaluation.problem import ProblemArrays
 from planner.evaluation.terrain_clearance import lag_length, segment_pixels, terrain_excess
@@ -98,7 +98,7 @@ def _max_depth_below_leg(
     start_altitude: float,
     end_altitude: float,
 ) -> float:
-    """Return the largest distance of the aircraft below a long leg, m; negative if it is always above.
+    """Return the largest distance of the aircraft below a long leg, m; negative if the aircraft is always above it.
 
     east, north: unit course of the leg.
     """
@@ -110,7 +110,7 @@ def _max_depth_below_leg(
 
 
 @compiled
-def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
+def _choose_candidates(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
     """Choose one of the candidates (w, c, 3) of each waypoint to minimise the sum of leg costs.
 
     Return the chosen candidates and the number of legs evaluated.
@@ -180,7 +180,10 @@ _AXIS_NEIGHBOURS = _NEIGHBOURS[np.abs(_NEIGHBOURS).sum(axis=1) <= 1.0]
 def fit_waypoints(
     data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE_FIT
 ) -> Floats:
-    """Return waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval."""
+    """Return waypoints along a route, one per interval of the rotated frame, (w, 3) m.
+
+    route: (s, 3) along, across, up in the frame, m.
+    """
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     interval = edges[1] - edges[0]
     fractions = np.linspace(0.1, 0.9, fit.candidates)
@@ -190,7 +193,10 @@ def fit_waypoints(
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
-    """Choose waypoints among candidates (w - 2, k, 3) in their frames, move them locally, and return them, (w, 3) m."""
+    """Choose waypoints among candidate points, move them locally, and return them with both ends, (w, 3) m.
+
+    points: (w - 2, k, 3) candidates of each inner waypoint, in its frame.
+    """
     inner_count, width, _ = points.shape
     candidates = np.zeros((inner_count + 2, width * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
@@ -198,7 +204,7 @@ def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit:
     chosen, _ = _pick_candidates(data, frames, candidates)
     steps = _NEIGHBOURS if fit.diagonal else _AXIS_NEIGHBOURS
     moved, _ = _move_waypoints(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), MOVE_FACTOR)
-    return _restore_world(frames, moved[:, None])[:, 0]
+    return _to_world(frames, moved[:, None])[:, 0]
 
 
 def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
@@ -207,9 +213,9 @@ def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int
     vector: (d,). scale: initial moves relative to `FIRST_MOVES`. Turns are not evaluated. Returns the new
     vector and the equivalent number of path evaluations.
     """
-    frames = frames_of(encoding)
+    frames = require_frames(encoding)
     path = np.zeros((encoding.waypoints, 3))
-    path[1:-1] = frames.rotate(encoding.decode(vector[None])[0, 1:-1])
+    path[1:-1] = frames.to_frame(encoding.decode(vector[None])[0, 1:-1])
     chosen, legs = _move_waypoints(
         data, frames, path, _NEIGHBOURS, rounds, scale * np.array(FIRST_MOVES), LAST_MOVE_FACTOR
     )
@@ -249,14 +255,14 @@ def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Fl
     inner_count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
     for end, point, neighbour_index in ((0, data.start, 0), (-1, data.destination, inner_count - 1)):
-        candidates[end] = frames.rotate(np.tile(point, (inner_count, 1)))[neighbour_index]
-    chosen_indices, leg_count = _choose(data, np.ascontiguousarray(_restore_world(frames, candidates)))
+        candidates[end] = frames.to_frame(np.tile(point, (inner_count, 1)))[neighbour_index]
+    chosen_indices, leg_count = _choose_candidates(data, np.ascontiguousarray(_to_world(frames, candidates)))
     return candidates[np.arange(len(candidates)), chosen_indices], int(leg_count)
 
 
-def _restore_world(frames: WaypointFrames, candidates: Floats) -> Floats:
+def _to_world(frames: WaypointFrames, candidates: Floats) -> Floats:
     """Return the world positions of candidates (w, c, 3); an end is in the frame of the waypoint next to it."""
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])
     row_frames = WaypointFrames(east, north, cosine, sine, frames.edges)
-    return np.asarray(row_frames.restore(candidates.transpose(1, 0, 2)).transpose(1, 0, 2))
+    return np.asarray(row_frames.to_world(candidates.transpose(1, 0, 2)).transpose(1, 0, 2))

@@ -75,7 +75,7 @@ def test_files_that_are_no_scenario(content: bytes, wanted: str, tmp_path: Path)
 
 
 def test_missing_and_unreadable_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(ScenarioError, match="no such file, and not an embedded scenario \\(jacksboro"):
+    with pytest.raises(ScenarioError, match="no such file, and not a built-in scenario \\(jacksboro"):
         load_scenario(str(tmp_path / "none.toml"))
     with pytest.raises(ScenarioError, match="no such file"):
         load_scenario("x" * 5000)

@@ -62,13 +62,20 @@ def _crs_code(database: sqlite3.Connection, system: int) -> str:
 
 
 def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
-    """Return the columns with text or numbers, and the zone's name under the key of the other formats."""
+    """Return the columns whose values are text or numbers.
+
+    The zone's name, from whichever column holds it, is added with the key "name", as in the other file formats.
+    """
     plain = {key: value for key, value in columns.items() if isinstance(value, str | int | float)}
     name = next((value for key, value in plain.items() if key.lower() in ("name", "identifier", "title")), None)
     return plain if name is None else plain | {"name": str(name)}
 
 
 def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
+    """Convert a GeoPackage geometry to GeoJSON in longitude and latitude.  Raises ScenarioError if it is invalid.
+
+    code: coordinate reference system as `_crs_code` returns it.
+    """
     allowed = "expected a polygon, a multipolygon or a point"
     try:
         if blob[:2] != b"GP":

@@ -38,7 +38,7 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
 
 
 def _outline(shape: Polygon | Cylinder) -> shapely.Polygon:
-    """Return the outline of a zone without holes."""
+    """Return the outline of a zone that has no holes; a circle becomes a polygon inside it."""
     if isinstance(shape, Polygon):
         return shapely.Polygon(shape.rings[0])
     angles = np.linspace(0.0, 2.0 * math.pi, _CIRCLE_CORNERS, endpoint=False)

@@ -185,7 +185,10 @@ def _limit_reader(key: str) -> Callable[[_Block, str], None]:
 
 
 def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
-    """Return a limit in openAIP's form, or None if unlimited."""
+    """Convert the text of a limit to openAIP's form; return None for the ground or an unlimited height.
+
+    key: "lowerLimit" or "upperLimit".
+    """
     if text.upper() in ("GND", "SFC", "SURFACE", "0") and key == "lowerLimit":
         return None
     if text.upper() in ("UNL", "UNLIM", "UNLTD", "UNLIMITED") and key == "upperLimit":
@@ -201,6 +204,7 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
 
 
 def _read_variable(block: _Block, text: str) -> None:
+    """Set the centre, the direction of arcs or the width of an airway (V)."""
     name, _, value = (part.strip() for part in text.partition("="))
     if name.upper() == "X":
         block.centre = _parse_position(value)
@@ -223,6 +227,7 @@ def _read_circle(block: _Block, text: str) -> None:
 
 
 def _read_arc_by_bearings(block: _Block, text: str) -> None:
+    """Add an arc about the block's centre, with a radius and two bearings (DA)."""
     parts = text.split(",")
     if len(parts) != 3:
         raise ValueError("expected radius, first and last bearing: 5, 270, 290")
@@ -234,6 +239,7 @@ def _read_arc_by_bearings(block: _Block, text: str) -> None:
 
 
 def _read_arc_by_points(block: _Block, text: str) -> None:
+    """Add an arc about the block's centre, between two points (DB)."""
     ends = [_parse_position(match[0]) for match in _COORDINATE.finditer(text)]
     if len(ends) != 2:
         raise ValueError("expected two points: 39:36:40N 119:46:10W, 39:29:09N 119:36:10W")
@@ -313,6 +319,7 @@ def _parse_position(text: str) -> _Position:
 
 
 def _parse_degrees(text: str, max_degrees: float) -> float:
+    """Parse degrees, with optional minutes and seconds separated by colons; return degrees."""
     parts = [_parse_number(part) for part in text.split(":")]
     if len(parts) > 3 or any(part > 60.0 for part in parts[1:]):
         raise ValueError("expected degrees, and minutes and seconds of at most 60")
@@ -337,9 +344,10 @@ def _bearing_and_distance(centre: _Position, position: _Position) -> tuple[float
 def _arc_positions(
     centre: _Position, radii: Sequence[float], first_bearing: float, last_bearing: float, clockwise: bool
 ) -> list[_Position]:
-    """Return positions along an arc, including its ends.
+    """Return positions along an arc, including both ends, close enough together for chords within `ARC_BEND` of it.
 
-    radii: radius at the first and at the last bearing, m; it changes linearly between them.
+    radii: radius at the first and at the last bearing, m; the radius changes linearly between them.
+    first_bearing, last_bearing: degrees; equal bearings mean a full circle.
     """
     turn_angle = (last_bearing - first_bearing) % 360.0 if clockwise else -((first_bearing - last_bearing) % 360.0)
     turn_angle = turn_angle or (360.0 if clockwise else -360.0)

@@ -86,6 +86,7 @@ def _feature_list(data: Mapping[str, Any]) -> Any:
 
 
 def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
+    """Convert a volume of ED-269 to the entries of a [[zones]] table, without a name."""
     shape = volume.get("horizontalProjection") if isinstance(volume, dict) else None
     if not isinstance(shape, dict):
         raise _value_error(source, "", "horizontalProjection", "expected a polygon or a circle")
@@ -178,7 +179,10 @@ def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -
 
 
 def _parse_limit(value: Any, unit: Any, datum: Any, limit_name: str, source: str) -> dict[str, Any] | None:
-    """Return a limit in openAIP's form, or None if unlimited."""
+    """Convert a limit to openAIP's form; return None if there is no limit.
+
+    limit_name: "lower" or "upper".
+    """
     if value is None or value == "":
         return None
     try:
@@ -216,7 +220,7 @@ def _circle_entries(centre: Any, radius: Any, source: str) -> dict[str, float]:
 
 
 def _one_line_name(value: Any) -> str:
-    """Return a name in one line: of several texts the first English one, or the first one without an English one."""
+    """Return a name in one line; of several texts the first English text, or the first text if none is English."""
     if isinstance(value, list):
         texts = [
             text_entry
@@ -235,7 +239,7 @@ def _upper_word(value: Any) -> str:
 
 
 def _period_texts(applicability: Any, source: str) -> list[str]:
-    """Return the periods of activity of a zone, as in a [[zones]] table; empty for a zone that is always active."""
+    """Return the periods in which a zone is active, as in a [[zones]] table; empty if it is always active."""
     if applicability is None:
         return []
     if not isinstance(applicability, list) or not all(isinstance(entry, dict) for entry in applicability):
@@ -258,7 +262,10 @@ def _period_texts(applicability: Any, source: str) -> list[str]:
 
 
 def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
-    """Return a date and time in UTC; add `extreme_offset` to a time that states no offset."""
+    """Return a date and time in UTC, or None for an empty value.
+
+    extreme_offset: offset that is added to a time that states no offset from UTC.
+    """
     if value is None or value == "":
         return None
     moment = datetime.fromisoformat(value)
@@ -287,9 +294,9 @@ def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: 
 
 
 def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
-    """Return the minutes from 00:00 UTC of the stated day, negative on the day before, or None if unknown.
+    """Return a time as minutes after 00:00 UTC of the stated day, or None if it has no UTC offset.
 
-    rounds_up: True to round a part of a minute up.
+    rounds_up: True to round a part of a minute up.  The result is negative for a time on the previous day in UTC.
     """
     if value is None or value == "":
         return None

@@ -115,7 +115,7 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return whether a limit is above ground, and its height, m; None if there is no valid limit."""
+    """Return True for a height above ground or False for an altitude, and the limit, m; None for an invalid limit."""
     if not isinstance(limit, dict):
         return None
     try:
@@ -141,7 +141,7 @@ def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
-    """Convert a limit in openAIP's form to a table entry; empty for the ground as a floor."""
+    """Convert a limit in openAIP's form to an entry of a [[zones]] table; return no entry for the ground as a floor."""
     if not isinstance(value, dict):
         allowed = "expected a table of value, unit and referenceDatum"
         raise ScenarioError.at(source, key, value, allowed, shown="")

@@ -89,6 +89,10 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
 
 
 def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple[str, dict[str, Any]]:
+    """Return the location of a GeoJSON feature for messages, and the [[zones]] entries of its zone.
+
+    index: index of the feature, from 0, for the default name.  Raises ScenarioError if the feature is not a zone.
+    """
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
         raise ScenarioError(f"{source}: {location}: expected a Feature", file=source, field=location)
     properties, geometry = feature.get("properties"), feature.get("geometry")
@@ -142,7 +146,7 @@ def _parse_rings(coordinates: Any) -> list[list[tuple[float, float]]]:
 
 
 def _corner(coordinates: Any) -> tuple[float, float]:
-    """Return latitude and longitude of a position, without its height."""
+    """Return the latitude and longitude of a GeoJSON position.  Raises TypeError if it is not a list of numbers."""
     if not isinstance(coordinates, list) or not all(type(value) in (int, float) for value in coordinates):
         raise TypeError("no position")
     lon, lat = coordinates[0], coordinates[1]
@@ -201,6 +205,7 @@ def _kml_text(element: _Element, tag: str) -> str:
 
 
 def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
+    """Return the [[zones]] entries of a placemark, without its name.  Raises ScenarioError if it is not a zone."""
     entries = zone_entries(_extended_data(placemark, source), source)
     polygons, points = _find_descendants(placemark, "Polygon"), _find_descendants(placemark, "Point")
     if not polygons:
@@ -403,9 +408,10 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
 
 
 def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) -> tuple[list[str], int]:
-    """Repair the outline of an authority's zone; return the notes about it and the number of its crossings.
+    """Repair the outline in a zone's entries if it is from an authority's file, and remove the marks from the entries.
 
-    Leave other zones as they are.  Raises ScenarioError for more crossings than ``max_crossings``.
+    Returns notes about the zone, and the number of crossings of its outline.  Raises ScenarioError for more crossings
+    than ``max_crossings``.
     """
     is_published = entries.pop(PUBLISHED, False)
     notes = [note for flag, note in ((UPSIDE_DOWN, _SWAPPED), (NO_BAND, _NO_BAND)) if entries.pop(flag, False)]

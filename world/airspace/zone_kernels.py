@@ -101,8 +101,9 @@ def _make_edges(rings: list[Ring]) -> Records:
     return edges
 
 
-def _level_record(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
-    return (absent, False) if level is None else (level.height, level.datum == "ground")
+def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float, bool]:
+    """Return the height of a level, m, and True if it is above ground; the default if there is no level."""
+    return (default_height, False) if level is None else (level.height, level.datum == "ground")
 
 
 @inlined
@@ -128,9 +129,9 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:
 
 @inner
 def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tuple[float, int]:
-    """Return the horizontal distance from a position to the outline of zone z, and the index of the nearest edge.
+    """Return the horizontal distance from a position to the outline of zone z, m, and the index of the nearest edge.
 
-    The distance is in m, and negative inside.  The index is -1 for a cylinder, which has no edges.
+    The distance is negative inside.  The index is -1 for a cylinder, which has no edges.
     """
     zone = records.zones[z]
     if zone.round:
@@ -166,12 +167,12 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
 
 @compiled_inline
 def height_outside_band(zone: Record, up: float, ground: float) -> float:
-    """Return the height below a zone's floor or above its ceiling, m.
+    """Return the height by which an altitude is below a zone's floor or above its ceiling, m.
 
-    Between floor and ceiling it is negative: minus the distance to the nearer one.
+    The result is negative between floor and ceiling: minus the distance to the nearer of the two.
 
-    zone: a record of `ZONE`.  up: m above mean sea level.  ground: height of the ground there, NaN if not known; the
-    result is then NaN for a zone with levels above ground.
+    zone: a record of `ZONE`.  up: altitude, m AMSL.  ground: altitude of the ground below, m AMSL; if it is NaN
+    (unknown), the result is NaN for a zone with levels above ground.
     """
     floor: float = zone.floor + ground if zone.floor_above_ground else zone.floor
     ceiling: float = zone.ceiling + ground if zone.ceiling_above_ground else zone.ceiling
@@ -184,12 +185,12 @@ def height_outside_band(zone: Record, up: float, ground: float) -> float:
 def inside_fraction(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the fraction of the segment a-b that is inside the shape of zone z and in a part of the segment.
+    """Return the length of a part of the segment a-b inside the shape of zone z, as a fraction of the segment.
 
-    begin_fraction, end_fraction: the part of the segment, 0 and 1 for all of it.  Exact: entries and exits alternate,
-    so that the sum of the exit fractions minus the sum of the entry fractions, each clipped to the part, is the
-    fraction inside. A segment along an edge is outside if it is to the right of the edge, and inside if it is to the
-    left.
+    begin_fraction, end_fraction: limits of the part; 0 and 1 for the whole segment.
+    Exact: entries and exits alternate, so the fraction inside is the sum of the exit fractions minus the sum of the
+    entry fractions, each clipped to the part.  A segment along an edge is outside if it is to the right of the edge,
+    and inside if it is to the left.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay
@@ -227,7 +228,10 @@ def inside_fraction(
 
 @inlined
 def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float) -> tuple[float, float]:
-    """Return the squared distance from an edge's first corner to the segment, and its fraction of the segment."""
+    """Return the squared distance from an edge's first corner to a segment, and the nearest point as a fraction.
+
+    ax, ay: start of the segment.  dx, dy: its vector.  run2: squared length of the vector, m^2.
+    """
     fraction = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
     fraction = min(1.0, max(0.0, fraction))
     east_offset, north_offset = ax + fraction * dx - edge.east, ay + fraction * dy - edge.north
@@ -236,10 +240,11 @@ def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, 
 
 @inner
 def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
-    """Return the smallest horizontal distance from the segment a-b to the shape of zone z, and its fraction of a-b.
+    """Return the smallest horizontal distance from the segment a-b to the shape of zone z, m, and the nearest point.
 
-    The distance is in m, and 0 if the segment meets the shape, at a fraction inside it or on its outline;
-    `edge_distance` gives the depth.  Exact: two straight pieces that do not cross are nearest at an end of one of them.
+    The nearest point is a fraction of the segment.  If the segment meets the shape, the distance is 0, and the point is
+    inside the shape or on its outline; `edge_distance` gives the depth.  Exact: two straight pieces that do not cross
+    are nearest at an end of one of them.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay

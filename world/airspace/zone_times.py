@@ -148,6 +148,7 @@ def is_active(times: Sequence[str], start: datetime, end: datetime) -> bool:
 
 
 def _may_overlap(period: Period, start: datetime, end: datetime) -> bool:
+    """Return True if a period may include a time from `start` to `end`, both included."""
     start = start if period.start is None else max(start, period.start)
     end = end if period.end is None else min(end, period.end)
     if start > end:

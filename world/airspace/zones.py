@@ -122,6 +122,7 @@ def _do_rings_cross(first: shapely.Polygon, second: shapely.Polygon) -> bool:
 
 
 def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
+    """Return a ring without repeated corners.  Raises ValueError for fewer than three different corners."""
     if not all(math.isfinite(value) for corner in ring for value in corner):
         raise ValueError("a corner is not a number")
     corners = [(float(east), float(north)) for east, north in ring]
@@ -134,7 +135,10 @@ def _clean_ring(ring: Sequence[tuple[float, float]]) -> Ring:
 
 
 def _orient_ring(ring: Ring, depth: int) -> Ring:
-    """Return the ring anticlockwise, or clockwise if it bounds a hole, which an odd number of other rings contain."""
+    """Return a ring with its corners anticlockwise, or clockwise if the ring bounds a hole.
+
+    depth: number of other rings that contain the ring; odd for a hole.
+    """
     anticlockwise = shapely.LinearRing(ring).is_ccw
     return ring if anticlockwise == (depth % 2 == 0) else ring[::-1]
 
@@ -148,7 +152,7 @@ def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
     ValueError: radius 0 m: must be above 0
     """
     if not (math.isfinite(east) and math.isfinite(north)):
-        raise ValueError("its centre is not a number")
+        raise ValueError("a coordinate of its centre is not a number")
     if not 0.0 < radius < math.inf:
         raise ValueError(f"radius {radius:g} m: must be above 0")
     return Cylinder(east, north, radius)
@@ -164,7 +168,7 @@ def is_hole(ring: Ring) -> bool:
 
 
 def band_outline(corners: Sequence[tuple[float, float]], width: float) -> list[tuple[float, float]]:
-    """Return the outline of a band of this width along a line, with half circles at its ends, m.
+    """Return the outline of a band of constant width along a line, with half circles at its ends, m.
 
     Raises ValueError for a line that crosses itself too often.
 

@@ -62,7 +62,7 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
 
 
 def add_corner_count(count: int, shape: Polygon | Cylinder) -> int:
-    """Return a count of corners plus the corners of a shape; raise ValueError above `MAX_MAP_CORNERS`.
+    """Add the number of a shape's corners to a count, and return it; raise ValueError above `MAX_MAP_CORNERS`.
 
     >>> add_corner_count(4, make_polygon([[(0.0, 0.0), (90.0, 0.0), (90.0, 90.0)]]))
     7
@@ -127,7 +127,7 @@ def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigi
 
 
 def _check_rings(table: ZoneTable) -> None:
-    """Raise ValueError for rings in degrees that are not a polygon, without projecting them on the map."""
+    """Raise ValueError if the rings in degrees of a zone are not a valid polygon; they are not projected on the map."""
     rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if rings and rings[0]:
         centre_longitude = rings[0][0][1]
@@ -140,6 +140,7 @@ def _check_rings(table: ZoneTable) -> None:
 
 
 def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
+    """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of the area, or if it is not in degrees."""
     max_distance, corners = MAX_ZONE_DISTANCE, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if table.lat_deg is not None and table.lon_deg is not None:
         max_distance, corners = MAX_ZONE_DISTANCE + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
@@ -154,6 +155,7 @@ def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
 
 
 def _make_shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
+    """Make the shape of a zone on the map.  Raises ValueError if it is invalid."""
     if table.radius_m is not None:
         east, north = table.east_m, table.north_m
         if east is None or north is None:
@@ -187,9 +189,10 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
 
 
 def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
-    """Return the first zone that a position (3,) m violates, or None.
+    """Return the first zone that a position violates, or None if it violates none.
 
-    If the ground height is not known, the position counts as between a floor and ceiling above ground.
+    point: (3,) m.  If the ground height is not known, the position is taken to be between a floor and a ceiling that
+    are heights above ground.
 
     >>> from world.airspace.zones import Cylinder
     >>> mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ceiling=ZoneLevel(300.0, "amsl"))
@@ -202,6 +205,7 @@ def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | 
 def _first_violated_by_records(
     zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None
 ) -> Zone | None:
+    """Return the result of `first_violated_zone` for zones whose records are already made."""
     east, north, up = (float(value) for value in point)
     ground_height = math.nan if ground is None else float(ground.height(east, north))
     for k, zone in enumerate(zones):
@@ -221,7 +225,9 @@ CIRCLE_CORNERS = 72
 
 
 def zone_rings(zone: Zone) -> tuple[Floats, ...]:
-    """Return the rings (k, 2) of a zone, east and north in m, closed; holes run in the opposite direction.
+    """Return the closed rings of a zone for drawing: arrays (k, 2) of east and north, m.
+
+    Holes run in the opposite direction to outlines.
 
     >>> square = zone_rings(Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0)))[0]
     >>> square.shape, square[0].tolist()
@@ -266,9 +272,9 @@ def _ring_area(ring: Floats) -> float:
 
 
 def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
-    """Return the altitudes (n,) of a floor or a ceiling over ground (n,), m AMSL.
+    """Return the altitude of a floor or a ceiling above each point of the ground, m AMSL, (n,).
 
-    default: altitude if the level is None, m AMSL.
+    ground: altitudes of the ground, m AMSL, (n,).  default: altitude if the level is None, m AMSL.
 
     >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]
@@ -279,9 +285,10 @@ def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Fl
 
 
 def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, default_ceiling: float) -> list[Floats]:
-    """Return rings (k, 2, 3) of the walls of a zone: lower and upper end of each corner, m.
+    """Return the walls of a zone, one array (k, 2, 3) per ring: the lower and upper end of each corner's edge, m.
 
-    default_floor, default_ceiling: default floor and ceiling, m AMSL.  A floor below the ground is raised to it.
+    default_floor, default_ceiling: altitudes for an unknown ground and for a zone without a ceiling, m AMSL.
+    A floor below the ground is raised to the ground.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0), ceiling=ZoneLevel(120.0, "amsl"))
     >>> zone_walls(zone, None, 0.0, 900.0)[0][0].tolist()

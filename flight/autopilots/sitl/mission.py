@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flight.mission.ground_ways import GroundPhases
 from flight.mission.items import Command, Frame, Home, MissionItem, is_navigation, round_to_grid
-from flight.mission.itinerary import loiter_of
+from flight.mission.itinerary import stated_loiter
 from flight.mission.route import Route, ends_at_plain_waypoint
 from flight.simulation.setup import FlightSetup
 from world.arrays import Floats
@@ -102,7 +102,7 @@ def _item_with_position(
     earlier: uploaded items before it; a loiter without a position is about the position of the last of them.
     """
     position = route.waypoints[waypoint_indices[-1]]
-    loiter = loiter_of(item)
+    loiter = stated_loiter(item)
     if loiter is None:
         waypoint = _make_waypoint(item.seq, position, float(route.acceptance[waypoint_indices[-1]]), origin)
         if item.command != Command.NAV_WAYPOINT:

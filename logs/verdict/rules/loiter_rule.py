@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flight.mission.itinerary import loiter_of
+from flight.mission.itinerary import stated_loiter
 from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, badness, finding_reason, make_finding, message
 from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
@@ -251,7 +251,7 @@ def _uses_parameter_radius(requirements: RouteRequirements, circle: LoiterCircle
     The mission item then has no radius that the autopilot reads.
     """
     rules, seq = requirements.setup.autopilot.loiters, int(requirements.setup.route.items[circle.first])
-    loiter = next((loiter_of(item) for item in requirements.setup.mission.items if item.seq == seq), None)
+    loiter = next((stated_loiter(item) for item in requirements.setup.mission.items if item.seq == seq), None)
     return rules.exits_on_heading and rules.radius != 0.0 and loiter is not None and rules.radius_of(loiter) == 0.0
 
 

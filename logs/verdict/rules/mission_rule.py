@@ -19,7 +19,7 @@ import numpy as np
 
 from aircraft.catalog import find_logged_aircraft
 from flight.autopilots.parts import FeasibilityLimits, MissionParts
-from flight.mission.commands import SKIPPED_REASON, Treatment, support_of
+from flight.mission.commands import SKIPPED_REASON, Treatment, command_support
 from flight.mission.fences import fence_problem
 from flight.mission.items import (
     FENCES,
@@ -116,7 +116,7 @@ def _arduplane_refusal_findings(setup: FlightSetup) -> list[Finding]:
     refused_items = [
         item
         for item in setup.mission.items
-        if support_of(item.command).arduplane == Treatment.REFUSED != support_of(item.command).px4
+        if command_support(item.command).arduplane == Treatment.REFUSED != command_support(item.command).px4
     ]
     if not refused_items or setup.autopilot.checks.dialect != "ardupilot":
         return []
@@ -329,7 +329,7 @@ def _check_validity(mission: Mission, refuses: bool) -> Iterator[_Remark]:
         because every file of Mission Planner has such commands.
     """
     for item in mission.items:
-        name, support = command_name(item.command), support_of(item.command)
+        name, support = command_name(item.command), command_support(item.command)
         if support.px4 == Treatment.REFUSED:
             arduplane_accepts = support.arduplane != Treatment.REFUSED
             autopilot = "ArduPlane accepts it" if arduplane_accepts else "ArduPlane rejects it, too"

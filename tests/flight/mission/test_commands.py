@@ -2,7 +2,7 @@
 
 import pytest
 
-from flight.mission.commands import Command, Treatment, support_of
+from flight.mission.commands import Command, Treatment, command_support
 
 # What `AP_Mission::mavlink_int_to_mission_cmd` (libraries/AP_Mission/AP_Mission.cpp) stores in ArduPlane; all else is
 # MAV_MISSION_UNSUPPORTED, NAV_SPLINE_WAYPOINT (82) in ArduPlane too.
@@ -40,7 +40,7 @@ def expected(number: int, takes: set[int], flown: set[int], steers: set[int]) ->
 
 @pytest.mark.parametrize("command", [*map(int, Command), 0, 50_000])
 def test_every_command_is_treated_as_the_autopilots_treat_it(command: int) -> None:
-    support = support_of(command)
+    support = command_support(command)
     assert support.arduplane == expected(command, ARDUPLANE_TAKES, ARDUPLANE_FLOWN, ARDUPLANE_STEERS)
     assert support.px4 == expected(command, PX4_TAKES, PX4_FLOWN, PX4_STEERS)
     assert support.reason

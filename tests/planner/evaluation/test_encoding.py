@@ -29,14 +29,14 @@ ROUTE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0], [-100.0, 50.0]])
 def test_along_is_the_length_of_the_route_and_across_is_to_its_left() -> None:
     frames = frames_along(ROUTE)
     np.testing.assert_allclose(frames.edges, [0.0, 100.0, 150.0, 350.0])
-    world = frames.restore([[40.0, 7.0, 1.0], [120.0, 7.0, 2.0], [250.0, 7.0, 3.0]])
+    world = frames.to_world([[40.0, 7.0, 1.0], [120.0, 7.0, 2.0], [250.0, 7.0, 3.0]])
     np.testing.assert_allclose(world, [[40.0, 7.0, 1.0], [93.0, 20.0, 2.0], [0.0, 43.0, 3.0]], atol=1e-9)
 
 
 def test_positions_come_back_from_their_frames() -> None:
     frames = frames_along(ROUTE)
     points = np.random.default_rng(1).uniform(-500.0, 500.0, (5, 3, 3))
-    np.testing.assert_allclose(frames.rotate(frames.restore(points)), points, atol=1e-9)
+    np.testing.assert_allclose(frames.to_frame(frames.to_world(points)), points, atol=1e-9)
 
 
 def test_frames_of_a_straight_route_are_the_rotated_frame() -> None:
@@ -46,9 +46,9 @@ def test_frames_of_a_straight_route_are_the_rotated_frame() -> None:
     points = np.random.default_rng(2).uniform(-500.0, 500.0, (5, 3))
     along = frames_along(np.linspace(start[:2], destination[:2], 6))
     straight = straight_frames(*frame[:4], edges)
-    np.testing.assert_array_equal(straight.restore(points), frame.restore(points))
-    np.testing.assert_array_equal(straight.rotate(points), frame.rotate(points))
-    np.testing.assert_allclose(along.restore(points), frame.restore(points), atol=1e-9)
+    np.testing.assert_array_equal(straight.to_world(points), frame.to_world(points))
+    np.testing.assert_array_equal(straight.to_frame(points), frame.to_frame(points))
+    np.testing.assert_allclose(along.to_world(points), frame.to_world(points), atol=1e-9)
     np.testing.assert_allclose(along.edges, edges)
 
 
@@ -89,11 +89,11 @@ def test_frame_round_trip_and_criteria_survive(start: np.ndarray, end: np.ndarra
     if math.dist(start[:2], end[:2]) < 1.0:
         return
     frame = rotated_frame(start, end)
-    turned = frame.rotate(path)
-    np.testing.assert_allclose(frame.restore(turned), path, atol=1e-7)
+    turned = frame.to_frame(path)
+    np.testing.assert_allclose(frame.to_world(turned), path, atol=1e-7)
     assert path_length(turned) == pytest.approx(float(path_length(path)), abs=1e-6)
-    np.testing.assert_allclose(frame.rotate(start)[:2], 0.0, atol=1e-9)
-    np.testing.assert_allclose(frame.rotate(end)[:2], [math.dist(start[:2], end[:2]), 0.0], atol=1e-7)
+    np.testing.assert_allclose(frame.to_frame(start)[:2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(frame.to_frame(end)[:2], [math.dist(start[:2], end[:2]), 0.0], atol=1e-7)
 
 
 def test_rotation_is_the_papers_matrix() -> None:
@@ -101,12 +101,12 @@ def test_rotation_is_the_papers_matrix() -> None:
     angle = math.atan2(end[1] - start[1], end[0] - start[0])
     matrix = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     point = np.array([3000.0, 7000.0, 120.0])
-    np.testing.assert_allclose(rotated_frame(start, end).rotate(point)[:2], matrix @ (point - start)[:2], atol=1e-9)
+    np.testing.assert_allclose(rotated_frame(start, end).to_frame(point)[:2], matrix @ (point - start)[:2], atol=1e-9)
 
 
 def test_turns_and_slopes_survive_rotation() -> None:
     path = np.random.default_rng(3).uniform(0, 5000, (9, 3))
-    turned = rotated_frame(path[0], path[-1]).rotate(path)
+    turned = rotated_frame(path[0], path[-1]).to_frame(path)
     np.testing.assert_allclose(turning_angles(turned), turning_angles(path), atol=1e-9)
     np.testing.assert_allclose(leg_slopes(turned), leg_slopes(path), atol=1e-9)
 
@@ -127,7 +127,7 @@ def test_decoded_paths_keep_their_ends(name: str, count: int) -> None:
 def test_rotated_waypoints_lie_each_in_its_interval() -> None:
     encoding = rotated(space(), 7)
     vectors = np.random.default_rng(2).uniform(encoding.lower, encoding.upper, (200, 15))
-    along = rotated_frame(space().start, space().destination).rotate(encoding.decode(vectors))[:, 1:-1, 0]
+    along = rotated_frame(space().start, space().destination).to_frame(encoding.decode(vectors))[:, 1:-1, 0]
     interval = np.floor(along / 2000.0 - 1e-12)
     np.testing.assert_array_equal(interval, np.tile(np.arange(5), (200, 1)))
     np.testing.assert_allclose(rotated_vectors(space(), encoding, encoding.decode(vectors)), vectors, atol=1e-6)
@@ -140,7 +140,7 @@ def test_box_across_covers_the_map_and_no_more() -> None:
         for i in range(2):
             # Some place at the box's edge within the interval is on the map's edge.
             along = np.linspace(5000.0 * i, 5000.0 * (i + 1), 9)
-            edge = frame.restore(np.column_stack([along, np.full(9, side[3 * i + 1]), np.zeros(9)]))
+            edge = frame.to_world(np.column_stack([along, np.full(9, side[3 * i + 1]), np.zeros(9)]))
             inside = (np.abs(edge[:, 0] - 4000.0) <= 5000.0 + 1e-6) & (np.abs(edge[:, 1] - 2500.0) <= 4500.0 + 1e-6)
             assert inside.any()
     narrow = rotated(space(1500.0), 4)

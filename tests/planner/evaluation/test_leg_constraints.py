@@ -14,7 +14,7 @@ from planner.evaluation.leg_constraints import (
     PATHS_PER_BLOCK,
     clear_sums,
     copy_point,
-    divide_legs,
+    interpolate_legs,
     load_waypoints,
     subtract_points,
 )
@@ -70,7 +70,7 @@ def test_a_step_leads_from_begin_to_end(block: Any) -> None:
 @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
 def test_a_leg_is_divided_by_its_share(block: Any, share: float) -> None:
     wanted, kept = columns(block.begin) + share * columns(block.step), columns(block.point)
-    divide_legs(block.begin, block.step, share, SIZE, block.point)
+    interpolate_legs(block.begin, block.step, share, SIZE, block.point)
     np.testing.assert_allclose(columns(block.point)[:, :SIZE], wanted[:, :SIZE])
     np.testing.assert_array_equal(columns(block.point)[:, SIZE:], kept[:, SIZE:])
 

@@ -12,7 +12,7 @@ from aircraft.path_limits import Limits
 from planfly.workflow.airframe import load_airframe
 from planner.evaluation.problem import ProblemArrays, make_problem
 from planner.search.explain_failure import explain_failure
-from planner.search.infeasibility_proof import closing_missiles, highest_level_flight, is_closed
+from planner.search.infeasibility_proof import blocking_missiles, highest_level_flight, is_closed
 from planner.search.plan_path import plan_path
 from tests.fresh_plans import fresh_scenario
 from world.scenario import Scenario
@@ -44,17 +44,17 @@ def test_a_wall_is_closed_and_its_units_are_named(small: Small, make_limits: Mak
     beside = [unit("south", 1000.0, -2000.0), unit("north", 5000.0, 2000.0)]
     data = arrays(small, make_limits, [beside[0], *wall(), beside[1]])
     assert is_closed(data)
-    assert closing_missiles(data) == list(range(1, 12))
+    assert blocking_missiles(data) == list(range(1, 12))
     # Two walls: either suffices.
     second = [unit(f"v{k}", 4500.0, 600.0 * (k - 5)) for k in range(11)]
-    assert closing_missiles(arrays(small, make_limits, wall() + second)) in (list(range(11)), list(range(11, 22)))
+    assert blocking_missiles(arrays(small, make_limits, wall() + second)) in (list(range(11)), list(range(11, 22)))
 
 
 @pytest.mark.parametrize("missing", [0, 5, 10])
 def test_a_wall_without_one_unit_is_open(missing: int, small: Small, make_limits: MakeLimits) -> None:
     data = arrays(small, make_limits, wall(missing))
     assert not is_closed(data)
-    assert closing_missiles(data) is None
+    assert blocking_missiles(data) is None
 
 
 @pytest.mark.parametrize(("gap", "closed"), [(-60.0, True), (5.0, False)])
@@ -80,7 +80,7 @@ def test_missiles_are_passed_below(small: Small, make_limits: MakeLimits) -> Non
 def test_the_ground_alone_closes(small: Small, make_limits: MakeLimits) -> None:
     hills = [{"east_m": 3000, "north_m": 300 * k, "height_m": 400, "sigma_m": 300} for k in range(-12, 13)]
     ground = {"terrain": {"kind": "peaks", "peak": hills}}
-    assert closing_missiles(arrays(small, make_limits, wall(5), **ground)) == []
+    assert blocking_missiles(arrays(small, make_limits, wall(5), **ground)) == []
 
 
 def test_the_search_ends_at_a_wall_and_says_what_closes_it(

@@ -178,7 +178,7 @@ class Work:
             (pattern_search, "_continue_search"),
             (shortening, "continue_shortening"),
             (waypoint_chains, "_advance"),
-            (waypoint_fitting, "_choose"),
+            (waypoint_fitting, "_choose_candidates"),
         ):
             self._count(monkeypatch, module, kernel)
 
@@ -206,7 +206,7 @@ def test_no_two_slices_of_work_are_done_without_a_question(number: int, monkeypa
     plan_path(scenario, load_airframe(scenario).limits.with_margin(), seed=number + 1, stop=work.ask)
     assert work.most["continue_airspace_route"] == 1
     # Fitting and its rounds, which together are a few milliseconds.
-    assert work.most.pop("_choose") <= 5
+    assert work.most.pop("_choose_candidates") <= 5
     assert work.most["_continue_search"] == 1
     assert set(work.most.values()) == {1}, work.most
 

@@ -239,7 +239,7 @@ def test_traps_are_left_by_short_ways_that_no_straight_frame_holds(
     courses = np.unwrap(leg_courses(plan.waypoints))
     assert (np.abs(courses - courses[0]).max() > 1.25 * np.pi) == (name == "trap-spiral")
     frame = rotated_frame(scenario.start, scenario.destination)
-    assert np.diff(frame.rotate(plan.waypoints)[:, 0]).min() < -100.0
+    assert np.diff(frame.to_frame(plan.waypoints)[:, 0]).min() < -100.0
     shortest, share = TRAPS[name]
     assert leg_runs(plan.waypoints).sum() < share * shortest
 

@@ -25,7 +25,7 @@ from planner.seeding.grids import (
     grid_route,
     make_grid,
     position_of,
-    relax,
+    relax_cells,
     set_cell_costs,
     trace_back,
 )
@@ -63,7 +63,7 @@ def test_places_in_the_rotated_frame_come_back_to_the_map() -> None:
     assert position_of(frame, 10.0, 0.0) == pytest.approx((100.0 - 10.0 * h, 200.0 + 10.0 * h))
     assert position_of(frame, 0.0, 10.0) == pytest.approx((100.0 - 10.0 * h, 200.0 - 10.0 * h))
     east, north = position_of(frame, 300.0, -70.0)
-    assert frame.rotate(np.array([[east, north, 5.0]]))[0] == pytest.approx([300.0, -70.0, 5.0])
+    assert frame.to_frame(np.array([[east, north, 5.0]]))[0] == pytest.approx([300.0, -70.0, 5.0])
 
 
 @pytest.mark.parametrize("step", [COARSE_STEP_M, COARSE_STEP_M + 1.0])
@@ -208,15 +208,15 @@ def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
 def test_a_move_is_taken_only_where_it_is_cheaper() -> None:
     cost, price = np.array([10.0, 10.0, math.inf, 10.0]), np.array([1.0, 2.0, 1.0, math.inf])
     after, parents = np.array([15.1, 19.9, 30.0, math.inf]), np.full(4, -1, dtype=np.int32)
-    relax(cost, price, after, parents, 0, 0, 0, 4, 5.0)
+    relax_cells(cost, price, after, parents, 0, 0, 0, 4, 5.0)
     assert after.tolist() == [15.0, 19.9, 30.0, math.inf]
     assert parents.tolist() == [0, -1, -1, -1]
     # From cells one place to the left.
-    relax(cost, price, after, parents, 0, 1, 1, 1, 4.0)
+    relax_cells(cost, price, after, parents, 0, 1, 1, 1, 4.0)
     assert after[1] == 18.0
     assert parents[1] == 0
     # Back from the second cell to the third, at the second's price.
-    relax(cost, price, after, parents, 1, 2, 1, 1, 4.0)
+    relax_cells(cost, price, after, parents, 1, 2, 1, 1, 4.0)
     assert after[2] == 18.0
     assert parents[2] == 1
 
@@ -249,7 +249,7 @@ def way_cost(problem: Problem, points: Floats, floor: float) -> float:
     """Cost of a way (s, 3) along, across, up: lengths times what each cell entered costs per m; inf if it is closed."""
     data = problem.search
     frame = rotated_frame(data.start, data.destination)
-    places = frame.rotate(problem.scenario.threats.position)
+    places = frame.to_frame(problem.scenario.threats.position)
     step = points[1, 0] - points[0, 0]
     most = math.tan(math.radians(20.0) - data.angle_margin)
     total = 0.0

@@ -11,7 +11,7 @@ import numpy as np
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.mission.items import Mission
-from flight.mission.itinerary import loiter_of
+from flight.mission.itinerary import stated_loiter
 from flight.mission_files.formats import parse_mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, fly_to_end
@@ -107,7 +107,7 @@ def places(flight: str) -> Floats:
 def middles(flight: str) -> list[Floats]:
     """The middles of a mission's circles, (2,) each."""
     mission = parse_mission(_text(flight), flight)
-    return [place for place, item in zip(places(flight), mission.items, strict=True) if loiter_of(item) is not None]
+    return [place for place, item in zip(places(flight), mission.items, strict=True) if stated_loiter(item) is not None]
 
 
 @functools.cache
