@@ -170,17 +170,17 @@ VIRTUAL = {
     "entities": (b'<!DOCTYPE a [<!ENTITY b "c">]><VRTDataset/>', "a document type is declared"),
     "a warped one": (
         b'<VRTDataset subClass="VRTWarpedDataset"><SourceFilename>a.tif</SourceFilename></VRTDataset>',
-        "VRTWarpedDataset computes its pixels",
+        "VRTWarpedDataset computes pixels",
     ),
     "a scaled one": (
         b"<VRTDataset><ComplexSource><SourceFilename>a.tif</SourceFilename><ScaleRatio>2</ScaleRatio></ComplexSource>"
         b"</VRTDataset>",
-        "ScaleRatio computes its pixels",
+        "ScaleRatio computes pixels",
     ),
     "a function": (
         b"<VRTDataset><VRTRasterBand subClass='VRTDerivedRasterBand'><SourceFilename>a.tif</SourceFilename>"
         b"</VRTRasterBand></VRTDataset>",
-        "VRTDerivedRasterBand computes its pixels",
+        "VRTDerivedRasterBand computes pixels",
     ),
     "a URL": (b"<VRTDataset><SourceFilename>http://x/a.tif</SourceFilename></VRTDataset>", "only local .tif"),
     "a virtual path": (b"<VRTDataset><SourceFilename>/vsizip/a.tif</SourceFilename></VRTDataset>", "only local .tif"),
