@@ -216,7 +216,7 @@ def _check_paths(path: object) -> object:
 class TerrainTable(ScenarioTable):
     """[terrain].  Planfly sets kind "none" for a mission without terrain; a file cannot state it.
 
-    path: an elevation file, a folder or .vrt of tiles, an embedded name, or a list of these on one grid.
+    path: an elevation file, a folder or .vrt of tiles, the name of a built-in terrain, or a list of these on one grid.
     vertical_error_m: error of the heights as their source states it; None if not stated (elevation files do not
     contain it).
     height_datum: datum of the file's heights, or the height of mean sea level in the file, m; None for the datum that
@@ -410,7 +410,7 @@ class PlannerTable(ScenarioTable):
 
 
 def names_folder(aircraft: str) -> bool:
-    """Return True if an aircraft's name is a folder (it has a slash), not an embedded aircraft.
+    """Return True if an aircraft's name is a folder (it has a slash), not a built-in aircraft.
 
     >>> names_folder("aerosonde"), names_folder("models/mine")
     (False, True)
@@ -454,7 +454,7 @@ class FlightTable(ScenarioTable):
     nav: navigation accuracy, see `flight.guidance.navigation_error`.
     """
 
-    aircraft: FilePath = "aerosonde"  # an embedded name, or a folder if it has a slash
+    aircraft: FilePath = "aerosonde"  # the name of a built-in aircraft, or a folder if it has a slash
     aircraft_by_default: Literal[True] | None = None  # set if no aircraft was named for a mission
     airspeed_mps: Annotated[float, in_range(15.0, 60.0)] | None = None
     max_bank_deg: Annotated[float, in_range(5.0, 60.0)] = 30.0

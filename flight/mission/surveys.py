@@ -39,11 +39,11 @@ _MAX_TURN_AROUND_RUNS = 12
 _MAX_TURN_AROUND_RATIO = 2.0
 # Length up to which any turn-around is accepted, m: lines at the tip of a field are short.
 _SHORT_TURN_AROUND_M = 250.0
-# A parallel run is no line if a later run is nearer than this ratio of its distance,
+# A parallel run is not a line if a later run is nearer than this fraction of the distance to the parallel run,
 _NEARER_LINE_RATIO = 0.5
-# and if it is shorter than this ratio of that later run.
+# and the parallel run is shorter than this fraction of the later run.
 _STUB_LENGTH_RATIO = 0.2
-# Ratio of lengths below which a line between two lines of another survey is a turn-around of that survey.
+# A line between two lines of another survey is a turn-around of that survey if shorter than this fraction of both.
 _TURN_AROUND_LENGTH_RATIO = 0.5
 # Maximum ratio between the spacings, and between the lengths, of successive run pairs of lines that bend.
 _SPACING_RATIO_LIMIT = 2.0
@@ -53,9 +53,9 @@ _MIN_LEGS_WITH_LEADS = 3
 _LEAD_LENGTH_TOLERANCE_M = 1.0
 # Minimum number of lines with different lateral positions in a survey: a flight there and back is no survey.
 _MIN_LINES = 3
-# The same number for lines with the camera on.
+# The same minimum, if the camera is on along the lines.
 _MIN_LINES_WITH_PHOTOS = 2
-# Fraction of both neighboring gaps below which a gap is none, but one line flown twice.
+# A gap that is smaller than this fraction of both neighboring gaps separates two flights along one line.
 _DUPLICATE_LINE_FRACTION = 0.2
 # Tolerance for equal distances between photos, m: ground stations write this distance in single precision.
 _PHOTO_SPACING_TOLERANCE_M = 0.01
@@ -64,9 +64,10 @@ _PHOTO_SPACING_TOLERANCE_M = 0.01
 class PhotoLine(NamedTuple):
     """A line along which photos are taken.
 
-    first, last: index of the first and last waypoint; the legs of the line are first to last - 1.
-    begins, ends: index of the first and last waypoint of the line's run, which may extend beyond the line.
-    photo: distance between photos, m; 0 if no item states it.
+    first, last: index of the line's first and last waypoint; the legs of the line are first to last - 1.
+    begins, ends: index of the first and last waypoint of the straight run that contains the line; leads may make it
+        longer than the line.
+    photo: distance between photos, m; 0 if no item states a distance.
     camera_on_at, camera_off_at: index of the waypoint of the run that switches the camera on, and of the waypoint that
         switches it off; -1 if none does.
     """
@@ -106,80 +107,89 @@ class Survey:
         return self.lines[-1].last
 
     def line(self, number: int) -> PhotoLine:
-        """Return a line by its number in flying order."""
+        """Return a line by its number in flying order, from 0; negative numbers count from the last line."""
         return self.lines[number]
 
     def has_leg(self, leg: int) -> bool:
         """Return True if a leg belongs to the survey.
 
-        The entry to the first line and the exit of the last line are included.
+        The leg to the first line's run and the leg after the last line's run belong to it, too.
         """
         return self.lines[0].begins - 1 <= leg <= self.lines[-1].ends
 
     def takes_photos(self) -> bool:
-        """Return True if items of the mission switch the camera on the survey's lines."""
+        """Return True if the mission's items switch the camera on or off on at least one line."""
         return any(line.camera_on_at >= 0 or line.camera_off_at >= 0 or line.photo > 0.0 for line in self.lines)
 
     def turn_arounds(self) -> list[tuple[int, int]]:
-        """Return the first and last waypoint of each turn-around."""
+        """Return the index of the first and last waypoint of each turn-around between two lines."""
         return [(line.last, following.first) for line, following in zip(self.lines[:-1], self.lines[1:], strict=True)]
 
     def transitions(self) -> list[tuple[int, int]]:
-        """Return the turn-arounds, the entry to the first line and the exit of the last line.
+        """Return the index of the first and last waypoint of the entry, of each turn-around and of the exit.
 
-        Each is a pair of waypoints between which the autopilot chooses the path.
+        The entry leads to the first line, and the exit leads away from the last line. Between the two waypoints of a
+        pair the autopilot chooses the path.
         """
         first_line, last_line = self.lines[0], self.lines[-1]
         return [(first_line.begins, first_line.first), *self.turn_arounds(), (last_line.last, last_line.ends)]
 
 
 class LineAxis:
-    """Along-track and cross-track coordinates of a line that is extended straight beyond both ends."""
+    """Along-track and cross-track coordinates relative to a line that continues straight beyond both ends.
+
+    along: (k,) m, distance of each corner along the line from the first corner.
+    length: length of the line, m.
+    """
 
     def __init__(self, corners: Floats) -> None:
-        """Set up the axis of a line through corners (k, 2 or 3) m, k at least 2."""
+        """Set up the axis of the line through corners (k, 2 or 3) m; k is at least 2."""
         self.corners = corners
-        step = np.diff(corners[:, :2], axis=0)
-        self._lengths = np.hypot(*step.T)
-        self._units = step / np.maximum(self._lengths, 1e-9)[:, None]
+        leg_vectors = np.diff(corners[:, :2], axis=0)
+        self._lengths = np.hypot(*leg_vectors.T)
+        self._directions = leg_vectors / np.maximum(self._lengths, 1e-9)[:, None]
         self.along = np.concatenate([[0.0], np.cumsum(self._lengths)])
         self.length = float(self.along[-1])
 
-    def of(self, points: Floats) -> tuple[Floats, Floats, Floats]:
-        """Project points (n, 2 or 3) on the line.
+    def project(self, points: Floats) -> tuple[Floats, Floats, Floats]:
+        """Project points (n, 2 or 3) m on the nearest leg of the line.
 
-        Return the points' distances along the line and to its right, m, and the line's course next to them, rad.
+        Return three arrays (n,): the points' distances along the line, m, their distances to the right of the line, m,
+        and the course of the nearest leg, rad.
         """
         min_distance = np.full(len(points), np.inf)
         coordinates = np.zeros((3, len(points)))
-        for index, (direction, length) in enumerate(zip(self._units, self._lengths, strict=True)):
-            along, across = _along_and_right(
+        for index, (direction, length) in enumerate(zip(self._directions, self._lengths, strict=True)):
+            along, right = _along_and_right(
                 points[:, :2] - self.corners[index, :2], math.atan2(direction[0], direction[1])
             )
             min_along = -math.inf if index == 0 else 0.0
             max_along = math.inf if index == len(self._lengths) - 1 else length
-            distance = np.hypot(along - np.clip(along, min_along, max_along), across)
+            distance = np.hypot(along - np.clip(along, min_along, max_along), right)
             is_nearer = distance < min_distance
             min_distance[is_nearer] = distance[is_nearer]
             coordinates[0, is_nearer], coordinates[1, is_nearer] = (
                 self.along[index] + along[is_nearer],
-                across[is_nearer],
+                right[is_nearer],
             )
             coordinates[2, is_nearer] = math.atan2(direction[0], direction[1])
         return coordinates[0], coordinates[1], coordinates[2]
 
-    def at(self, along: Floats) -> Floats:
-        """Return the points (n, 2 or 3) m on the line at distances along it, m."""
+    def points_at(self, along: Floats) -> Floats:
+        """Return the points on the line at distances (n,) m along it: (n, 2 or 3) m, as many columns as the corners.
+
+        A distance beyond an end of the line gives that end.
+        """
         columns = [np.interp(along, self.along, self.corners[:, axis]) for axis in range(self.corners.shape[1])]
         return np.stack(columns, axis=1)
 
 
 def camera_spacing(mission: Mission, route: Route) -> Floats:
-    """Return the distance between photos on the leg that begins at each waypoint, (w,) m.
+    """Return the distance between photos on the leg that begins at each of the route's w waypoints, m: (w,).
 
-    The distance is 0 with the camera off, and NaN if the camera is on without a stated distance. Items after a
+    The distance is 0 with the camera off, and NaN if the camera is on and no item states the distance. Items after a
     waypoint's item switch the camera as soon as the waypoint is reached. If several items lead to a waypoint by jumps,
-    the legs to it are assigned to the waypoint's own item.
+    the legs to the waypoint are assigned to the waypoint's own item.
     """
     route_items = set(route.items.tolist())
     spacing_after, spacing, waypoint_seq = dict[int, float](), 0.0, None
@@ -203,10 +213,10 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
 
 
 def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
-    """Return the survey settings that the mission's author stored for a survey, or None.
+    """Return the settings that the ground station stored in the mission for a survey, or None.
 
-    They are identified by the distance between photos. If no stored survey, or more than one, has that distance, the
-    settings for any survey are returned.
+    The settings with the survey's distance between photos are returned. If no settings, or several different ones, have
+    this distance, the first settings without a distance are returned; None if there are none.
     """
     photo_spacing = survey.lines[0].photo
     matching_plans = {
@@ -222,8 +232,9 @@ def survey_plan(mission: Mission, survey: Survey) -> SurveyPlan | None:
 def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[float, float]] = ()) -> tuple[Survey, ...]:
     """Find the surveys of a route, in flying order.
 
-    camera: (w,) from `camera_spacing`.
-    turn_arounds: pairs of a ground station: distance between photos, m, and length of a line beyond its photos, m.
+    camera: distance between photos on each leg, (w,) m, from `camera_spacing`.
+    turn_arounds: a pair of distances for each survey of the ground station: between photos, m, and from a line's first
+        or last photo to the end of its run, m.
 
     >>> lines = [[0, 0], [0, 900], [60, 900], [60, 0], [120, 0], [120, 900]]
     >>> points = np.array([[*place, 100.0] for place in lines], dtype=float)
@@ -250,9 +261,9 @@ def find_surveys(route: Route, camera: Floats, turn_arounds: Sequence[tuple[floa
 
 
 def _straight_runs(route: Route) -> list[tuple[int, int]]:
-    """Return the first and last waypoint of each straight run.
+    """Return the index of the first and last waypoint of each straight run.
 
-    Corners of a loiter, take-off, landing and return to launch are not runs.
+    The legs of a take-off, a landing, a loiter's circle and a return to launch are left out.
     """
     courses, arcs, end = leg_courses(route.waypoints), route.arcs, len(route.waypoints) - 1
     last = route.rtl_start if route.rtl_start >= 0 else end
@@ -280,17 +291,17 @@ _Line = tuple[int, int]
 class _Runs:
     """Straight runs of a route in flying order, addressed by index.
 
-    Results for pairs of runs are cached, because each pair is looked up from every possible start of a survey, and a
-    mission whose items are flown a hundred times has as many starts.
+    Results for pairs of runs are cached, because each pair is looked up from every possible start of a survey. A
+    mission that repeats its items a hundred times has a hundred times as many starts.
     """
 
     def __init__(self, points: Floats, runs: Sequence[tuple[int, int]]) -> None:
-        """Set up for points (w, 3) m, and runs given by their first and last waypoints."""
+        """Store waypoints (w, 3) m, and runs as pairs of the index of their first and last waypoint."""
         self.points, self.runs = points, runs
         self._distances = np.concatenate([[0.0], np.cumsum(leg_runs(points))]).tolist()
-        # East and north of each waypoint, and course and length of each run, as plain numbers: arrays of two take
-        # ten times as long.
-        self._places: list[list[float]] = points[:, :2].tolist()
+        # Positions, directions and lengths are plain numbers: computing with arrays of two elements takes ten times as
+        # long.
+        self._positions: list[list[float]] = points[:, :2].tolist()
         steps = np.array([points[last, :2] - points[first, :2] for first, last in runs]).reshape(-1, 2)
         self._directions = [(math.sin(course), math.cos(course)) for course in itertools.starmap(math.atan2, steps)]
         self.run_lengths: list[float] = np.hypot(*steps.T).tolist()
@@ -299,7 +310,7 @@ class _Runs:
         self._midpoints = dict[_Line, Floats]()
 
     def ends(self, line: _Line) -> tuple[int, int]:
-        """Return the first and last waypoint of a line."""
+        """Return the index of the first and last waypoint of a line."""
         return self.runs[line[0]][0], self.runs[line[1]][1]
 
     def length(self, line: _Line) -> float:
@@ -308,11 +319,11 @@ class _Runs:
         return float(self._distances[last] - self._distances[first])
 
     def midpoint(self, line: _Line) -> Floats:
-        """Return the midpoint of a line, (2 or 3,) m."""
+        """Return the midpoint of the path along a line, (3,) m."""
         if line not in self._midpoints:
             first, last = self.ends(line)
             axis = LineAxis(self.points[first : last + 1])
-            self._midpoints[line] = axis.at(np.array([0.5 * axis.length]))[0]
+            self._midpoints[line] = axis.points_at(np.array([0.5 * axis.length]))[0]
         return self._midpoints[line]
 
     def starts_at_previous_end(self, run: int) -> bool:
@@ -320,12 +331,16 @@ class _Runs:
         return self.runs[run - 1][1] == self.runs[run][0]
 
     def spacing(self, run: int, other_run: int) -> float | None:
-        """Return the distance between two runs, m, or None if they are not parallel neighbors."""
+        """Return the distance between two runs, m, or None if they cannot be neighboring lines.
+
+        Neighboring lines are parallel, overlap, and are far enough apart.
+        """
         if (run, other_run) not in self._spacings:
             self._spacings[run, other_run] = self._compute_spacing(run, other_run)
         return self._spacings[run, other_run]
 
     def _compute_spacing(self, run: int, other_run: int) -> float | None:
+        """Return the distance between two runs as `spacing` does, without the cache."""
         length, other_length = self.run_lengths[run], self.run_lengths[other_run]
         min_length = min(length, other_length)
         if min_length < _MIN_LINE_LENGTH_M:
@@ -345,7 +360,7 @@ class _Runs:
 
     def _along_and_right_of(self, run: int, waypoint: int) -> tuple[float, float]:
         """Return a waypoint's distance along a run and to the right of it, m."""
-        (start_east, start_north), (east, north) = self._places[self.runs[run][0]], self._places[waypoint]
+        (start_east, start_north), (east, north) = self._positions[self.runs[run][0]], self._positions[waypoint]
         course_east, course_north = self._directions[run]
         east, north = east - start_east, north - start_north
         return east * course_east + north * course_north, east * course_north - north * course_east
@@ -357,6 +372,7 @@ class _Runs:
         return self._next_lines[run]
 
     def _find_next_lines(self, run: int) -> list[int]:
+        """Return the runs for `next_lines` without the cache."""
         candidates, own_length = list[tuple[int, float, float]](), self.length((run, run))
         for next_run in range(run + 1, min(len(self.runs), run + 2 + _MAX_TURN_AROUND_RUNS)):
             link_length = self._distances[self.runs[next_run][0]] - self._distances[self.runs[run][1]]
@@ -367,7 +383,7 @@ class _Runs:
             ):
                 continue
             candidates.append((next_run, spacing, length))
-        # A leg of a turn-around may be parallel to lines too, but it is far from them, and short.
+        # A leg of a turn-around may be parallel to the lines, too, but it is short and farther away than the next line.
         return [
             next_run
             for next_run, spacing, length in candidates
@@ -381,18 +397,18 @@ class _Runs:
 
 
 def _find_chain(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of a survey that starts at a run, or slightly before or after it."""
+    """Return the lines of the survey that starts at a run, or a few runs before or after that run."""
     chain = _follow_lines(runs, start)
     if len(chain) > 1:
         # The entry to the first line may be parallel to the second line.
-        chains = (_follow_lines(runs, other) for other in range(start, chain[1][0]))
+        chains = (_follow_lines(runs, first_run) for first_run in range(start, chain[1][0]))
         chain = max(chains, key=lambda lines: (len(lines), sum(map(runs.length, lines))))
     while len(chain) > _MIN_LINES_WITH_PHOTOS:
         # The last line may be a turn-around of the next survey, whose lines are perpendicular.
         (_, previous_run), last_line = chain[-2:]
         if not any(
-            _is_turn_around(_follow_lines(runs, other), last_line, runs)
-            for other in range(previous_run + 1, last_line[0])
+            _is_turn_around(_follow_lines(runs, first_run), last_line, runs)
+            for first_run in range(previous_run + 1, last_line[0])
         ):
             break
         chain.pop()
@@ -400,7 +416,7 @@ def _find_chain(runs: _Runs, start: int) -> list[_Line]:
 
 
 def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
-    """Return True if a line is only a turn-around between two longer lines of a survey."""
+    """Return True if a line is only a turn-around between two longer lines of another survey's chain."""
     enclosing_pairs = [pair for pair in pairwise(chain) if pair[0][1] < line[0] and line[1] < pair[1][0]]
     length = runs.length(line)
     return len(chain) >= _MIN_LINES and any(
@@ -409,7 +425,10 @@ def _is_turn_around(chain: Sequence[_Line], line: _Line, runs: _Runs) -> bool:
 
 
 def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
-    """Return the lines of a chain from a run on; the first line may start before that run."""
+    """Return the successive parallel lines from a start run on; the first line may begin before the start run.
+
+    Only the first line is returned if no run after it can be the next line.
+    """
     chain = [(start, start)]
     while True:
         first_run, last_run = chain[-1]
@@ -430,7 +449,10 @@ def _follow_lines(runs: _Runs, start: int) -> list[_Line]:
 
 
 def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool:
-    """Return True if two lines are still parallel ``bend_count`` runs before and after their turn-around."""
+    """Return True if two lines are still parallel ``bend_count`` runs before and after the turn-around between them.
+
+    run, next_run: last run of the first line, and first run of the second line.
+    """
     run_before, run_after = run - bend_count, next_run + bend_count
     if (
         run_before < 0
@@ -439,7 +461,7 @@ def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool
     ):
         return False
     spacing, bent_spacing = runs.spacing(run, next_run), runs.spacing(run_before, run_after)
-    lengths = [runs.run_lengths[k] for k in (run_before, run_after)]
+    lengths = [runs.run_lengths[run_before], runs.run_lengths[run_after]]
     return (
         spacing is not None
         and bent_spacing is not None
@@ -455,27 +477,28 @@ def _are_parallel(runs: _Runs, run: int, next_run: int, bend_count: int) -> bool
 def _make_survey(
     runs: _Runs, chain: Sequence[_Line], camera: Floats, turn_arounds: Sequence[tuple[float, float]]
 ) -> Survey | None:
-    """Build a survey from lines, or return None if they have too few different lateral positions."""
+    """Build a survey from a chain of lines, or return None if the lines have too few different lateral positions."""
     points, (run_start, run_end) = runs.points, runs.ends(chain[0])
-    offsets = LineAxis(points[run_start : run_end + 1]).of(np.array([runs.midpoint(line) for line in chain]))[1]
+    midpoints = np.array([runs.midpoint(line) for line in chain])
+    _, offsets, _ = LineAxis(points[run_start : run_end + 1]).project(midpoints)
     gaps = _line_gaps(np.sort(offsets))
     if len(gaps) + 1 < (_MIN_LINES_WITH_PHOTOS if camera.any() else _MIN_LINES):
         return None
-    lines = tuple(_camera_part(runs.ends(line), camera) for line in chain)
+    lines = tuple(_make_photo_line(runs.ends(line), camera) for line in chain)
     if len(gaps) + 1 < _MIN_LINES and not all(line.photo > 0.0 for line in lines):
         return None
     # A camera that is off between lines shows where they start.
     has_photos = any((camera[line.first : line.last] != 0.0).any() for line in lines)
     line_pairs = pairwise(lines)
     if not has_photos or all((camera[line.last : following.first] != 0.0).all() for line, following in line_pairs):
-        lines = _without_leads(points, lines, turn_arounds)
+        lines = _remove_leads(points, lines, turn_arounds)
     first_leg = points[run_start + 1, :2] - points[run_start, :2]
     course = math.atan2(*first_leg)
     return Survey(lines, course, tuple((offsets - offsets[0]).tolist()), float(np.median(gaps)))
 
 
 def _line_gaps(positions: Floats) -> list[float]:
-    """Return the gaps (m) between lines at sorted positions (n,) m, ignoring lines flown twice."""
+    """Return the gaps between lines at sorted lateral positions (n,) m, m; a line flown twice counts once."""
     gaps = [float(gap) for gap in np.diff(positions) if gap >= _MIN_LINE_SPACING_M]
     neighbors = [[gaps[k] for k in (i - 1, i + 1) if 0 <= k < len(gaps)] for i in range(len(gaps))]
     return [
@@ -485,8 +508,8 @@ def _line_gaps(positions: Floats) -> list[float]:
     ]
 
 
-def _camera_part(run: tuple[int, int], camera: Floats) -> PhotoLine:
-    """Return the part of a run with the camera on, or the whole run if the camera is never on."""
+def _make_photo_line(run: tuple[int, int], camera: Floats) -> PhotoLine:
+    """Return the part of a run with the camera on as a photo line, or the whole run if the camera is never on."""
     first_waypoint, last_waypoint = run
     photo_legs = np.flatnonzero(camera[first_waypoint:last_waypoint] != 0.0)
     if not photo_legs.size:
@@ -503,18 +526,19 @@ def _camera_part(run: tuple[int, int], camera: Floats) -> PhotoLine:
     )
 
 
-def _without_leads(
+def _remove_leads(
     points: Floats, lines: tuple[PhotoLine, ...], turn_arounds: Sequence[tuple[float, float]]
 ) -> tuple[PhotoLine, ...]:
-    """Return the lines without their lead-in and lead-out legs, where the camera does not separate them.
+    """Return the lines without their lead-in and lead-out legs, or unchanged if no leads are found.
 
-    Leads have the length that the ground station states. If it states none, end legs are leads if they are equally long
-    on all lines, because all turn-arounds of a survey have one length.
+    A lead is a leg before a line's first photo or after its last photo. Leads have the length that the ground station
+    stores. If it stores none, the first and last legs are leads if they are equally long on all lines, because all
+    turn-arounds of a survey have one length.
     """
     for photo_spacing, lead in turn_arounds:
         if abs(photo_spacing - lines[0].photo) <= _PHOTO_SPACING_TOLERANCE_M and lead > 0.0:
-            shortened = tuple(_without_lead(points, line, lead) for line in lines)
-            # The mission may have been changed since the ground station wrote that length.
+            shortened = tuple(_remove_lead(points, line, lead) for line in lines)
+            # If no line changes, the mission was edited after the ground station stored the length.
             if shortened != lines:
                 return shortened
     lengths = leg_runs(points)
@@ -529,9 +553,8 @@ def _without_leads(
     leads = [lengths[line.first] for line in lines[1:]] + [lengths[line.last - 1] for line in lines[:-1]]
     if float(np.ptp(leads)) > _LEAD_LENGTH_TOLERANCE_M:
         return lines
-    # The entry to the first line and the exit of the last may be longer than the other leads, so find a lead as long as
-    # the others there; or use the camera, which goes on at the first line's photos and off after the last line's
-    # photos.
+    # The entry to the first line and the exit of the last line may be longer than the other leads. If the camera is
+    # switched there, the line already ends there. If not, find a leg there with the length of the other leads.
     is_lead = np.abs(lengths - np.median(leads)) <= _LEAD_LENGTH_TOLERANCE_M
     candidate_starts = np.flatnonzero(is_lead[first_line.first : first_line.last - 1]) + first_line.first + 1
     candidate_ends = np.flatnonzero(is_lead[last_line.first + 1 : last_line.last]) + last_line.first + 1
@@ -545,16 +568,16 @@ def _without_leads(
     return tuple(inner_lines)
 
 
-def _without_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLine:
-    """Shorten a line to the waypoints at a distance ``lead_length`` (m) from the ends of its run.
+def _remove_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoLine:
+    """Return a line shortened to the waypoints at a distance ``lead_length`` (m) from the ends of its run.
 
-    Keep an end that has no such waypoint.
+    An end without such a waypoint is kept. The line is unchanged if no leg would remain.
     """
-    inner = range(line.first + 1, line.last)
+    inner_waypoints = range(line.first + 1, line.last)
     tolerance = max(_LEAD_LENGTH_TOLERANCE_M, 0.01 * lead_length)
 
     def points_at_lead_distance(end: int) -> list[int]:
-        return [i for i in inner if abs(math.dist(points[i, :2], points[end, :2]) - lead_length) <= tolerance]
+        return [i for i in inner_waypoints if abs(math.dist(points[i, :2], points[end, :2]) - lead_length) <= tolerance]
 
     start_points, end_points = points_at_lead_distance(line.begins), points_at_lead_distance(line.ends)
     first = start_points[0] if start_points and line.first == line.begins else line.first
@@ -563,6 +586,6 @@ def _without_lead(points: Floats, line: PhotoLine, lead_length: float) -> PhotoL
 
 
 def _along_and_right(offsets: Floats, course: float) -> tuple[Floats, Floats]:
-    """Return the distances along a course and to the right of it, m, of offsets (n, 2)."""
+    """Return the components of offsets (n, 2) m along a course and to the right of the course: two arrays (n,) m."""
     east, north = math.sin(course), math.cos(course)
     return offsets[:, 0] * east + offsets[:, 1] * north, offsets[:, 0] * north - offsets[:, 1] * east

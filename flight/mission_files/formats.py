@@ -49,9 +49,9 @@ def mission_kind(path: Path) -> FileKind:
     try:
         return KINDS[path.suffix.lower()]
     except KeyError:
-        allowed = ", ".join(KINDS)
+        allowed = f"expected one of {', '.join(KINDS)}"
         raise MissionError(
-            f"{path}: suffix {path.suffix!r}: allowed {allowed}",
+            f"{path}: suffix {path.suffix!r}: {allowed}",
             file=path,
             field="suffix",
             value=path.suffix,

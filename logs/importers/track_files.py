@@ -315,7 +315,7 @@ def read_kml(path: Path) -> RawLog:
         lines = sum(_name(element) == "LineString" for element in root.iter())
         reason = f"; its {lines} lines have no times" if lines else ""
         raise LogError(
-            f"{path}: only {len(rows)} position(s) with a time (gx:Track); expected at least 2{reason}", file=path
+            f"{path}: only {len(rows)} position(s) with a time (gx:Track); at least 2 are needed{reason}", file=path
         )
     table = np.array(rows)
     start = _earliest(table[:, 0])

@@ -1,4 +1,4 @@
-"""Return data, trims and modes of embedded and user-made aircraft, and make folders for new aircraft."""
+"""Return data, trims and modes of built-in and user-made aircraft, and make folders for new aircraft."""
 
 import shlex
 from collections.abc import Mapping
@@ -56,7 +56,7 @@ def aircraft(name: str | Path) -> Aircraft: ...
 def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     """Return an aircraft by name or folder, with its masses, speeds and limits in SI units and radians.
 
-    name: name or folder; None returns all embedded aircraft, keyed by name.
+    name: name or folder; None returns all built-in aircraft, keyed by name.
     Raises a `planfly.PlanflyError` for an unknown name, and for a folder without an aircraft.
 
     >>> import planfly
@@ -154,7 +154,7 @@ def describe_aircraft(
 ) -> AircraftNumbers:
     """Compute trims, modes, envelope and step responses of an aircraft, and draw them.
 
-    name: name of an embedded aircraft, or a folder.
+    name: name of a built-in aircraft, or a folder.
     motor_braking: True lets the motor brake in descents.
     out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``, in which {name} stands for the aircraft's name;
     None writes no pictures.

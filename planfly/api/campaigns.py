@@ -136,7 +136,7 @@ def campaign(
 ) -> CampaignResult:
     """Fly a mission many times, like `planfly.fly`, with variations of wind, aircraft, terrain and start.
 
-    target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     spread: a TOML file of the quantities that vary; None takes planfly's default.
     flights: number of flights; None takes 300, or, with ``prove``, at most 5,000.  Without flights, ``prove`` and
     ``at_least``, a resumed campaign keeps its earlier goal.
@@ -242,7 +242,7 @@ def winds(
 ) -> WindsResult:
     """For each wind direction, find the strongest wind in which a mission is flyable with a given probability.
 
-    target: an embedded scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
+    target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     prove: the probability.
     directions: number of directions, 4 to 72.
     most: maximum wind to search, m/s.

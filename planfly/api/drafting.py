@@ -36,7 +36,7 @@ def new_scenario(
     folder: the folder for FOLDER/NAME.toml, where NAME is the name of the folder; it is made if it is missing.
     start, destination: latitude and longitude, degrees.
     height: height of start and destination above ground, m.
-    terrain: an elevation file, a folder of tiles, or an embedded name; None for flat ground.
+    terrain: an elevation file, a folder of tiles, or the name of a built-in terrain; None for flat ground.
     aircraft: a name, or a folder.  autopilot: see `planfly.fly`.
     overwrite: True replaces an existing scenario.
     The area contains the straight line and a margin of a third of its length, within the coverage of the elevation
@@ -97,7 +97,7 @@ def _scenario_file(folder: Path, name: str, *, overwrite: bool) -> Path:
     if folder.is_dir():
         check_output_file(file, overwrite)
     elif not folder.absolute().parent.is_dir():
-        raise PlanflyError(f"{folder}: its folder {folder.parent} does not exist", file=folder)
+        raise PlanflyError(f"{folder}: the parent folder {folder.parent} does not exist", file=folder)
     return file
 
 
@@ -113,7 +113,7 @@ def _parse_position(keyword: str, coordinates: Sequence[float]) -> GeoPosition:
 
 
 def _absolute_path(path: str | Path, *, is_name: bool) -> str:
-    """Return the absolute path of a file, or an embedded name unchanged."""
+    """Return the absolute path of a file, or a built-in terrain's name unchanged."""
     return str(path) if is_name else absolute_path(Path(path))
 
 

@@ -167,7 +167,7 @@ def _check_suffix(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
-        allowed = f"allowed {', '.join([*KINDS, *MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES])}"
+        allowed = f"expected one of {', '.join([*KINDS, *MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES])}"
         message = f"{target}: suffix {target.suffix!r}: {allowed}"
         raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
 

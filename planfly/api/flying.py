@@ -141,7 +141,7 @@ def plan_then_fly(
 ) -> PlanThenFly:
     """Plan a path, fly it in JSBSim and judge the flight.
 
-    scenario: an embedded name, a TOML file's path, or a `Scenario`.
+    scenario: a built-in scenario's name, a TOML file's path, or a `Scenario`.
     seed: seed of planner and turbulence; None takes the seed of the scenario, or 1.
     log: MCAP file for the flight, replaced if it exists; None writes no log.
     options: see `planfly.fly`.

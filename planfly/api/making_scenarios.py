@@ -34,7 +34,7 @@ def make_scenario(
 ) -> Scenario:
     """Return a scenario with other threats and other values, for `planfly.plan`, `planfly.fly` and other functions.
 
-    base: an embedded name, a TOML file's path, or a `Scenario`.
+    base: a built-in scenario's name, a TOML file's path, or a `Scenario`.
     threats: threats that replace the base's threats; None keeps these.  A pandas data frame or a mapping of columns,
     named as the keys of [[threats]]; a list of mappings with these keys; or an array (n, 4) of east, north, kill radius
     and detection radius, m.  A radius that is 0 or missing means no such zone; a scale that is missing is a quarter of

@@ -1,4 +1,4 @@
-"""Plan a path, plan again in flight, and list the embedded scenarios."""
+"""Plan a path, plan again in flight, and list the built-in scenarios."""
 
 import math
 import time
@@ -49,7 +49,7 @@ def plan(
 ) -> Plan:
     """Plan a path across a scenario's terrain and around its threats, within the limits of its aircraft.
 
-    scenario: an embedded name (`planfly.scenarios()` lists them), a TOML file's path, or a `Scenario`.
+    scenario: a built-in scenario's name (`planfly.scenarios()` lists them), a TOML file's path, or a `Scenario`.
     waypoints: a path of your own, (w, 3): east and north of the scenario's origin and altitude AMSL, m, from the
     scenario's start to its destination.  Nothing is searched: the path is scored and certified as it stands.
     out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
@@ -264,7 +264,7 @@ def what_blocks(plan: Plan) -> tuple[str, ...]:
 
 
 def scenarios() -> dict[str, str]:
-    """Return the name and description of each embedded scenario.
+    """Return the name and description of each built-in scenario.
 
     >>> import planfly
     >>> list(planfly.scenarios())[0]

@@ -136,7 +136,7 @@ def run(
 ) -> RunResult:
     """Plan, export, fly, record, judge and report into one folder.
 
-    scenario: an embedded name, a TOML file's path, or a `Scenario`.
+    scenario: a built-in scenario's name, a TOML file's path, or a `Scenario`.
     seed: seed of planner and turbulence; None takes the seed of the scenario, or 1.
     refine: maximum number of additional rounds, up to 20, each planned within limits tightened by the failures of the
     previous flight.

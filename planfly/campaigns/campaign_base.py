@@ -121,7 +121,7 @@ def open_campaign(
 ) -> CampaignBase:
     """Open the base of a campaign for a plan, a mission file, or a scenario, for which a path is planned.
 
-    target: an embedded scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
+    target: a built-in scenario's name, a scenario's TOML file, a plan, or a plan.json, .waypoints or .plan.
     options: options of the flights; the plan avoids their zones, and their seed is used for the plan and the draws.
     plan_file: file of a scenario's plan, which is read if it exists, and written otherwise.
     Raises a PlanflyError for bad input, for a plan that is not feasible, and for dispersions with medians at which the

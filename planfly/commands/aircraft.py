@@ -48,7 +48,9 @@ def add_aircraft_parser(command_line: LineParser) -> None:
         "planfly aircraft --identify A.BIN B.BIN --mass 13.2 --span 2.9 --area 0.55 --check C.BIN --out ./mine",
     )
     with_completer(
-        parser.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)"),
+        parser.add_argument(
+            "name", metavar="NAME", nargs="?", help="name of a built-in aircraft, or a folder such as ./mine"
+        ),
         complete_aircraft,
     )
     parser.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
@@ -123,7 +125,7 @@ def _add_data_sheet_options(parser: CommandParser) -> None:
 
 
 def aircraft(args: argparse.Namespace) -> int:
-    """List the embedded aircraft, show the named aircraft, or make a folder for a new aircraft."""
+    """List the built-in aircraft, show the named aircraft, or make a folder for a new aircraft."""
     if args.logs is not None:
         return _identify(args)
     for name in ("base", "check"):

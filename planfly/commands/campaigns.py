@@ -116,7 +116,9 @@ def _add_shared_options(parser: CommandParser) -> None:
     """Add the arguments and options that campaigns and searches for winds have in common."""
     with_completer(
         parser.add_argument(
-            "target", metavar="SCENARIO|PLAN|MISSION", help="embedded name, TOML file, plan.json, .waypoints or .plan"
+            "target",
+            metavar="SCENARIO|PLAN|MISSION",
+            help="name of a built-in scenario, or a TOML file, plan.json, .waypoints or .plan",
         ),
         complete_mission_or_scenario,
     )

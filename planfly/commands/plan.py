@@ -41,7 +41,7 @@ def add_plan_parser(command_line: LineParser) -> None:
     )
     parser.extra_help = _algorithms_help
     parser.alias_keyword("seconds", "--budget")
-    add_scenario_argument(parser, help="TOML file or embedded name")
+    add_scenario_argument(parser, help="TOML file, or name of a built-in scenario")
     planning_group = parser.add_group("planning")
     planning_group.add_argument(
         "--seed", metavar="N", type=number_parser("seed"), help="seed of the planner (default: the scenario's, or 1)"

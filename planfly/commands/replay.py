@@ -60,7 +60,7 @@ def add_replay_parser(command_line: LineParser) -> None:
         "--to",
         metavar="S|IP:PORT,...",
         type=parse_time_or_stations,
-        help="end at this time of the flight, s; or play the log to ground stations at this address (extra "
+        help="a number: stop at this flight time, s; an address: stream the log to ground stations there (needs "
         "planfly[live])",
     )
     part_group.add_argument(

@@ -31,7 +31,7 @@ def add_run_parser(command_line: LineParser) -> None:
         "planfly run tight --wind 8,270 --turbulence light --refine 3",
     )
     add_scenario_argument(
-        parser, nargs="?", default="jacksboro", help="TOML file or embedded name (default: jacksboro)"
+        parser, nargs="?", default="jacksboro", help="TOML file, or name of a built-in scenario (default: jacksboro)"
     )
     planning = parser.add_group("planning")
     planning.add_argument(

@@ -85,17 +85,17 @@ def _report_bad_usage(reason: str) -> int:
 
 
 # ----------------------------------------------------------------------
-# ``planfly scenarios``: the embedded scenarios, one line each.
+# ``planfly scenarios``: the built-in scenarios, one line each.
 
 
 def add_scenarios_parser(command_line: LineParser) -> None:
     """Add the parser of ``planfly scenarios``."""
-    parser = command_line.add_command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
+    parser = command_line.add_command("scenarios", "list the built-in scenarios, one line each", "planfly scenarios")
     add_json_option(parser.add_group("results"), "scenarios")
 
 
 def scenarios(args: argparse.Namespace) -> int:
-    """Print the name and description of each embedded scenario."""
+    """Print the name and description of each built-in scenario."""
     descriptions = planfly.scenarios()
     for name, description in descriptions.items():
         print(f"{name:<12} {description}")

@@ -101,7 +101,7 @@ class TableRow:
 
 
 def problem_name(threats: int) -> str:
-    """Return the name of the embedded scenario of a problem."""
+    """Return the name of the built-in scenario of a problem."""
     return f"paper-{threats:02d}"
 
 

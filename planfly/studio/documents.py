@@ -110,7 +110,7 @@ def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
     )
     if suffix not in DROPPED_SUFFIXES:
         raise MissionError.at(
-            shown_name, "suffix", suffix, f"allowed {', '.join(DROPPED_SUFFIXES)}", shown=repr(suffix)
+            shown_name, "suffix", suffix, f"expected one of {', '.join(DROPPED_SUFFIXES)}", shown=repr(suffix)
         )
     if suffix == ".json":
         _check_plan_names_no_files(shown_name, data)

@@ -70,6 +70,6 @@ def find_file_in_folder(folder: Path | None, name: str) -> Path:
         raise MissionError.at("open", "name", name[:60], allowed, shown=repr(name[:60]))
     if path.suffix.lower() not in _READABLE_SUFFIXES:
         raise MissionError.at(
-            "open", "suffix", path.suffix, f"allowed {', '.join(_READABLE_SUFFIXES)}", shown=repr(path.suffix)
+            "open", "suffix", path.suffix, f"expected one of {', '.join(_READABLE_SUFFIXES)}", shown=repr(path.suffix)
         )
     return path

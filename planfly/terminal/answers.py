@@ -77,7 +77,7 @@ class AircraftEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class AircraftAnswer:
-    """planfly aircraft: the named or made aircraft, or all embedded ones."""
+    """planfly aircraft: the named or made aircraft, or all built-in ones."""
 
     schema: Literal["planfly.aircraft/1"] = "planfly.aircraft/1"
     exit_code: int
@@ -491,7 +491,7 @@ class TerrainAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ScenarioEntry:
-    """An embedded scenario."""
+    """A built-in scenario."""
 
     name: str
     description: str
@@ -499,7 +499,7 @@ class ScenarioEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class ScenariosAnswer:
-    """planfly scenarios: the embedded scenarios."""
+    """planfly scenarios: the built-in scenarios."""
 
     schema: Literal["planfly.scenarios/1"] = "planfly.scenarios/1"
     exit_code: int

@@ -175,7 +175,7 @@ def file_completer(*suffixes: str) -> Completer:
 
 
 def complete_scenario(prefix: str, **_context: object) -> list[str]:
-    """Return the names of embedded scenarios, and the scenario files, that start with `prefix`.
+    """Return the names of built-in scenarios, and the scenario files, that start with `prefix`.
 
     >>> complete_scenario("jack")
     ['jacksboro', 'jacksboro-air', 'jacksboro-field']
@@ -185,7 +185,7 @@ def complete_scenario(prefix: str, **_context: object) -> list[str]:
 
 
 def complete_aircraft(prefix: str, **_context: object) -> list[str]:
-    """Return the names of embedded aircraft, and the folders, that start with `prefix`.
+    """Return the names of built-in aircraft, and the folders, that start with `prefix`.
 
     >>> complete_aircraft("aero")
     ['aerosonde']

@@ -89,7 +89,9 @@ def add_world_options(parser: CommandParser) -> OptionGroup:
     group = parser.add_group("where it flies")
     with_completer(
         group.add_argument(
-            "--scenario", metavar="SCENARIO", help="judge within this scenario: a TOML file or an embedded name"
+            "--scenario",
+            metavar="SCENARIO",
+            help="judge within this scenario: a TOML file, or the name of a built-in scenario",
         ),
         complete_scenario,
     )
@@ -101,7 +103,9 @@ def add_world_options(parser: CommandParser) -> OptionGroup:
 def add_terrain_option(group: OptionGroup) -> None:
     """Add the option for the terrain."""
     suffixes, names = ", ".join(SUFFIXES), ", ".join(EMBEDDED)
-    help_text = f"elevation file ({suffixes}), a folder or .vrt of such tiles, or an embedded name: {names}"
+    help_text = (
+        f"elevation file ({suffixes}), a folder or .vrt of such tiles, or the name of a built-in terrain: {names}"
+    )
     group.add_argument("--terrain", metavar="DEM", help=help_text)
 
 
@@ -112,8 +116,8 @@ def add_fence_option(group: OptionGroup) -> None:
         metavar="FILE",
         action="append",
         default=[],
-        help="also keep within this fence: .fence, .waypoints, .txt or .plan, or zones: .geojson, .json (of ED-269 and "
-        "ED-318, too), .kml, .openair, .gpkg; repeatable",
+        help="also respect this fence (.fence, .waypoints, .txt, .plan) or these airspace zones (.geojson, .json "
+        "including ED-269 and ED-318, .kml, .openair, .gpkg); repeatable",
     )
     with_completer(option, file_completer("fence", *(suffix[1:] for suffix in ZONES), *MISSION_SUFFIXES))
 

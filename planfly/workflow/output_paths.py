@@ -86,7 +86,7 @@ def check_output_file(path: Path, overwrite: bool, source: Path | None = None) -
     if path.exists() and not overwrite:
         raise PlanflyError(f"{path}: exists; overwrite=True replaces it", file=path)
     if not path.parent.exists():
-        raise PlanflyError(f"{path}: its folder {path.parent} does not exist", file=path)
+        raise PlanflyError(f"{path}: the folder {path.parent} does not exist", file=path)
 
 
 def check_output_folder(folder: Path, overwrite: bool) -> None:

@@ -92,7 +92,7 @@ def _line_rows(
     if window.stop - window.start < 2 or not aligned.passed[line.begins]:
         return None
     position = aligned.track.position[window]
-    along, across, course = axis.of(position)
+    along, across, course = axis.project(position)
     course_error = np.abs(np.angle(np.exp(1j * (aligned.course[window] - course))))
     is_ahead = course_error <= MAX_PHOTO_COURSE_ERROR_RAD
     height_error, height_tolerance = _height_errors(requirements, axis, position, along)
@@ -157,7 +157,7 @@ def _height_errors(
     requirements: RouteRequirements, axis: LineAxis, position: Floats, along: Floats
 ) -> tuple[Floats, Floats]:
     """Return each row's error from the planned height above ground, and its tolerance, m."""
-    planned_height = heights_over_ground(requirements, axis.at(along))
+    planned_height = heights_over_ground(requirements, axis.points_at(along))
     tolerance = np.maximum(MIN_PHOTO_HEIGHT_ERROR_M, PHOTO_HEIGHT_FRACTION * planned_height)
     return heights_over_ground(requirements, position) - planned_height, tolerance
 
@@ -184,7 +184,7 @@ def _camera_on_rows(
     may be beyond the line's ends, and each is optional.
     """
     follows_path, rows = requirements.setup.autopilot.turns.follows_path, np.arange(len(position))
-    along = axis.of(position)[0]
+    along = axis.project(position)[0]
 
     def first_row_at(waypoint: int, first_row: int = 0) -> int:
         """Return the first row, from `first_row` on, that reaches or passes a waypoint."""
@@ -192,7 +192,7 @@ def _camera_on_rows(
         distances = np.hypot(*(position[:, :2] - point[:2]).T)
         # An autopilot that follows a path is at a waypoint where the path passes it.
         radius = 0.0 if follows_path else acceptance_condition(requirements, waypoint).radius
-        is_at_waypoint = (distances <= radius) | (along >= axis.of(point[None])[0][0])
+        is_at_waypoint = (distances <= radius) | (along >= axis.project(point[None])[0][0])
         indices = np.flatnonzero(is_at_waypoint & is_ahead & (rows >= first_row))
         return int(indices[0]) if indices.size else len(along)
 
@@ -289,7 +289,7 @@ def _line_strip(
         axis = LineAxis(requirements.points[line.first : line.last + 1])
         along = np.linspace(0.0, axis.length, max(2, math.ceil(axis.length / PHOTO_STEP_M) + 1))
         legs = np.clip(np.searchsorted(axis.along, along, "right") - 1, 0, len(axis.along) - 2) + line.first
-        positions, speeds = axis.at(along), requirements.ground_speed[legs]
+        positions, speeds = axis.points_at(along), requirements.ground_speed[legs]
         return _Strip(
             positions, heights_over_ground(requirements, positions), speeds, np.ones(len(along), dtype=np.bool_)
         )
@@ -332,7 +332,7 @@ def _with_side_overlap(
     """Return the measure with the minimum overlap between neighbouring lines."""
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
     axis = LineAxis(corners[0])
-    end_distances = [axis.of(corner_points)[0] for corner_points in corners]
+    end_distances = [axis.project(corner_points)[0] for corner_points in corners]
     min_along = min(float(along.min()) for along in end_distances)
     length = max(float(along.max()) for along in end_distances) - min_along
     count = max(1, math.ceil(length / PHOTO_STEP_M))
@@ -344,7 +344,7 @@ def _with_side_overlap(
         this_line = np.full((4, count), np.nan)
         this_line[3, on_line] = number
         if strip is not None and strip.is_usable.any():
-            point_along, across, _ = axis.of(strip.positions)
+            point_along, across, _ = axis.project(strip.positions)
             is_forward = along[-1] >= along[0]
             is_flown_usably = _line_steps(
                 (point_along - min_along) if is_forward else length - (point_along - min_along), strip.is_usable, length

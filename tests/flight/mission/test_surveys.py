@@ -225,12 +225,12 @@ def test_lines_that_bend_are_lines_as_a_whole() -> None:
 def test_places_along_and_beside_a_line_that_bends() -> None:
     axis = LineAxis(np.array(bent(1)))
     places = np.array([[10.0, 300.0], [-20.0, -50.0], [300.0, 900.0], [600.0, 1200.0]])
-    along, across, course = axis.of(places)
+    along, across, course = axis.project(places)
     half = math.sqrt(0.5)
     assert along == pytest.approx([300.0, -50.0, 600.0 + 600.0 * half, 600.0 + 1200.0 * half])
     assert across == pytest.approx([10.0, -20.0, 0.0, 0.0], abs=1e-9)
     assert np.degrees(course) == pytest.approx([0.0, 0.0, 45.0, 45.0])
-    assert axis.at(np.array([300.0, 1200.0])) == pytest.approx(np.array([[0.0, 300.0], bent(1)[-1]]))
+    assert axis.points_at(np.array([300.0, 1200.0])) == pytest.approx(np.array([[0.0, 300.0], bent(1)[-1]]))
 
 
 def test_two_lines_are_a_survey_with_the_camera_on() -> None:

@@ -26,7 +26,7 @@ def test_what_is_no_mission_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "folder.plan").mkdir()
     refused(tmp_path / "folder.plan", "cannot be read")
     (tmp_path / "a.kml").write_text("<kml/>")
-    refused(tmp_path / "a.kml", "suffix '.kml': allowed .waypoints, .plan, .txt")
+    refused(tmp_path / "a.kml", "suffix '.kml': expected one of .waypoints, .plan, .txt")
 
 
 @settings(max_examples=scaled(300, 25), deadline=None)

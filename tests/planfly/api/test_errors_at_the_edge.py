@@ -106,7 +106,7 @@ CASES: dict[str, tuple[Callable[[], object], _Known]] = {
     ),
     "an export's suffix": (
         lambda: planfly.export(_file("a.waypoints", _MISSION), "b.doc"),
-        _Known("b.doc", "suffix", ".doc", "allowed .waypoints"),
+        _Known("b.doc", "suffix", ".doc", "expected one of .waypoints"),
     ),
     "an export onto a file": (
         lambda: planfly.export(_file("a.waypoints", _MISSION), _file("b.plan", "")),

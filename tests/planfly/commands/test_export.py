@@ -121,7 +121,7 @@ def test_an_unknown_suffix_is_refused_with_the_known_ones(
 ) -> None:
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / name)]) == 2
     assert (
-        "allowed .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx, .parm, .csv, .parquet, .tlog, .ulg"
+        "expected one of .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx, .parm, .csv, .parquet, .tlog, .ulg"
         in capsys.readouterr().err
     )
     assert not (tmp_path / "a.plan").exists()
