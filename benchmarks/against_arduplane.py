@@ -201,7 +201,7 @@ def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
     setup, airframe = random_setup(seed, steep=steep)
     law = fly_to_end(Flight(setup, airframe.aircraft))
     assert isinstance(setup.autopilot, ArduPlane)
-    autopilot = ArduPlaneSitl.flying(setup.autopilot, BINARY)
+    autopilot = ArduPlaneSitl.with_model(setup.autopilot, BINARY)
     real, _ = fly_autopilot(setup, airframe.aircraft, autopilot)
     (law_across, law_up), (across, up) = (_along_legs(setup, flown.track) for flown in (law, real))
     wind = setup.scenario.wind

@@ -55,9 +55,9 @@ _SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraf
 
 
 def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
-    """Return a text for each value of the user's file that contradicts the order of two parameters.
+    """Return a text for each pair of values in the wrong order of which at least one is from the user's file.
 
-    orders: names of parameters whose values must not decrease from one parameter to the next.
+    orders: groups of parameter names; within a group the values must not decrease from one name to the next.
 
     >>> made = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
     >>> find_misfits(made, [("THR_MIN", "TRIM_THROTTLE")])
@@ -95,29 +95,29 @@ class Parameters(Protocol):
 
     @property
     def values(self) -> tuple[ParameterValue, ...]:
-        """See the class."""
+        """Every parameter that the control law uses, with its value and source."""
 
     @property
     def unused(self) -> tuple[str, ...]:
-        """See the class."""
+        """Names of the parameters in the user's file that the control law does not use."""
 
     @property
     def source(self) -> str:
-        """See the class."""
+        """The user's file; "" if there is none."""
 
     @property
     def beyond(self) -> tuple[str, ...]:
-        """See the class."""
+        """Texts on values of the user's file that are outside their documented ranges."""
 
     @property
     def misfits(self) -> tuple[str, ...]:
-        """See the class."""
+        """Texts on values of the user's file that contradict another parameter."""
 
     def changed(self, **values: float) -> Self:
-        """Return a copy with other values for some parameters."""
+        """Return a copy with the given parameters changed."""
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
-        """Return the values that one source states, by name."""
+        """Return the values that come from one source, by name and in the autopilot's units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,14 +228,17 @@ class Autopilot(ABC):
 
     @classmethod
     def missing_files(cls, aircraft: Aircraft) -> list[str]:
-        """Return a sentence for each file that the autopilot requires and that an aircraft's folder lacks.
+        """Return a sentence for each required file that is missing from an aircraft's folder.
 
         Raises PlanflyError if a file is invalid.
         """
         return []
 
     def with_parameters(self, **values: float) -> "Autopilot":
-        """Return a copy with other values for some parameters, by the autopilot's names and in its units."""
+        """Return a copy with the given parameters changed, by the autopilot's names and in its units.
+
+        Raises ValueError for an autopilot without parameters.
+        """
         raise ValueError(f"{self.title} has no parameters")
 
     def stated_value(self, name: str) -> float | None:
@@ -297,7 +300,7 @@ class Autopilot(ABC):
 
     @property
     def route_rules(self) -> RouteRules:
-        """Rules by which a mission becomes the route of this autopilot, from the autopilot's parts."""
+        """Rules by which a mission is converted to the route that this autopilot flies."""
         turns = self.turns
         return RouteRules(
             self.returns.rules,
@@ -311,7 +314,7 @@ class Autopilot(ABC):
 def describe_program(program: AutopilotProgram, aircraft: str, named: int = 8) -> str:
     """Return a description of a program with its version, checksum and changed parameters.
 
-    named: maximum number of changed parameters in the description.  The verdict's data contains all of them.
+    named: maximum number of changed parameters that the description names; the number of others is appended.
     """
     changed = [f"{name} {value:g}" for name, value in program.changed.items()]
     remainder = f", +{len(changed) - named} more" if len(changed) > named else ""

@@ -38,7 +38,7 @@ AUTOPILOTS = (
     Entry("px4", "px4.autopilot.Px4", ("1.16", "1.17")),
     Entry("planfly", "planfly.autopilot.PlanflyGuidance"),
 )
-# External programs.  The first program that recognises a file is used.
+# External programs.  The first one whose `accepts_program` is True for a file is used.
 PROGRAMS = (
     "px4_sitl.autopilot.Px4Sitl",
     "arduplane_sitl.autopilot.ArduPlaneSitl",
@@ -69,12 +69,13 @@ def program_classes() -> "Iterator[type[ProgramAutopilot]]":
 
 
 def _load_class(path: str) -> "type[Autopilot]":
+    """Import and return an autopilot class, from its path below `flight.autopilots`."""
     module, _, name = path.rpartition(".")
     return cast("type[Autopilot]", getattr(importlib.import_module(f"flight.autopilots.{module}"), name))
 
 
 def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
-    """Return the autopilot that a scenario names, with its settings.
+    """Return the autopilot that a scenario names, with its settings and the RTL settings of the scenario.
 
     Raises ScenarioError if the name is not listed, and as `Autopilot.load` does.
 
@@ -116,7 +117,7 @@ def _field_depth_below_home(scenario: "Scenario") -> float:
 
 
 def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_parameters: Mapping[str, float]) -> None:
-    """Raise ScenarioError if a scenario and the user's parameter file state different values.
+    """Raise ScenarioError if a scenario and the user's parameter file state different values for one parameter.
 
     rtl_parameters: parameters that the scenario's RTL settings set.
     """
@@ -129,12 +130,12 @@ def _check_no_conflict(scenario: "Scenario", autopilot: "Autopilot", rtl_paramet
 
 
 def program_class_for(program: Path) -> "type[ProgramAutopilot]":
-    """Return the class of the autopilot that runs an executable built for software in the loop.
+    """Return the autopilot class for an executable built for software in the loop (SITL).
 
     >>> program_class_for(Path("arduplane")).name
     'ardupilot'
     """
-    return next(kind for kind in program_classes() if kind.recognises(program))
+    return next(kind for kind in program_classes() if kind.accepts_program(program))
 
 
 def autopilot_of_log(
@@ -154,7 +155,7 @@ def autopilot_of_log(
 def restore_autopilot(name: str | None, stored: "StoredAutopilot") -> "Autopilot":
     """Return the autopilot that a log stores.
 
-    name: None if the stored settings imply it.
+    name: name of the autopilot in the log; None if the log states no name, because the stored settings imply it.
 
     Raises ParameterError if a value is not allowed, and KeyError if the name is unknown.
     """
@@ -175,5 +176,5 @@ def stored_name(autopilot: "Autopilot") -> str | None:
 
 
 def _implied_name(stored: "StoredAutopilot") -> str:
-    """Return the autopilot of a log without its name: ArduPlane if it has parameters or a program, else planfly."""
+    """Return the autopilot's name for a log without a name: ArduPlane with parameters or a program, else planfly."""
     return "planfly" if stored.parameters is None and stored.program is None else "ardupilot"

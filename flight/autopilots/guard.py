@@ -49,7 +49,7 @@ class Guard:
     """Guard process as a context manager; at a normal exit it removes nothing.
 
     >>> with Guard() as guard:
-    ...     guard.keep_folder(Path("/nowhere/planfly-autopilot-1"))
+    ...     guard.register_folder(Path("/nowhere/planfly-autopilot-1"))
     """
 
     def __init__(self) -> None:
@@ -66,16 +66,16 @@ class Guard:
                 cwd="/",
             )
 
-    def keep_folder(self, folder: Path) -> None:
-        """Guard a folder, whose name has no line break."""
+    def register_folder(self, folder: Path) -> None:
+        """Have a folder removed if planfly is killed; its name must have no line break."""
         self._write_line(f"folder {folder}")
 
-    def keep_file(self, file: Path) -> None:
-        """Guard a file, which need not exist yet and whose name has no line break."""
+    def register_file(self, file: Path) -> None:
+        """Have a file removed if planfly is killed; it may not exist yet, and its name must have no line break."""
         self._write_line(f"file {file}")
 
-    def keep_group(self, group: int) -> None:
-        """Guard a process group."""
+    def register_group(self, group: int) -> None:
+        """Have a process group killed if planfly is killed."""
         self._write_line(f"group {group}")
 
     def _write_line(self, line: str) -> None:
@@ -89,7 +89,7 @@ class Guard:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the guard process."""
+        """End the guard process, without removing anything."""
         self._write_line("done")
         self._pipe.close()
         self._process.wait()

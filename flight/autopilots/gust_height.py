@@ -38,7 +38,7 @@ def height_in_gusts(opposing_rate: float, turbulence: Turbulence) -> float:
 
 
 def height_in_updrafts(sink_reserve: float, turbulence: Turbulence) -> float:
-    """Return the altitude gain in updrafts of an autopilot that holds airspeed, m.
+    """Return the altitude that an autopilot which holds its airspeed gains in updrafts, m.
 
     sink_reserve: unused sink rate, m/s.
 

@@ -152,7 +152,7 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
         header = PX4 if "px4" in stack[1].lower() else ARDUPILOT if re.search("ardu|apm", stack[1], re.I) else ""
     elif program is not None:
         header = ARDUPILOT
-    names = {PX4: _matching(entries, _PX4_NAMES.fullmatch), ARDUPILOT: _matching(entries, _is_ardupilot)}
+    names = {PX4: _select_names(entries, _PX4_NAMES.fullmatch), ARDUPILOT: _select_names(entries, _is_ardupilot_name)}
     votes = {autopilot: len(names[autopilot]) + (_HEADER_WEIGHT if autopilot == header else 0) for autopilot in TITLES}
     winner = max(TITLES, key=lambda autopilot: votes[autopilot])
     min_votes = min(votes.values())
@@ -169,11 +169,11 @@ def parameter_origin(text: str, entries: Mapping[str, Entry]) -> ParameterOrigin
     return ParameterOrigin(winner, vehicle, evidence)
 
 
-def _matching(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
+def _select_names(names: Iterable[str], matches: Callable[[str], object]) -> list[str]:
     return [name for name in names if matches(name)]
 
 
-def _is_ardupilot(name: str) -> bool:
+def _is_ardupilot_name(name: str) -> bool:
     patterns = (_ARDUPLANE_NAMES, _ARDUPILOT_NAMES, *_ARDUPILOT_VEHICLES.values())
     return not _PX4_NAMES.fullmatch(name) and any(pattern.fullmatch(name) for pattern in patterns)
 
@@ -190,25 +190,30 @@ def _header_vehicle(text: str) -> str | None:
 def _vehicle_by_majority(
     text: str, entries: Mapping[str, Entry], plane_names: re.Pattern[str], other_vehicles: Mapping[str, re.Pattern[str]]
 ) -> str:
-    """Return the vehicle with the most names; in a tie, an aeroplane."""
+    """Return the vehicle with the most parameter names in a file; "" for an aeroplane, which also wins a tie.
+
+    A header that names the vehicle counts as `_HEADER_WEIGHT` names.
+    """
     header_kind = _header_vehicle(text)
-    votes = {"": len(_matching(entries, plane_names.fullmatch))}
-    votes |= {kind: len(_matching(entries, names.fullmatch)) for kind, names in other_vehicles.items()}
+    votes = {"": len(_select_names(entries, plane_names.fullmatch))}
+    votes |= {kind: len(_select_names(entries, names.fullmatch)) for kind, names in other_vehicles.items()}
     if header_kind is not None:
         votes[header_kind] = votes.get(header_kind, 0) + _HEADER_WEIGHT
     return max(votes, key=lambda kind: votes[kind])
 
 
 def _px4_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
+    """Return the vehicle of a PX4 file, from its type parameters, its header or its names; "" for an aeroplane."""
     for name, kinds in _PX4_TYPES.items():
         if name in entries and (kind := kinds.get(round(entries[name].value))):
             return kind
-    if _header_vehicle(text) == _VTOL or _matching(entries, _PX4_VTOL.fullmatch):
+    if _header_vehicle(text) == _VTOL or _select_names(entries, _PX4_VTOL.fullmatch):
         return _VTOL
     return _vehicle_by_majority(text, entries, _PX4_PLANE, _PX4_VEHICLES)
 
 
 def _ardupilot_vehicle(text: str, entries: Mapping[str, Entry]) -> str:
+    """Return the vehicle of an ArduPilot file; "" for an aeroplane."""
     return _vehicle_by_majority(text, entries, _ARDUPLANE_NAMES, _ARDUPILOT_VEHICLES)
 
 
@@ -243,7 +248,10 @@ def read_parameters_for(path: Path, autopilot: str) -> dict[str, Entry]:
 
 
 def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], known: Mapping[str, float]) -> None:
-    """Raise ParameterError if an autopilot knows no name in a file, unless the names show that they belong to it."""
+    """Raise ParameterError if an autopilot uses no name in a file and the names do not look like its parameters.
+
+    known: values of the file that the autopilot uses.
+    """
     if known or parameter_origin("", entries).autopilot == autopilot:
         return
     names = ", ".join(list(entries)[:_SHOWN_NAMES])
@@ -253,7 +261,12 @@ def refuse_unknown(path: Path, autopilot: str, entries: Mapping[str, Entry], kno
 
 
 def other_autopilot(where: str, written_for: str, evidence: str, flying: str) -> ParameterError:
-    """Return the error for a file that was written for a different autopilot."""
+    """Return the error for a parameter file that was written for a different autopilot.
+
+    where: the file, for the message.
+    written_for, flying: names of the autopilot of the file and of the autopilot that is to fly.
+    evidence: header or names that show the autopilot of the file.
+    """
     evidence_text = f" ({evidence})" if evidence else ""
     allowed = f"{_MODELS[flying]} is to fly; --autopilot {written_for} simulates {_MODELS[written_for]} instead"
     message = f"{where}: written for {TITLES[written_for]}{evidence_text}, but {allowed}"

@@ -80,7 +80,7 @@ class ParameterTable:
         }
 
     def read(self, entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return the values by present name and in present units, and the names that the control law does not read.
+        """Return the values of a file by present name and in present units, and the names that no control law reads.
 
         Raises ParameterError if a value is not accepted, or if one parameter has two values.
         """
@@ -101,9 +101,9 @@ class ParameterTable:
         return values, tuple(unused)
 
     def read_log(self, logged: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
-        """Return the accepted values of a log, and a sentence on each rejected value.
+        """Return the accepted values of a log by present name, and a sentence on each rejected value.
 
-        logged: values by name.
+        logged: values by present or older name.
         """
         values: dict[str, float] = {}
         notes = []
@@ -159,7 +159,10 @@ class ParameterSet:
 
     @classmethod
     def load(cls, aircraft: Aircraft, path: Path | str | None = None, *fields: Any) -> Self:
-        """Return an aircraft's parameters from a file, from the aircraft's own file, and from the defaults.
+        """Return an aircraft's parameters from the user's file, the aircraft's own file, and the defaults.
+
+        path: the user's file; None for no file.
+        fields: additional fields of the subclass, such as PX4's version.
 
         Raises ParameterError, in one line, if a file cannot be read or contains a value that is not allowed.
         """
@@ -172,7 +175,7 @@ class ParameterSet:
             sources.append(("file", values))
         aircraft_file = aircraft.folder / AIRCRAFT_FILE
         if aircraft_file.exists():
-            sources.append(("aircraft", cls._of_aircraft(read_parameter_file(aircraft_file))))
+            sources.append(("aircraft", cls._read_aircraft_values(read_parameter_file(aircraft_file))))
         return cls._build(sources, "" if path is None else str(path), unused, *fields)
 
     @classmethod
@@ -204,7 +207,7 @@ class ParameterSet:
     def of_log(cls, logged: Mapping[str, float], source: str, *fields: Any) -> tuple[Self, tuple[str, ...]]:
         """Return the parameters of a flight log, and a sentence for each value that could not be used.
 
-        For a log without parameters, returns the autopilot's defaults and a sentence on it.
+        For a log without parameters, return the autopilot's defaults, and a sentence that says so.
 
         logged: values by the names of any release.
         source: file of the log.
@@ -216,33 +219,33 @@ class ParameterSet:
             return cls.defaults(*fields), (*notes, f"{error}: {cls.table.title}'s defaults are used")
 
     @classmethod
-    def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
+    def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
         """Return the values in the aircraft's file that the control law reads."""
         return cls.table.read(entries)[0]
 
     @classmethod
-    def _counts_as_set(cls, definition: Definition, value: float) -> bool:
-        """Return True if a value in the file counts as set explicitly; subclasses may exclude unchanged defaults."""
+    def _is_set_on_purpose(cls, definition: Definition, value: float) -> bool:
+        """Return True if a value of a file was set on purpose; a subclass may exclude values that equal the default."""
         return True
 
     @classmethod
-    def _known_in_release(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Return the sources without parameters that the release lacks, and the file's names of such parameters."""
+    def _without_unknown(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
+        """Remove parameters that the release lacks; return the remaining sources, and the removed names of the file."""
         return sources, ()
 
     @classmethod
     def _build(cls, sources: list[Stated], source: str, unused: tuple[str, ...], *fields: Any) -> Self:
-        """Return a set that takes each parameter from the first source that states it.
+        """Return a parameter set that takes each value from the first source that states it, else from the defaults.
 
         Raises ParameterError if a minimum is not below its maximum.
         """
-        known_sources, unknown_names = cls._known_in_release(sources, *fields)
+        known_sources, unknown_names = cls._without_unknown(sources, *fields)
         unused = (*unused, *unknown_names)
 
         def find(definition: Definition) -> ParameterValue:
             for origin, values in known_sources:
                 value = values.get(definition.name)
-                if value is not None and cls._counts_as_set(definition, value):
+                if value is not None and cls._is_set_on_purpose(definition, value):
                     return ParameterValue(definition.name, value, origin)
             return ParameterValue(definition.name, definition.default, "default")
 
@@ -298,7 +301,7 @@ class ParameterSet:
 def _value_error(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
     """Return the error for a value that is not allowed.
 
-    where: the line of the value, or the source of recorded parameters, which the message does not name.
+    where: line of the value, which the message names, or source of a recording, which it does not name.
     """
     prefix, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
     return ParameterError(f"{prefix}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)

@@ -140,20 +140,20 @@ class SpeedRules:
     cruise_parameter: str = ""
 
     def true_airspeed_factor(self, amsl: float) -> float:
-        """Return the ratio of flown true airspeed to commanded airspeed, at an altitude (m AMSL)."""
+        """Return the ratio of the true airspeed in flight to the commanded airspeed, at an altitude (m AMSL)."""
         return float(true_by_equivalent(amsl)) if self.equivalent else 1.0
 
-    def flown(self, commanded: Floats, cruise: float) -> Floats:
-        """Return the airspeed that the autopilot flies on each leg, (l,) m/s, in the kind of the commands.
+    def flown_airspeeds(self, commanded: Floats, cruise: float) -> Floats:
+        """Return the airspeed that the autopilot flies on each leg, m/s, (l,): true or equivalent like the commands.
 
-        commanded: airspeed commanded for each leg, (l,) m/s.
+        commanded: airspeed commanded for each leg, m/s, (l,).
         cruise: airspeed until the autopilot accepts the first command, m/s.
 
         >>> ignoring = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX"))
-        >>> ignoring.flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
+        >>> ignoring.flown_airspeeds(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
         [12.0, 15.0, 15.0, 10.0]
         >>> clipping = SpeedRules(SpeedLimits(9.0, 22.0, "MIN", "MAX", nearest=True))
-        >>> clipping.flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
+        >>> clipping.flown_airspeeds(np.array([8.0, 15.0, 30.0, 10.0]), 12.0).tolist()
         [9.0, 15.0, 22.0, 10.0]
         """
         limits = self.limits
@@ -194,7 +194,7 @@ def _no_parameters(settings: RtlSettings) -> Mapping[str, float]:
 
 @dataclass(frozen=True)
 class ReturnBehaviour:
-    """Behaviour of an autopilot in an RTL; by default that of ArduPlane with its default parameters.
+    """Behaviour of an autopilot in an RTL; the defaults are ArduPlane's behaviour with its default parameters.
 
     rules: rules of the RTL's target, altitude, turn and loiter.
     parameters_of: returns the autopilot's parameters, by name and in its units, for a scenario's settings of the RTL.
@@ -222,7 +222,11 @@ class LandingGlide(NamedTuple):
 
 
 def straight_glide(height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-    """Return the glide from the last waypoint before the landing point: straight and without a flare.
+    """Return a straight glide without a flare, from the last waypoint before the landing point.
+
+    height: height of the waypoint above the landing point, m.
+    run: horizontal distance of the waypoint from the landing point, m.
+    tail_wind, amsl: unused; see `GroundRules.glide`.
 
     >>> straight_glide(50.0, 1000.0, 0.0, 0.0)
     LandingGlide(slope=0.05, flare_height=0.0, flare_distance=0.0)
@@ -282,11 +286,11 @@ class FeasibilityLimits(NamedTuple):
 
 
 class BatteryFailsafe(NamedTuple):
-    """A failsafe that leaves the mission at a state of the battery.
+    """A failsafe that ends the mission at a threshold of the battery's charge or voltage.
 
-    parameter: name of the parameter of its threshold.
-    threshold: value of that parameter, mAh that remain, V, or the fraction that remains.
-    used_charge: used charge at which the autopilot leaves the mission, mAh; NaN if it acts by the voltage.
+    parameter: name of the parameter that states the threshold.
+    threshold: value of this parameter: remaining charge, mAh, or voltage, V, or remaining fraction.
+    used_charge: used charge at which the autopilot leaves the mission, mAh; NaN for a threshold of the voltage.
     shares_charge: True if several batteries are monitored: the share of this battery in the used charge is unknown.
     remaining_fraction: remaining fraction of the energy, estimated from the voltage, at which the autopilot leaves the
         mission; NaN for a threshold of the charge or of the voltage itself.
@@ -360,7 +364,7 @@ class MissionChecks:
     unites_inclusions: True if a position inside any inclusion of the mission's fence is inside the fence; False if a
         position must be inside all of them.
     battery_failsafes: failsafes that leave the mission at a state of the battery.
-    settings_not_flown: returns a sentence, without full stop, for each setting that changes the flight path of a
+    settings_not_flown: returns a sentence, without a full stop, for each setting that changes the flight path of a
         mission but is not simulated.
     parameter_notes: notes on the parameter file, for the verdict.
     """
@@ -411,13 +415,13 @@ class TrackingErrorFunction(Protocol):
         """
 
 
-def _exact(
+def _no_tracking_error(
     airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
 ) -> TrackingError | None:
     return None
 
 
-def _never_off_altitude(climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
+def _no_altitude_miss(climb_reserve: float, sink_reserve: float, turbulence: Turbulence) -> float:
     return 0.0
 
 
@@ -441,10 +445,10 @@ class Deviations:
     altitude_candidates, track_candidates: parameters that may cause an altitude or a track to fail.
     """
 
-    tracking_error: TrackingErrorFunction = _exact
+    tracking_error: TrackingErrorFunction = _no_tracking_error
     gust_sink: Callable[[float, Turbulence], float] = _no_displacement
     gust_rise: Callable[[float, Turbulence], float] = _no_displacement
-    altitude_miss_probability: Callable[[float, float, Turbulence], float] = _never_off_altitude
+    altitude_miss_probability: Callable[[float, float, Turbulence], float] = _no_altitude_miss
     altitude_parameter: str = ""
     altitude_candidates: tuple[Candidate, ...] = ()
     track_candidates: tuple[Candidate, ...] = ()

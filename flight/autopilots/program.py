@@ -14,11 +14,11 @@ from flight.simulation.setup import FlightSetup
 
 
 class ProgramFlight(Airborne, AbstractContextManager["ProgramFlight"]):
-    """Flight of an external program in lockstep with planfly's physics; leaving the context ends the program."""
+    """Flight of an external program in lockstep with planfly's physics, as a context manager that ends the program."""
 
     @abstractmethod
     def prepare(self) -> None:
-        """Upload the mission to the program, and let it fly to the first waypoint.
+        """Upload the mission to the program, and fly to the first waypoint.
 
         Raises FlightError if the program refuses or fails.
         """
@@ -43,14 +43,15 @@ class ProgramAutopilot(Autopilot):
 
     @classmethod
     @abstractmethod
-    def recognises(cls, program: Path) -> bool:
-        """Return True if the program of --sitl is this autopilot."""
+    def accepts_program(cls, program: Path) -> bool:
+        """Return True if the program that --sitl names is this autopilot."""
 
     @classmethod
     @abstractmethod
-    def flying(cls, model: Any, binary: Path) -> Self:
-        """Return the program's autopilot with the settings of the simulated autopilot.
+    def with_model(cls, model: Any, binary: Path) -> Self:
+        """Return the external program as an autopilot, with the settings of its simulated model.
 
+        model: simulated autopilot that models the program.
         binary: the program's file.
         """
 

@@ -37,11 +37,11 @@ class RateGains(NamedTuple):
     d: float
 
 
-def rate_gains_fault(gains: RateGains, needed: tuple[float, float], time_constant: float) -> str:
-    """Return "too low" or "too high" for gains that do not hold an attitude; "" if they do.
+def rate_gains_fault(gains: RateGains, feed_forward_range: tuple[float, float], time_constant: float) -> str:
+    """Return "too low" or "too high" for gains with which the attitude is not held; "" for usable gains.
 
-    needed: lowest and highest feed-forward that suit the aircraft, which are positive.
-    time_constant: of the attitude, s.
+    feed_forward_range: lowest and highest feed-forward that suits the aircraft; both are positive.
+    time_constant: time constant of the attitude, s.
 
     >>> rate_gains_fault(RateGains(0.345, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
     ''
@@ -50,7 +50,7 @@ def rate_gains_fault(gains: RateGains, needed: tuple[float, float], time_constan
     >>> rate_gains_fault(RateGains(6.0, 0.08, 0.15, 0.0), (0.345, 0.345), 0.5)
     'too high'
     """
-    low, high = needed
+    low, high = feed_forward_range
     immediate_response = (gains.feed_forward + gains.p) / (low + gains.p)
     decay = math.exp(-_RESPONSE_TIME_S * gains.i / (low + gains.p))
     if immediate_response < _MIN_IMMEDIATE_RESPONSE or (1.0 - immediate_response) * decay > 1.0 - _MIN_RESPONSE:

@@ -87,7 +87,7 @@ class StepResponse:
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Return the trimmed level flights at evenly spaced guidance speeds, without speeds that have no trim.
+    """Return level flights at evenly spaced airspeeds of the guidance, without airspeeds at which no trim exists.
 
     >>> from aircraft.catalog import load_aircraft
     >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
@@ -109,9 +109,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
 
 
 def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tuple[Mode, ...]:
-    """Return the named modes of level flight at this airspeed (m/s) and altitude (m).
-
-    Return an empty tuple if there is no such flight.
+    """Return the named modes of level flight at an airspeed (m/s) and an altitude (m); () if there is no such flight.
 
     >>> from aircraft.catalog import load_aircraft
     >>> for mode in level_flight_modes(load_aircraft("aerosonde"), 25.0):
@@ -128,7 +126,7 @@ def level_flight_modes(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_A
 
 
 def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
-    """Name the modes of the matrix A (8, 8), by their eigenvectors; states as in `flight.dynamics.trim.linearise`.
+    """Return the named modes of the linear dynamics with the matrix A of `flight.dynamics.trim.linearise`, (8, 8).
 
     The longitudinal modes are, from fast to slow, short period and phugoid. A lateral oscillation is the Dutch roll,
     and a second, slower oscillation is the roll-spiral; the faster real root is roll, and the slower real root is
@@ -190,7 +188,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
 def _step_response(
     aircraft: Aircraft, control: str, size: float, hold_time: float, duration: float, quantities: tuple[str, ...]
 ) -> StepResponse:
-    """Return the response to a control that moves by ``size`` for ``hold_time`` s, over ``duration`` s."""
+    """Simulate ``duration`` s of the response to a control that moves by ``size`` for ``hold_time`` s."""
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
     commands = fdm.start(*_POSITION_DEG, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
     moved_commands = commands._replace(**{control: getattr(commands, control) + size})
@@ -206,6 +204,6 @@ def _step_response(
 
 
 def _unwrap_states(states: NDArray[np.record], name: str) -> Floats:
-    """Return a quantity of states (t,), with a yaw that does not jump by 2 pi."""
+    """Return one quantity of the states, (t,); yaw is returned without jumps by 2 pi."""
     values: Floats = states[name]
     return np.unwrap(values) if name == "yaw" else values

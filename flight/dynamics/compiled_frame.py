@@ -179,11 +179,11 @@ _MIN_SYMMETRIC_AIRSPEED_2 = 1e-6
 
 @inner
 def step(frame: Record, numbers: Floats, code: Code, contacts: Records, frictions: Records) -> None:
-    """Advance by one step.
+    """Advance the model by one time step.
 
-    frame: the record of `FRAME` at the start of the numbers.
+    frame: record of `FRAME`, which shares the memory of the first registers.
     numbers: registers of the model.
-    code: header and sections as described above.
+    code: header and sections of instructions, as described above.
     contacts, frictions: records of `flight.dynamics.ground_contact`, possibly none.
     """
     _integrate(frame)
@@ -230,7 +230,7 @@ def _integrate(frame: Record) -> None:
 
 @inner
 def _update_position(frame: Record) -> None:
-    """Compute the position on the ellipsoid, and the local axes."""
+    """Compute latitude, longitude, altitude and the local axes from the inertial position."""
     cos, sin = math.cos(frame.earth_angle), math.sin(frame.earth_angle)
     frame.earth_cos, frame.earth_sin = cos, sin
     earth_position = transform(rotation(cos, sin), vector_of(frame.position))
@@ -252,7 +252,7 @@ def _update_position(frame: Record) -> None:
 
 @inlined
 def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) -> Matrix:
-    """Return the matrix from axes fixed to the earth to north, east and down."""
+    """Return the matrix that transforms vectors from axes fixed to the earth to north, east and down."""
     return (
         (-cos_lon * sin_lat, -sin_lon * sin_lat, cos_lat),
         (-sin_lon, cos_lon, 0.0),
@@ -262,7 +262,7 @@ def _local_axes(sin_lat: float, cos_lat: float, sin_lon: float, cos_lon: float) 
 
 @inner
 def _update_motion(frame: Record) -> None:
-    """Compute the body's axes, and the body's motion relative to the earth."""
+    """Compute the body axes, and the velocity, rates and attitude of the body relative to the earth."""
     inertial_to_earth = rotation(frame.earth_cos, frame.earth_sin)
     quaternion = (frame.attitude_real, vector_of(frame.attitude))
     inertial_to_body = matrix_of_quaternion(quaternion)
@@ -286,7 +286,7 @@ def _update_motion(frame: Record) -> None:
 
 @inner
 def _update_gravity(frame: Record) -> None:
-    """Compute gravity over the oblate earth."""
+    """Compute the gravity of the oblate earth, ft/s^2, in axes fixed to the earth."""
     radius = frame.radius
     sin_lat = math.sin(frame.geocentric_latitude)
     ratio = SEMI_MAJOR / radius
@@ -302,7 +302,7 @@ def _update_gravity(frame: Record) -> None:
 
 @inner
 def _update_atmosphere(frame: Record) -> None:
-    """Compute temperature, pressure and density in the standard atmosphere of 1976, below 20 km."""
+    """Compute temperature, pressure and density of the standard atmosphere of 1976; valid below 20 km."""
     geopotential_altitude = (frame.altitude * _GEOPOTENTIAL_RADIUS) / (_GEOPOTENTIAL_RADIUS + frame.altitude)
     if geopotential_altitude < _TROPOPAUSE:
         if geopotential_altitude <= 0.0:
@@ -346,7 +346,7 @@ def _update_air_data(frame: Record) -> None:
 
 @inlined
 def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
-    """Return the aerodynamic force along the body's axes, and its moment about the center of gravity."""
+    """Return the aerodynamic force (lbf) and its moment about the center of gravity (lbf ft), in body axes."""
     cos, sin = math.cos(frame.alpha), math.sin(frame.alpha)
     drag, side, lift = vector_of(frame.aero_force)
     force = transform(((cos, 0.0, -sin), (0.0, 1.0, 0.0), (sin, 0.0, cos)), (-drag, side, -lift))
@@ -355,7 +355,7 @@ def _aerodynamic_forces(frame: Record) -> tuple[Vector, Vector]:
 
 @inlined
 def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
-    """Return the sum of the external forces along the body's axes, and the sum of their moments."""
+    """Return the sum of the external forces (lbf) and the sum of the external moments (lbf ft), in body axes."""
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for k in range(code[FORCES_START], code[READS_START], FORCE_NUMBERS):
         magnitude, first_axis = numbers[code[k]], int(code[k + 1])
@@ -368,13 +368,19 @@ def _external_forces(numbers: Floats, code: Code) -> tuple[Vector, Vector]:
 
 @inlined
 def _read_registers(numbers: Floats, first: int) -> Vector:
-    """Return three registers as a vector."""
+    """Return three successive registers as a vector.
+
+    first: index of the first register.
+    """
     return numbers[first], numbers[first + 1], numbers[first + 2]
 
 
 @inner
 def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
-    """Compute the accelerations of the next step."""
+    """Compute the linear and angular accelerations for the next step, without friction.
+
+    force, moment: lbf and lbf ft, in body axes.
+    """
     inertial_rates = vector_of(frame.inertial_rates)
     gyroscopic_moment = cross(inertial_rates, transform(matrix_of(frame.inertia), inertial_rates))
     set_vector(
@@ -388,7 +394,10 @@ def _accelerate(frame: Record, force: Vector, moment: Vector) -> None:
 
 @inner
 def _add_friction(frame: Record, contacts: Records, frictions: Records, count: int) -> None:
-    """Add the friction of the contacts to the accelerations."""
+    """Add the accelerations that the friction of the contacts causes.
+
+    count: number of friction records.
+    """
     inertial_to_body = matrix_of(frame.inertial_to_body)
     earth_rates = transform(inertial_to_body, (0.0, 0.0, EARTH_RATE))
     rates = add(vector_of(frame.rates), scale(2.0, earth_rates))
@@ -417,9 +426,10 @@ def _add_friction(frame: Record, contacts: Records, frictions: Records, count: i
 def step_repeatedly(
     frames: Records, numbers: Floats, code: Code, contacts: Records, frictions: Records, count: int
 ) -> None:
-    """Advance by a number of steps.
+    """Advance the model by ``count`` time steps.
 
-    frames: (1,) of `FRAME`, at the start of the numbers.
+    frames: one record of `FRAME`, (1,), which shares the memory of the first registers.
+    Other arguments as for `step`.
     """
     for _ in range(count):
         step(frames[0], numbers, code, contacts, frictions)
@@ -427,13 +437,13 @@ def step_repeatedly(
 
 @compiled
 def initialise_attitude(frames: Records, angles: Floats) -> None:
-    """Set the attitude of the frame to the attitude that JSBSim's initial conditions produce.
+    """Set the attitude of the frame to the attitude that JSBSim's initial conditions produce, to the last bit.
 
-    FGInitialCondition keeps a quaternion, which cannot be read. Each angle that is set changes one Euler angle of that
-    quaternion, so that its last bits depend on all angles that were ever set.
+    FGInitialCondition stores a quaternion that cannot be read.  Each angle that is set changes one Euler angle of this
+    quaternion, so its last bits depend on all angles that were ever set.
 
-    frames: (1,) of `FRAME` with the position, the rates and the angle of the earth.
-    angles: (n, 3) roll, pitch and yaw of all evaluations of an instance, rad.
+    frames: one record of `FRAME`, (1,), with the position, the rates and the angle of the earth.
+    angles: roll, pitch and yaw of all evaluations of a JSBSim instance in order, rad, (n, 3).
     """
     frame: Record = frames[0]
     local_attitude = (1.0, (0.0, 0.0, 0.0))

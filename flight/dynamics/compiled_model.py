@@ -1,7 +1,7 @@
-"""Fly a model in compiled code instead of JSBSim, if both are equal in every bit.
+"""Fly a model in compiled code instead of JSBSim, if both give the same result in every bit.
 
-A `CompiledModel` takes over the state of a JSBSim instance at the start of a flight. Its `find_differences` then steps
-both with moving commands and gusts, and compares every register that JSBSim states as a property.
+A `CompiledModel` copies the state of a JSBSim instance at the start of a flight. `CompiledModel.find_differences` then
+steps both with changing commands and gusts, and compares every register that JSBSim has as a property.
 """
 
 import math
@@ -72,7 +72,7 @@ _NUMBER_PROPERTIES = {
 
 
 class CompiledModel:
-    """A flight of a compiled model, which continues a flight in JSBSim.
+    """Compiled model of an aircraft in flight, which continues a flight that JSBSim has started.
 
     numbers: registers.
     frames: (1,) of `flight.dynamics.compiled_frame.FRAME`, the first registers.
@@ -116,9 +116,10 @@ class CompiledModel:
         self._copy_state()
 
     def find_differences(self) -> list[str]:
-        """Step both engines, and return the properties that differ in any bit; then restore the compiled state.
+        """Step both engines until a property differs in any bit, and return the differing properties.
 
-        JSBSim's state is not restored, so that a flight with JSBSim must start again.
+        The list is empty if no property differs in `PROOF_STEPS`.  Only the state of the compiled model is restored: a
+        flight with JSBSim must start again.
         """
         initial_numbers, initial_contacts = self.numbers.copy(), self.contacts.copy()
         differing = self.differing_properties()
@@ -140,20 +141,20 @@ class CompiledModel:
     # ----------------------------------------------------------------------
 
     def _register(self, name: str) -> int:
-        """Return the register of a property. Raises UnsupportedModel if it has none."""
+        """Return the register of a property; raise UnsupportedModel if the property has no register."""
         if name not in self.properties:
             raise UnsupportedModel(f"property {name}")
         return self.properties[name]
 
     def _state_register(self, field: str, zero_register: int) -> int:
-        """Return the register of a field of the state."""
+        """Return the register of a field of the state; ``zero_register`` for a quantity that the aircraft lacks."""
         if field in STATE_PROPERTIES:
             return self._register(STATE_PROPERTIES[field][0])
         name = self._fdm.aircraft.model.readings[MODEL_FIELDS.index(field)].name
         return self._register(name) if name else zero_register
 
     def _copy_state(self) -> None:
-        """Copy the state of JSBSim to the registers."""
+        """Copy the state and the constants of the JSBSim instance to the registers."""
         read, numbers = self._fdm.properties.read, self.numbers
         for register, getter in self._getters.values():
             numbers[register] = getter()
@@ -166,13 +167,17 @@ class CompiledModel:
         frame.last_velocity, frame.second_last_velocity = frame.velocity, frame.velocity
         frame.last_acceleration = frame.acceleration
         centre = [read(f"inertia/cg-{axis}-in") for axis in "xyz"]
-        frame.aero_arm = _arm([read(f"metrics/aero-rp-{axis}-in") for axis in "xyz"], centre)
+        frame.aero_arm = _arm_about_center([read(f"metrics/aero-rp-{axis}-in") for axis in "xyz"], centre)
         for force in self._program.forces:
             base = f"external_reactions/{force.name}"
             direction = [read(f"{base}/{axis}") for axis in ("lmn" if force.is_moment else "xyz")]
             axes = [0.0] * 3 + direction + [0.0] * 3
             if not force.is_moment:
-                axes = direction + [0.0] * 3 + _arm([read(f"{base}/location-{axis}-in") for axis in "xyz"], centre)
+                axes = (
+                    direction
+                    + [0.0] * 3
+                    + _arm_about_center([read(f"{base}/location-{axis}-in") for axis in "xyz"], centre)
+                )
             numbers[force.axes : force.axes + len(axes)] = axes
         for block in self._program.actuators:
             numbers[block.first_register : block.first_register + LOWER_LIMIT] = _actuator_numbers(
@@ -182,14 +187,19 @@ class CompiledModel:
         initialise_attitude(self.frames, self._fdm.attitudes())
 
     def _copy_contacts(self, centre: Sequence[float]) -> None:
-        """Copy the contacts. Raises UnsupportedModel if one is on the ground, where its friction cannot be read."""
+        """Copy the contacts from JSBSim.
+
+        Raises UnsupportedModel if a contact is on the ground, because JSBSim does not state its friction.
+
+        centre: center of gravity in JSBSim's structural frame, inches.
+        """
         read, frame = self._fdm.properties.read, self.frames[0]
         frame.centre, frame.terrain = centre, self._fdm.terrain_amsl / FOOT
         for contact, data in zip(self.contacts, self._program.contacts, strict=True):
             if read(f"{data.base}/WOW"):
                 raise UnsupportedModel("a start on the ground")
             contact.place = [read(f"{data.base}/{axis}-position") for axis in "xyz"]
-            contact.arm = _arm(contact.place, centre)
+            contact.arm = _arm_about_center(contact.place, centre)
             for field in data._fields[1:]:
                 contact[field] = getattr(data, field)
         arms = np.linalg.norm(self.contacts["arm"], axis=1)
@@ -233,7 +243,7 @@ def _is_equal(a: float, b: float) -> bool:
 
 
 def _frame_properties() -> dict[str, int]:
-    """Return the register of each property of the frame."""
+    """Return the register of each JSBSim property that the frame holds, by name."""
     vector_registers = {
         name: frame_register(field, k) for field, names in _VECTOR_PROPERTIES.items() for k, name in enumerate(names)
     }
@@ -246,25 +256,29 @@ def _frame_properties() -> dict[str, int]:
 
 
 def _pack_code(program: ModelProgram, reads: Sequence[int], writes: Sequence[int], steps: int) -> Code:
-    """Return the code: its header, and its sections in order."""
+    """Return the code of a program: the header, followed by the sections in order.
+
+    reads, writes: registers that are read and written each tick.
+    steps: time steps in a tick.
+    """
     forces = [number for force in program.forces for number in (force.magnitude, force.axes)]
     sections = (program.fcs, program.aero, program.external, forces, reads, writes)
     bounds = accumulate(map(len, sections), initial=CODE_HEADER)
     return np.array([steps, *bounds, *(number for section in sections for number in section)], dtype=np.uint32)
 
 
-def _arm(position: Sequence[float], centre: Sequence[float]) -> list[float]:
-    """Return the arm from the center of gravity to a position, ft along the body's axes.
+def _arm_about_center(position: Sequence[float], centre: Sequence[float]) -> list[float]:
+    """Return the arm from the center of gravity to a position, ft, in body axes.
 
-    Both arguments are in JSBSim's inches and axes.
+    position, centre: the position and the center of gravity in JSBSim's structural frame, inches.
     """
     return [_INCH * (centre[0] - position[0]), _INCH * (position[1] - centre[1]), _INCH * (centre[2] - position[2])]
 
 
 def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz: float) -> tuple[Floats, Floats]:
-    """Return the inertia matrix and its inverse from the inertia properties of JSBSim.
+    """Return the inertia matrix and the inverse of this matrix, from JSBSim's inertia properties.
 
-    The sign of xz differs from the sign of the others, as in FGMassBalance.
+    The sign convention of xz differs from the other products of inertia, as in FGMassBalance.
     """
     ixz = -xz
     k1, k2, k3 = yy * zz - yz * yz, yz * ixz + xy * zz, xy * yz + yy * ixz
@@ -276,6 +290,12 @@ def _inertia_matrices(xx: float, yy: float, zz: float, xy: float, xz: float, yz:
 
 
 def _actuator_numbers(source: float, lag: float, rate: float, dt: float) -> list[float]:
-    """Return the memory and the factors of an actuator whose output equals its input, as in initial conditions."""
+    """Return the registers of an actuator up to `LOWER_LIMIT`, with its output equal to its input, as at the start.
+
+    source: input of the actuator.
+    lag: rate of the lag, 1/s; NaN without a lag.
+    rate: rate limit, 1/s.
+    dt: time step, s.
+    """
     divisor = 2.0 + dt * lag
     return [source, source, source, dt * lag / divisor, (2.0 - dt * lag) / divisor, dt * rate]

@@ -23,7 +23,9 @@ _FOCUS = SEMI_MAJOR * ECCENTRICITY_2
 def geodetic(position: Vector) -> tuple[float, float, float, float]:
     """Return geodetic latitude (rad), altitude (ft), and sine and cosine of the latitude of a position.
 
-    Computed by one iteration of Fukushima's method (Journal of Geodesy 79, 2006), whose variable names are used.
+    Computed by one iteration of Fukushima's method (Journal of Geodesy 79, 2006), with the paper's variable names.
+
+    position: position in axes fixed to the earth, ft.
     """
     x, y, z = position
     axis_distance = math.sqrt(x * x + y * y)

@@ -86,7 +86,7 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     """Return the tables of `aircraft.envelope.Envelope` by name, with a trim at each grid point.
 
     The trims are in still standard atmosphere, at 45 degrees latitude, on a course due north.
-    Raises FlightError for a model whose elevator or throttle moves nothing, because it has no trims.
+    Raises FlightError for a model whose elevator or throttle has no effect, because it has no trims.
     """
     fdm = Fdm(aircraft, motor_braking=motor_braking)
     _check_commands(fdm)
@@ -170,12 +170,12 @@ def _power(fdm: Fdm, trim: Trim) -> float:
 
 
 def _grid_airspeeds(aircraft: Aircraft) -> Floats:
-    """Return the airspeeds of the grid, from the stall to 5 m/s above guidance's maximum, (v,) m/s."""
+    """Return the airspeeds of the grid, m/s, (v,): from the stall to 5 m/s above the maximum of the guidance."""
     return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _AIRSPEED_COUNT)
 
 
 def _cache_key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
-    """Return the values on which the tables depend, and which a cache file must match."""
+    """Return the values on which the tables depend; a cache file must contain the same values."""
     return {
         "schema": _SCHEMA_VERSION,
         "aircraft": aircraft.name,

@@ -66,7 +66,7 @@ _MAX_PRINTED_BYTES = 2**20
 
 @contextmanager
 def silence() -> Iterator[Callable[[], str]]:
-    """Keep standard output off the terminal: JSBSim prints its banner at every debug level.
+    """Suppress standard output, because JSBSim prints its banner at every debug level.
 
     JSBSim's C++ side writes to file descriptor 1, its Python side to ``sys.stdout``. Yield a function that returns the
     output of both.
@@ -411,7 +411,7 @@ class Fdm:
         )
 
     def _release_motion(self) -> None:
-        """Release the motion from the initial conditions."""
+        """Start the motion at time 0 from the initial conditions that are set."""
         if self._engine:
             self._engine.release()
         self._exec.set_trim_status(False)
@@ -471,7 +471,7 @@ class Fdm:
         return model if self._gear is None else with_contacts(model, self.aircraft, self._gear)
 
     def attitudes(self) -> Floats:
-        """Return roll, pitch and yaw (n, 3), rad, of all evaluations of initial conditions, in order."""
+        """Return roll, pitch and yaw of all n evaluations of initial conditions in order, rad, (n, 3)."""
         return np.array(self._attitudes).reshape(-1, 3)
 
     def specific_force(self) -> tuple[float, float, float]:
@@ -481,7 +481,7 @@ class Fdm:
         return x() * factor, y() * factor, z() * factor
 
     def height(self) -> float:
-        """Return the height above the ground that was set last, m; negative below ground, where JSBSim flies on."""
+        """Return the height above the ground altitude that was set last, m; negative below ground."""
         return self._read_height() * FOOT
 
     # Functions for trims and linearization.
@@ -491,7 +491,7 @@ class Fdm:
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
     def first_guess(self) -> Floats:
-        """Return a trim vector (8,) as the initial guess: level at cruise."""
+        """Return the initial guess of a trim vector, (8,): level flight at cruise."""
         return first_guess(self.aircraft.airspeed)
 
     def move_to(self, amsl: float) -> None:
@@ -530,7 +530,7 @@ class Fdm:
         commands: Iterable[float],
         settle: bool = False,
     ) -> Floats:
-        """Set JSBSim's initial conditions, and return the eight rates of `RATES` there, SI and radians.
+        """Set JSBSim's initial conditions, and return the eight rates of `RATES` at this state, SI and radians.
 
         angles: roll, pitch, yaw, rad.
         velocity: (3,) north, east, down over the ground, m/s.

@@ -1,4 +1,4 @@
-"""Compute the forces of ground contact as JSBSim does: springs and dampers, and friction by a projected Gauss-Seidel.
+"""Compute the forces of ground contact as JSBSim does: springs, dampers, and friction by projected Gauss-Seidel.
 
 The ground is level at the altitude of the frame's terrain (FGDefaultGroundCallback). Contacts are points of the
 structure, or wheels that neither steer nor brake (FGLGear). Friction is solved for all contacts together so that it
@@ -32,7 +32,7 @@ MAX_CONTACTS = 16
 # A contact, its memory and its friction.
 CONTACT = record_dtype(
     ("arm", np.float64, (3,)),  # ft, along the body's axes from the center of gravity
-    ("place", np.float64, (3,)),  # in, in the structure's axes
+    ("place", np.float64, (3,)),  # in, position in JSBSim's structural frame
     "spring",  # lbf/ft
     "damping",  # lbf s/ft
     "static_friction",
@@ -77,9 +77,10 @@ _DEGREES = 180.0 / math.pi
 
 @inner
 def contact_forces(frame: Record, contacts: Records, frictions: Records) -> tuple[Vector, Vector, int]:
-    """Return the force of all contacts along the body's axes, its moment, and the number of friction records to solve.
+    """Return the total force (lbf) and moment (lbf ft) of all contacts, and the number of friction records to solve.
 
-    The friction records of contacts below the ground are filled.
+    Force and moment are in body axes and exclude friction, for which `friction_accelerations` solves.  The friction
+    records of contacts below the ground are filled.
     """
     force, moment, count = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0
     if frame.geodetic_altitude - frame.terrain > frame.contact_reach:
@@ -121,9 +122,11 @@ def _contact_force(
     contact_index: int,
     friction_count: int,
 ) -> tuple[Vector, Vector, int]:
-    """Return the force of a contact below the ground, its moment, and the new number of friction records.
+    """Return the force (lbf) and moment (lbf ft) of a contact below the ground, and the new number of friction records.
 
-    height_above_ground: ft, negative.
+    Force and moment are in body axes and exclude friction.  Also update the compression in the contact's memory.
+
+    height_above_ground: height of the uncompressed contact, ft, negative.
     normal: normal of the ground, in axes fixed to the earth.
     """
     upward = transform(matrix_of(frame.earth_to_body), normal)
@@ -169,10 +172,15 @@ def _contact_force(
 
 @inlined
 def _moment_arm(frame: Record, contact: Record, displacement: Vector) -> Vector:
-    """Return the arm of a contact, computed from its position in the structure so that it rounds as in JSBSim."""
-    position, centre, inches = contact.place, frame.centre, 1.0 / _INCH
-    x, y = position[0] + -inches * displacement[0], position[1] + inches * displacement[1]
-    z = position[2] + -inches * displacement[2]
+    """Return the moment arm of a contact about the center of gravity, ft, in body axes.
+
+    It is computed in JSBSim's structural frame (inches), to reproduce JSBSim's rounding.
+
+    displacement: displacement of the contact by its compression, ft, in body axes.
+    """
+    position, centre, inches_per_foot = contact.place, frame.centre, 1.0 / _INCH
+    x, y = position[0] + -inches_per_foot * displacement[0], position[1] + inches_per_foot * displacement[1]
+    z = position[2] + -inches_per_foot * displacement[2]
     return _INCH * (centre[0] - x), _INCH * (y - centre[1]), _INCH * (centre[2] - z)
 
 
@@ -189,10 +197,11 @@ def _add_frictions(
 ) -> int:
     """Append the friction records of a contact, and return the new number of friction records.
 
-    A sliding contact of the structure has friction against its motion; any other contact has friction along and across
-    its longitudinal direction.
+    A sliding contact that is not a wheel has friction against its motion; any other contact has friction in the
+    longitudinal and in the lateral direction.
 
-    ground_velocity: velocity along the axes of the ground, ft/s.
+    axes: longitudinal, lateral and upward axis of the ground, as columns in body axes.
+    ground_velocity: velocity of the contact along these axes, ft/s.
     """
     ground_speed = math.sqrt(ground_velocity[0] * ground_velocity[0] + ground_velocity[1] * ground_velocity[1])
     is_sliding = ground_speed > _MIN_SLIDING_SPEED
@@ -238,7 +247,7 @@ def _set_friction(
     min_force: float,
     max_force: float,
 ) -> None:
-    """Fill a friction record, and limit the contact's last friction force to its range."""
+    """Fill a friction record, and limit the contact's last friction force to the record's range."""
     friction.contact, friction.kind, friction.min_force, friction.max_force = contact_index, kind, min_force, max_force
     set_vector(friction.direction, direction)
     set_vector(friction.arm, arm)
@@ -247,7 +256,7 @@ def _set_friction(
 
 @inlined
 def _limit(lower: float, value: float, upper: float) -> float:
-    """Return a value within limits."""
+    """Return the value, limited to the range from lower to upper."""
     if value < lower:
         return lower
     return upper if value > upper else value
@@ -257,9 +266,9 @@ def _limit(lower: float, value: float, upper: float) -> float:
 def friction_accelerations(
     frame: Record, contacts: Records, frictions: Records, count: int, acceleration: Vector, angular_acceleration: Vector
 ) -> tuple[Vector, Vector]:
-    """Return the linear and angular accelerations by friction, in the body's axes.
+    """Return the linear (ft/s^2) and angular (rad/s^2) accelerations that friction causes, in body axes.
 
-    count: number of frictions.
+    count: number of friction records.
     acceleration, angular_acceleration: accelerations without friction, relative to the earth.
     """
     inverse_mass, inverse_inertia = 1.0 / frame.mass, matrix_of(frame.inverse_inertia)
@@ -299,7 +308,7 @@ def friction_accelerations(
 
 @inner
 def _solve_frictions(contacts: Records, frictions: Records, count: int) -> None:
-    """Solve for the friction forces by the Gauss-Seidel method, each within its limits."""
+    """Solve for the friction forces in the contacts' memory by the Gauss-Seidel method, each within its limits."""
     for _ in range(_MAX_ITERATIONS):
         total_change = 0.0
         for i in range(count):

@@ -60,9 +60,9 @@ HEADER = 3
 
 @inner
 def run_instructions(numbers: Floats, code: Code, start: int, end: int) -> None:
-    """Run the instructions in code[start:end].
+    """Run the instructions in ``code[start:end]``.
 
-    numbers: registers.
+    numbers: registers, which are read and changed.
     """
     position = start
     while position < end:
@@ -107,7 +107,7 @@ def run_instructions(numbers: Floats, code: Code, start: int, end: int) -> None:
 
 @inlined
 def _apply_function(operation: int, value: float) -> float:
-    """Apply a function of one number."""
+    """Return the result of a function of one number: ABS, SQRT, SIN or COS."""
     if operation == Operation.ABS:
         return abs(value)
     if operation == Operation.SQRT:
@@ -117,7 +117,7 @@ def _apply_function(operation: int, value: float) -> float:
 
 @inlined
 def _clip(value: float, lower: float, upper: float) -> float:
-    """Return a value within limits."""
+    """Return the value, limited to the range from lower to upper."""
     if value < lower:
         return lower
     return upper if value > upper else value
@@ -125,7 +125,10 @@ def _clip(value: float, lower: float, upper: float) -> float:
 
 @inlined
 def _interpolate_table(numbers: Floats, first: int, row_count: int, key: float) -> float:
-    """Interpolate a table linearly; beyond its ends, return the value of the first or last row."""
+    """Interpolate a table linearly at a key; beyond the ends of the table return the value of the first or last row.
+
+    first: first register of the table, whose rows are pairs of key and value.
+    """
     last_row = first + 2 * (row_count - 1)
     if key <= numbers[first]:
         return numbers[first + 1]
@@ -145,9 +148,12 @@ def _interpolate_table(numbers: Floats, first: int, row_count: int, key: float) 
 
 @inlined
 def _step_actuator(numbers: Floats, first: int, value: float) -> float:
-    """Advance an actuator by a step, and return its output after lag, rate limit and limits.
+    """Advance an actuator by a time step, and return the output after lag, rate limit and position limits.
 
-    The limits do not change its memory.
+    The position limits do not change the stored state.
+
+    first: first register of the actuator.
+    value: input.
     """
     factor = numbers[first + INPUT_FACTOR]
     if not math.isnan(factor):

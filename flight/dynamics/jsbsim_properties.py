@@ -133,7 +133,7 @@ class PropertyAccess:
         return self.getter(name)()
 
     def set(self, name: str, value: float) -> None:
-        """Set a property once."""
+        """Set a property.  Raises FlightError if it is undefined."""
         self.setter(name)(value)
 
     def set_optional(self, name: str, value: float, default: float) -> None:

@@ -77,7 +77,7 @@ class _Reader:
             raise FlightError(f"{self.file}: not well-formed XML: {error}", file=self.file) from None
 
     def without_channels(self) -> bytes:
-        """Return the file's bytes with blanks for the channels, so that lines keep their numbers."""
+        """Return the file's bytes with channels replaced by blanks, so that line numbers do not change."""
         data = bytearray(self.data)
         for start, end in self._spans:
             data[start:end] = bytes(byte if byte == 10 else 32 for byte in data[start:end])
@@ -187,7 +187,7 @@ def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
 
 
 def _find_file(name: str, folders: Sequence[Path]) -> Path | None:
-    """Return the file of this name, with or without its suffix, if it is inside the folders."""
+    """Return the path of a file in one of the folders, or None; the name may omit the suffix ".xml"."""
     if Path(name).name != name or name.startswith("."):
         return None
     file_names = (name, f"{name}.xml")
@@ -236,7 +236,7 @@ except FlightError:
 
 
 def try_model(aircraft: Aircraft) -> None:
-    """Load and step a model in another process, once for each version of the model.
+    """Load and step a user's model in another process, once for each version of the model.
 
     Raises FlightError if that process dies. If it only refuses the model, nothing is raised, because loading the model
     in this process will refuse it again, with the reason.
@@ -285,7 +285,7 @@ _MAX_REASON_LINES = 4
 
 
 def jsbsim_reason(printed: str) -> str:
-    r"""Return in one line why JSBSim does not load a model, from its output; "" if it states no reason.
+    r"""Return, in one line, the reason that JSBSim printed for not loading a model; "" if it printed none.
 
     >>> jsbsim_reason("JSBSim startup beginning ...\n\nIn file /tmp/a/m.xml: line 91\n Unknown engine type\n")
     'In file m.xml: line 91 Unknown engine type'

@@ -142,9 +142,9 @@ def frame_register(name: str, element: int = 0) -> int:
 
 @lru_cache(maxsize=8)
 def translate(model: bytes) -> ModelProgram:
-    """Translate the XML of a model that JSBSim accepts.
+    """Translate the XML of a JSBSim model to a program.
 
-    Raises UnsupportedModel with the reason if the model is not supported.
+    The model must be one that JSBSim accepts.  Raises UnsupportedModel with the reason if the model is not supported.
     """
     try:
         root = ElementTree.fromstring(model)
@@ -202,7 +202,7 @@ class _Translator:
         return ModelProgram(numbers, fcs, aero, external, self.properties, actuators, forces, tuple(self.contacts))
 
     def _instructions(self, translate_section: Callable[[Element], None], section: Element) -> tuple[int, ...]:
-        """Return the instructions of a section."""
+        """Translate a section, and return its instructions."""
         self._code = []
         translate_section(section)
         return tuple(self._code)
@@ -221,13 +221,13 @@ class _Translator:
                     self._property(element.attrib["name"])
 
     def _property(self, name: str) -> int:
-        """Return the register of a property, a new one for a new property."""
+        """Return the register of a property; for a new property, assign a new register."""
         if name not in self.properties:
             self.properties[name] = self._new_register(0.0)
         return self.properties[name]
 
     def _new_register(self, *values: float) -> int:
-        """Append registers with these values, and return the first of them."""
+        """Append registers with these values, and return the index of the first new register."""
         self.numbers += values
         return len(self.numbers) - len(values)
 
@@ -239,7 +239,7 @@ class _Translator:
         return self._constants[key]
 
     def _emit(self, operation: Operation, operands: Sequence[int], target: int | None = None) -> int:
-        """Append an instruction, and return its target register, a new one if ``target`` is None."""
+        """Append an instruction, and return its target register; with ``target`` None, use a new register."""
         target = self._new_register(0.0) if target is None else target
         self._code += [operation, target, len(operands), *operands]
         return target
@@ -247,7 +247,7 @@ class _Translator:
     # Functions.
 
     def _translate_value(self, element: Element, target: int | None = None) -> int:
-        """Translate an operand or operation, and return the register of its value, ``target`` if it is not None."""
+        """Translate an operand or operation, and return the register of its value, which is ``target`` unless None."""
         tag = element.tag
         if tag in ("p", "property", "v", "value"):
             _check_element(element)
@@ -294,7 +294,10 @@ class _Translator:
         )
 
     def _translate_function(self, element: Element, *, may_have_name: bool = True, target: int | None = None) -> int:
-        """Translate a function, and return the register of its value."""
+        """Translate a function, and return the register of its value.
+
+        may_have_name: True if the function may name a property, which then is the target.
+        """
         _check_element(element, attributes={"name"} if may_have_name else (), children=_VALUES)
         if name := element.get("name"):
             target = self._property(name)
@@ -306,6 +309,7 @@ class _Translator:
     # Flight controls.
 
     def _translate_flight_control(self, section: Element) -> None:
+        """Translate the components of all channels, in order."""
         _check_element(section, attributes={"name"}, children={"channel", *_DECLARATIONS})
         for channel in section.findall("channel"):
             _check_element(channel, attributes={"name"}, children={*_COMPONENTS, *_DECLARATIONS})
@@ -316,6 +320,7 @@ class _Translator:
                     self._translate_fcs_function(component)
 
     def _translate_actuator(self, element: Element) -> None:
+        """Translate an actuator with one input, and optionally a lag, a rate limit and position limits."""
         _check_element(element, attributes={"name"}, children={"input", "lag", "rate_limit", "clipto", "description"})
         inputs = [self._read_property(_element_text(child)) for child in element.findall("input")]
         if len(inputs) != 1:
@@ -335,6 +340,7 @@ class _Translator:
         self._emit(Operation.ACTUATOR, [inputs[0], first_register], self._property(_component_property(element)))
 
     def _translate_fcs_function(self, element: Element) -> None:
+        """Translate a function of the flight controls, and optionally its limits."""
         _check_element(element, attributes={"name"}, children={"function", "clipto", "description"})
         functions, limits = element.findall("function"), _clip_limits(element)
         if len(functions) != 1:
@@ -349,6 +355,7 @@ class _Translator:
     # Forces.
 
     def _translate_aerodynamics(self, section: Element) -> None:
+        """Translate the functions, and for each axis the sum of its functions."""
         _check_element(section, children={"function", "axis", *_DECLARATIONS})
         for function in section.findall("function"):
             self._translate_function(function)
@@ -371,6 +378,7 @@ class _Translator:
             self._emit(Operation.SUM, values or [self._constant(0.0)], frame_register(vector, element))
 
     def _translate_external_reactions(self, section: Element) -> None:
+        """Translate the functions, and the magnitudes of the external forces and moments."""
         _check_element(section, children={"function", "force", "moment", *_DECLARATIONS})
         for element in section.findall("function"):
             self._translate_function(element)
@@ -431,7 +439,7 @@ _VALUES = {"p", "property", "v", "value", "table", "description", *_OPERATIONS}
 
 
 def _check_element(element: Element, *, attributes: Iterable[str] = (), children: Iterable[str] = ()) -> None:
-    """Raise UnsupportedModel if an element has other attributes or children than these."""
+    """Raise UnsupportedModel if an element has an attribute or a child other than the given ones."""
     for name in element.attrib:
         if name not in attributes:
             raise UnsupportedModel(f"<{element.tag} {name}=...>")
@@ -459,7 +467,7 @@ def _parse_number(element: Element, text: str) -> float:
 
 
 def _clip_limits(element: Element) -> tuple[float, float] | None:
-    """Return the limits of a component, or None if it has none."""
+    """Return the lower and upper limit of a component, or None if it has no limits."""
     clip = element.find("clipto")
     if clip is None:
         return None
@@ -471,6 +479,6 @@ def _clip_limits(element: Element) -> tuple[float, float] | None:
 
 
 def _component_property(element: Element) -> str:
-    """Return the property of a component's output."""
+    """Return the name of the property that holds the output of a component."""
     name = element.get("name", "")
     return name if "/" in name else "fcs/" + name.lower().replace(" ", "-")

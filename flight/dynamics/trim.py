@@ -98,10 +98,10 @@ class Engine:
 
 
 def settle_step(steps: Sequence[float], previous_change: Sequence[float], change: Sequence[float]) -> float:
-    """Return the next time step: the time constant of the quantities in Euler's method, s, within limits.
+    """Return the next time step, s: the estimated time constant of the settling rates, within limits.
 
-    steps: the last two steps, s.
-    previous_change, change: changes of the quantities in these steps.
+    steps: the last two time steps, s.
+    previous_change, change: changes of the rates in the last step but one and in the last step.
 
     A change that falls to 0.9 in equal steps of 0.2 s has a time constant of 2 s, which is limited to 4 times 0.2 s; an
     oscillation, with -3 times the previous change, has a time constant of 0.05 s.
@@ -140,7 +140,7 @@ _MAX_STALLED_STEPS = 10
 
 
 def first_guess(airspeed: float) -> Floats:
-    """Return a trim vector (8,) near level flight at an airspeed (m/s)."""
+    """Return a trim vector near level flight at an airspeed (m/s), (8,)."""
     return np.array([airspeed, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
 
 
@@ -200,7 +200,7 @@ def solve_trim(
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
-    """Find the trim vector (8,) with two quantities fixed, or None if the iteration does not converge.
+    """Find a trim vector with two quantities fixed, (8,); return None if the iteration does not converge.
 
     balance: function from a trim vector to its accelerations, (6,).
     fixed_values: values of the fixed quantities.
@@ -252,7 +252,7 @@ def solve_trim(
 
 
 def _trim_bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
-    """Return the lower and upper bounds of a trim vector, (8,) each.
+    """Return the lower and the upper bounds of a trim vector, each (8,).
 
     limits: elevator, aileron and rudder limits, rad.
     """
@@ -276,7 +276,7 @@ def trim(
 
 
 def from_vector(values: Floats, amsl: float) -> Trim:
-    """Return the trim of a vector (8,), in the order of `QUANTITIES`."""
+    """Return the trim at an altitude (m) from a trim vector, whose elements are in the order of `QUANTITIES`."""
     airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = (float(value) for value in values)
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
 
@@ -284,7 +284,7 @@ def from_vector(values: Floats, amsl: float) -> Trim:
 def steady_flight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
-    """Return the steady flight at an airspeed (m/s), altitude (m) and climb angle (rad), or None.
+    """Return the steady flight at an airspeed (m/s), altitude (m) and climb angle (rad), or None if no trim is found.
 
     The climb angle is relative to the air mass.
 
@@ -306,12 +306,12 @@ def steady_flight(
 
 
 def full_throttle_climb(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steepest steady climb at an airspeed (m/s) and altitude (m), or None."""
+    """Return the steady climb at full throttle at an airspeed (m/s) and altitude (m), or None if none is found."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
 
 
 def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steepest steady descent, with closed throttle, at an airspeed (m/s) and altitude (m), or None."""
+    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m), or None."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
@@ -365,9 +365,11 @@ def attitude(trim_point: Trim) -> tuple[float, float]:
 
 
 def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats:
-    """Return the rotation (3, 3) from body to north-east-down axes without sideslip.
+    """Return the rotation matrix from body to north-east-down axes in flight without sideslip, (3, 3).
 
-    heading, climb: direction of the velocity, rad.
+    heading, climb: direction of the velocity relative to the air, rad.
+    bank: rotation about the velocity, rad.
+    alpha: angle of attack, rad.
     """
     # Without NumPy, whose sines on processors with AVX-512 differ in the last digit from other machines.
     ch, sh, cc, sc = math.cos(heading), math.sin(heading), math.cos(climb), math.sin(climb)
@@ -398,11 +400,11 @@ def euler(axes: Floats) -> tuple[float, float, float]:
 
 
 def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> Floats:
-    """Return the air-relative velocity, (3,) north, east, down, of a path over the ground in a wind.
+    """Return the velocity relative to the air that flies a path over the ground: north, east and down, m/s, (3,).
 
-    course, climb: course and slope of the path, rad.
+    course, climb: course and slope angle of the path, rad.
     airspeed: m/s.
-    wind: (3,) m/s, direction of air motion.
+    wind: velocity of the air, north, east and down, m/s, (3,).
 
     Raises FlightError if the airspeed cannot overcome the wind along the path.
     """

@@ -35,13 +35,13 @@ def matrix_of(field: Floats) -> Matrix:
 
 @inlined
 def set_vector(field: Floats, vector: Vector) -> None:
-    """Set a field (3,) of a record."""
+    """Set a field (3,) of a record to a vector."""
     field[0], field[1], field[2] = vector[0], vector[1], vector[2]
 
 
 @inlined
 def set_matrix(field: Floats, matrix: Matrix) -> None:
-    """Set a field (3, 3) of a record."""
+    """Set a field (3, 3) of a record to a matrix."""
     set_vector(field[0], matrix[0])
     set_vector(field[1], matrix[1])
     set_vector(field[2], matrix[2])
@@ -83,7 +83,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 @inlined
 def unit(v: Vector) -> Vector:
-    """Return a vector scaled to length 1; a zero vector stays."""
+    """Return a vector scaled to length 1; a zero vector is returned unchanged."""
     length = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
     if length == 0.0:
         return v
@@ -98,7 +98,7 @@ def transform(m: Matrix, v: Vector) -> Vector:
 
 @inlined
 def transform_back(m: Matrix, v: Vector) -> Vector:
-    """Return the product of a transposed matrix and a vector."""
+    """Return the product of the transpose of a matrix and a vector."""
     x, y, z = m
     return (
         x[0] * v[0] + y[0] * v[1] + z[0] * v[2],
@@ -115,13 +115,13 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 @inlined
 def product_back(a: Matrix, b: Matrix) -> Matrix:
-    """Return the product of a matrix and a transposed one."""
+    """Return the product of a matrix and the transpose of another matrix."""
     return transform(b, a[0]), transform(b, a[1]), transform(b, a[2])
 
 
 @inlined
 def rotation(cos: float, sin: float) -> Matrix:
-    """Return the matrix that transforms into axes rotated about the third axis, from the angle's cosine and sine."""
+    """Return the matrix that transforms vectors into axes rotated about the third axis, from the cosine and sine."""
     return (cos, sin, 0.0), (-sin, cos, 0.0), (0.0, 0.0, 1.0)
 
 
@@ -160,7 +160,7 @@ def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 @inlined
 def quaternion_rate(q: Quaternion, rates: Vector) -> Quaternion:
-    """Return the time derivative of the quaternion of a body that rotates at these rates about its axes."""
+    """Return the time derivative of the attitude quaternion of a body with given rates about its axes, rad/s."""
     w, (x, y, z) = q
     roll, pitch, yaw = rates
     return (
@@ -175,7 +175,7 @@ def quaternion_rate(q: Quaternion, rates: Vector) -> Quaternion:
 
 @inlined
 def matrix_of_quaternion(q: Quaternion) -> Matrix:
-    """Return the matrix that transforms into the axes of a body with this attitude."""
+    """Return the matrix that transforms vectors into the axes of a body, from the body's attitude quaternion."""
     w, (x, y, z) = q
     ww, xx, yy, zz = w * w, x * x, y * y, z * z
     wx, wy, wz = w * x, w * y, w * z
@@ -208,9 +208,9 @@ def quaternion_of_matrix(m: Matrix) -> Quaternion:
 
 @inlined
 def euler_angles(m: Matrix) -> Vector:
-    """Return roll, pitch and yaw (0 to 2 pi), rad, from the matrix that transforms into the axes of a body.
+    """Return roll, pitch and yaw of a body, rad, from the matrix that transforms vectors into the body's axes.
 
-    With the nose straight up or down, yaw is 0.
+    Yaw is 0 to 2 pi; with the nose straight up or down it is 0.
     """
     (xx, xy, xz), (_, yy, yz), (_, zy, zz) = m
     if abs(xz) >= 1.0:
@@ -223,7 +223,7 @@ def euler_angles(m: Matrix) -> Vector:
 
 @inlined
 def quaternion_of_angles(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Return the quaternion of Euler angles, rad."""
+    """Return the quaternion of an attitude given by Euler angles, rad."""
     sin_roll, sin_pitch, sin_yaw = math.sin(0.5 * roll), math.sin(0.5 * pitch), math.sin(0.5 * yaw)
     cos_roll, cos_pitch, cos_yaw = math.cos(0.5 * roll), math.cos(0.5 * pitch), math.cos(0.5 * yaw)
     return unit_quaternion(

@@ -12,7 +12,7 @@ _MAX_ALTITUDE_M = 11_000.0
 
 @compiled
 def true_by_equivalent(amsl: float) -> float:
-    """Return the ratio of true to equivalent airspeed in the standard atmosphere at an altitude, m.
+    """Return the ratio of true to equivalent airspeed in the standard atmosphere at an altitude (m AMSL).
 
     The ratio is 1.05 at 1,000 m.
     """

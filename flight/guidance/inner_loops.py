@@ -64,10 +64,10 @@ GUIDANCE_MEMORY = record_dtype(
 def steer_elevator(
     state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, acceleration: float
 ) -> None:
-    """Set the elevator for an upward acceleration, from the load factor and the angle of attack.
+    """Set the elevator for an upward acceleration: feed-forward of the angle of attack, and damping of the pitch rate.
 
     climb_rate: m/s.
-    acceleration: m/s^2, positive upwards.
+    acceleration: demanded acceleration, m/s^2, positive upwards.
     """
     airspeed = max(8.0, state.airspeed)
     # Lift responds more slowly than roll: use the bank predicted by the lead.
@@ -94,15 +94,15 @@ def steer_elevator(
 def step_roll_model(
     bank_demand: float, bank: float, roll_rate: float, gains: Record, dt: float
 ) -> tuple[float, float, float]:
-    """Advance the model roll by one tick, and return bank (rad), roll rate and roll acceleration.
+    """Advance the model roll by one tick; return bank (rad), roll rate (rad/s) and roll acceleration (rad/s^2).
 
     The model is a critically damped oscillator with limits of roll rate and roll acceleration.
     """
     frequency = gains.roll_frequency
-    limit = gains.roll_acceleration_max
-    roll_acceleration = min(limit, max(-limit, frequency * (frequency * (bank_demand - bank) - 2.0 * roll_rate)))
-    limit = gains.roll_rate_max
-    roll_acceleration = min((limit - roll_rate) / dt, max((-limit - roll_rate) / dt, roll_acceleration))
+    acceleration_max, rate_max = gains.roll_acceleration_max, gains.roll_rate_max
+    roll_acceleration = frequency * (frequency * (bank_demand - bank) - 2.0 * roll_rate)
+    roll_acceleration = min(acceleration_max, max(-acceleration_max, roll_acceleration))
+    roll_acceleration = min((rate_max - roll_rate) / dt, max((-rate_max - roll_rate) / dt, roll_acceleration))
     roll_rate += roll_acceleration * dt
     return bank + roll_rate * dt, roll_rate, roll_acceleration
 
@@ -118,11 +118,9 @@ def follow_roll(
     roll_acceleration: float,
     dt: float,
 ) -> None:
-    """Set aileron and rudder so that the aircraft follows a roll.
+    """Set aileron and rudder so that the aircraft follows a model roll.
 
-    bank: rad.
-    roll_rate: rad/s.
-    roll_acceleration: rad/s^2.
+    bank, roll_rate, roll_acceleration: model roll at this tick, rad, rad/s and rad/s^2.
 
     The aileron command is the deflection for this roll, plus feedback of the remaining error, plus compensation of
     gusts and propeller torque, which are estimated from the roll that the ailerons do not explain.

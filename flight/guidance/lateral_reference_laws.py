@@ -48,9 +48,9 @@ WAYPOINT = record_dtype(
 
 
 def waypoint_column(count: int) -> Records:
-    """Return `WAYPOINT` records (count,), all 0, with the memory stride of a flight's path.
+    """Return ``count`` records of `WAYPOINT`, all 0, with the same memory stride as in the path of a flight.
 
-    Numba treats contiguous records as another type, and would compile every control law a second time for them.
+    They are not contiguous: for contiguous records Numba would compile every control law a second time.
 
     >>> waypoint_column(3).shape, waypoint_column(3).flags.c_contiguous
     ((3,), False)
@@ -83,14 +83,15 @@ def l1_length(speed: float, period: float, damping: float) -> float:
 def l1_angles(
     motion: Record, a_east: float, a_north: float, b_east: float, b_north: float, l1_distance: float
 ) -> tuple[float, float]:
-    """Return the angles Nu2 and Nu1 of AP_L1_Control, rad, each with the opposite sign.
+    """Return the angles -Nu2 and -Nu1 of AP_L1_Control, rad.
 
     The first is the angle from the leg, or from the direction to a waypoint, to the ground velocity. The second is the
     angle between the leg and the direction to the L1 point, without the integrator. It is NaN while L1 aims straight at
     a waypoint: far before the leg's start, or past the leg's end.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
-    a_east, a_north, b_east, b_north: the leg's ends, m.
+    a_east, a_north: start of the leg, m.
+    b_east, b_north: end of the leg, m.
     """
     leg_east, leg_north = b_east - a_east, b_north - a_north
     leg_length = max(1e-6, math.hypot(leg_east, leg_north))
@@ -112,8 +113,8 @@ def l1_angles(
 def l1_integrate(aim_angle: float, integrator: float, gain: float, dt: float) -> float:
     """Return the cross-track integrator (`_L1_xtrack_i` of AP_L1_Control) after a tick, rad.
 
-    aim_angle: angle between the leg and the direction to the L1 point, rad, NaN without a leg; the integrator changes
-        only while it is below 5 degrees.
+    aim_angle: angle between the leg and the direction to the L1 point, rad, NaN while L1 aims at a waypoint.  The
+        integrator changes only while the magnitude of this angle is below 5 degrees.
     gain: NAVL1_XTRACK_I.
     """
     if math.isnan(aim_angle) or abs(aim_angle) >= _INTEGRATION_LIMIT_RAD:
@@ -133,10 +134,12 @@ def l1_acceleration(angle: float, speed: float, l1_distance: float, damping: flo
 
 @inner
 def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, radius: float) -> bool:
-    """Return True if the aircraft is within the turn distance of waypoint b, or past the line across the leg there.
+    """Return True if the aircraft is within the turn distance of waypoint b, or past the line across the leg at b.
+
+    A fly-over waypoint is reached only past this line.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
-    a, b: the leg's ends, of `WAYPOINT`.
+    a, b: start and end of the leg, records of `WAYPOINT`.
     radius: turn distance for a turn of 90 degrees, m; smaller turns start later.
     """
     leg_east, leg_north = b.east - a.east, b.north - a.north
@@ -151,9 +154,9 @@ def has_l1_reached(motion: Record, a: Record, b: Record, l1_distance: float, rad
 def field_course(
     course: float, cross_track: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
 ) -> float:
-    """Return the course that the vector field commands at a distance from a path, rad.
+    """Return the course that the vector field commands at a cross-track distance from a path, rad.
 
-    course: course of the path here, rad.
+    course: course of the path at the nearest point, rad.
     cross_track: distance to the right of the path, m.
     curvature: curvature of the path, 1/m, positive to the right; 0 for a line.
     approach: angle of approach to a line from far away, rad.

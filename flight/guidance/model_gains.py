@@ -75,7 +75,7 @@ _FIXED_GAINS = {
 
 
 def gains_at_airspeed(airspeed: float) -> dict[str, float]:
-    """Return `TYPICAL_GAINS` scaled to an airspeed, m/s.
+    """Return `TYPICAL_GAINS` scaled from 25 m/s to another airspeed (m/s).
 
     The gains of control surfaces stay unchanged, because they are scaled with airspeed elsewhere.
     """
@@ -88,7 +88,7 @@ def gains_at_airspeed(airspeed: float) -> dict[str, float]:
 
 
 def airframe_gains(aircraft: Aircraft, fdm: Fdm | None = None) -> dict[str, float]:
-    """Return the gains of the airframe, from its linear model in level cruise.
+    """Return the gains that follow from the airframe's linear model in level cruise.
 
     Raises FlightError if the aircraft cannot hold level flight at cruise.
     """
@@ -127,7 +127,7 @@ def _gains_from_matrices(aircraft: Aircraft, a: Floats, b: Floats) -> dict[str, 
 
 
 def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
-    """Return the throttle (0..1) below which an electric motor draws no current, and gives no thrust, in level flight.
+    """Return the throttle (0..1) in level flight below which an electric motor draws no current and gives no thrust.
 
     The throttle is found in steps of 0.02. The result is 0 for an aircraft without an electric motor.
     """
@@ -223,7 +223,7 @@ _UNIT_SUFFIXES = {
 
 
 def gains_text(gains: Gains) -> str:
-    """Return the text of a ``gains.toml``, without gains at their default values."""
+    """Return gains as the text of a ``gains.toml``; gains at their default values are omitted."""
     defaults = {gain.name: gain.default for gain in fields(Gains)}
     lines = [
         "# Gains of the guidance and inner loops; flight/guidance/gains.py says what each means.",

@@ -23,7 +23,11 @@ NAVIGATION_LAGS = record_dtype(("first", np.float64, (3,)), ("second", np.float6
 
 
 def start_navigation(noise: Floats, lags: Record) -> None:
-    """Set the lags, a record of `NAVIGATION_LAGS`, to a stationary state from (6,) unit normals."""
+    """Initialise the navigation error, so that its statistics do not change over the flight.
+
+    noise: random numbers from the standard normal distribution, (6,).
+    lags: a record of `NAVIGATION_LAGS`, which is set.
+    """
     lags.first = noise[:3]
     # See `flight.simulation.turbulence.start_gusts`.
     lags.second = 0.5 * noise[:3] + 0.5 * noise[3:]
@@ -43,7 +47,7 @@ def estimate_motion(
 
     true_motion, estimated_motion: records of `MOTION`.
     lags: a record of `NAVIGATION_LAGS`.
-    noise: (3,) unit normals.
+    noise: random numbers from the standard normal distribution, (3,).
     sigma: standard deviation of the position error on each axis, m; 0 for no error.
     time_constant: correlation time of the error, s.
     """
@@ -66,7 +70,7 @@ def estimate_motion(
 def _step_error(
     lags: Record, axis: int, noise: Floats, sigma: float, time_constant: float, dt: float
 ) -> tuple[float, float]:
-    """Advance the error of one axis by a tick, and return the errors of position (m) and velocity (m/s)."""
+    """Advance the error of one axis by a tick; return the errors of position (m) and velocity (m/s)."""
     decay = math.exp(-dt / time_constant)
     # The second lag's variance is half of the first lag's variance.
     scale = sigma * math.sqrt(2.0)

@@ -53,9 +53,10 @@ NODE = record_dtype(
 
 @inner
 def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:
-    """Project a position onto a piece: distance along it (m), cross-track error (m) and course there (rad).
+    """Project a position onto a piece of the path; return distance, cross-track error and course of the path.
 
-    The cross-track error is positive to the right.
+    The distance along the piece is in m; it may lie before the start (negative) or beyond the end.  The cross-track
+    error is in m, positive to the right.  The course of the path at the projected point is in rad.
     """
     course, curvature = piece.course, piece.curvature
     offset_east, offset_north = east - piece.east, north - piece.north
@@ -82,7 +83,9 @@ def project(piece: Record, east: float, north: float) -> tuple[float, float, flo
 
 @inner
 def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
-    """Update the position along the path in the memory, and return the path's course at that position, rad.
+    """Find the position along the path, store it in ``memory``, and return the course of the path there, rad.
+
+    The search starts at the piece of the last tick and never goes back.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     pieces: records of `PIECE`.
@@ -104,9 +107,12 @@ def find_on_path(motion: Record, pieces: Records, memory: Record) -> float:
 
 @inner
 def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
-    """Advance the memory past sharp corners to the leg to which an autopilot has turned.
+    """Advance the position in ``memory`` past sharp corners to the leg that an autopilot already flies.
 
-    The autopilot may turn before it passes the end of the previous leg. Other arguments as for `find_on_path`.
+    An autopilot may turn to a leg before it passes the end of the previous leg.
+
+    leg: leg that the autopilot flies.
+    Other arguments as for `find_on_path`.
     """
     while memory.piece + 1 < pieces.shape[0] and pieces[memory.piece].leg < leg:
         piece, next_piece = pieces[memory.piece], pieces[memory.piece + 1]
@@ -118,7 +124,10 @@ def leave_sharp_corners(pieces: Records, memory: Record, leg: int) -> None:
 
 @inner
 def mean_curvature(pieces: Records, first_piece: int, start: float, end: float) -> float:
-    """Return the mean curvature of the path between two distances, both at or after piece ``first_piece``, 1/m."""
+    """Return the mean curvature of the path between two distances along it, 1/m, positive to the right.
+
+    Both distances (m) are at or after the piece ``first_piece``.
+    """
     turn_angle = 0.0
     for i in range(first_piece, pieces.shape[0]):
         piece = pieces[i]
@@ -133,9 +142,9 @@ def mean_curvature(pieces: Records, first_piece: int, start: float, end: float) 
 
 @inner
 def max_curvature(pieces: Records, first_piece: int, start: float, end: float) -> float:
-    """Return the maximum curvature of the path between two distances, 1/m, positive.
+    """Return the maximum magnitude of the path's curvature between two distances along it, 1/m.
 
-    Both distances are at or after piece ``first_piece``.
+    Both distances (m) are at or after the piece ``first_piece``.
     """
     max_piece_curvature = 0.0
     for i in range(first_piece, pieces.shape[0]):
@@ -149,7 +158,7 @@ def max_curvature(pieces: Records, first_piece: int, start: float, end: float) -
 
 @compiled
 def profile_at(nodes: Records, distance: float) -> tuple[float, float, float]:
-    """Return altitude (m), slope (tangent) and slope change per meter of an altitude profile.
+    """Return the altitude (m), the slope (m per m) and the change of slope (1/m) of an altitude profile at a distance.
 
     nodes: records of `NODE`.
     distance: distance along the path, m.
@@ -278,9 +287,7 @@ def fly_by_path(
 
 
 def reversals(route: Route) -> NDArray[np.int64]:
-    """Return the indices of fly-over waypoints at which the course reverses.
-
-    The turn there may go to either side.
+    """Return the indices of fly-over waypoints at which the course reverses, so that the turn may go to either side.
 
     >>> way = np.array([[0.0, 0.0, 90.0], [0.0, 900.0, 90.0], [60.0, 0.0, 90.0], [900.0, 0.0, 90.0]])
     >>> over = np.array([False, True, True, False])
@@ -303,12 +310,13 @@ def _turn_angles(route: Route, fly_over_turn: FlyOverTurn) -> Floats:
 def _ground_following_corners(
     route: Route, terrain: Terrain, leg: int, segment_start: Floats, course: float, start_distance: float, length: float
 ) -> list[tuple[float, float]]:
-    """Return corners (distance along the path, altitude; m) of the altitude profile of a leg above ground.
+    """Return the corners of the altitude profile on a leg that follows the ground, as (distance, altitude) pairs, m.
 
-    The height above ground changes linearly from its value at the leg's start to the stated value at its end.
+    The height above ground changes linearly from the height of the leg's start to the height stated for the leg's end.
+    Distances are along the path; no corner is returned where the ground is unknown.
 
-    segment_start: (2,) m, start of the leg's straight part.
-    start_distance: distance of that start along the path, m.
+    segment_start: east and north of the start of the leg's straight part, m, (2,).
+    start_distance: distance of this start along the path, m.
     length: length of the straight part, m.
     """
     leg_start, end_height = route.waypoints[leg], float(route.above_ground[leg + 1])
@@ -338,7 +346,7 @@ def _ground_following_corners(
 def _arcs_at_waypoints(
     route: Route, limits: Limits, courses: Floats, leg_lengths: Floats, turns: Floats
 ) -> tuple[Floats, Floats, Floats]:
-    """Return tangent lengths, radii and return lengths of the arcs at each waypoint, (w,) m each.
+    """Return the tangent lengths, the radii and the return lengths of the arcs at all waypoints, m, each (w,).
 
     The tangent lengths of fly-by arcs are shortened if a leg is too short for them. The return length of a fly-over
     waypoint is the length of the next leg up to the point where the path joins that leg; it is 0 if the leg is too
@@ -388,10 +396,11 @@ def _overshoot_angle(turn: float) -> float:
 def _fly_over_arcs(
     corner: Floats, course: float, turn: float, radius: float
 ) -> list[tuple[Floats, float, float, float]]:
-    """Return the arcs of a fly-over turn, each as start (2,) m, course at the start (rad), curvature (1/m), length (m).
+    """Return the three arcs of a fly-over turn, each as (start, course at the start, curvature, length).
 
-    Two arcs turn past the next leg's course, and the third leads back onto that leg. The first turn is divided because
-    `flight.guidance.path.project` cannot tell the direction of a larger angle.
+    The start is (2,), m; the course is in rad, the curvature in 1/m, the length in m.  Two arcs turn past the course of
+    the next leg, and the third leads back onto that leg.  The first turn is divided because `project` is ambiguous for
+    larger angles.
 
     turn: rad, positive to the right.
     """
@@ -407,7 +416,10 @@ def _fly_over_arcs(
 
 
 def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
-    """Return the corners of the altitude profile with the parabolas that blend them."""
+    """Return the altitude profile: corners with the parabolas that blend them, as records of `NODE`.
+
+    corners: (distance along the path, altitude) pairs, m.
+    """
     distances, altitudes = np.array(corners).T
     is_distinct = np.concatenate([[True], np.diff(distances) > 1e-3])
     # Of two corners at the same distance keep the second one, which is on the next leg.
@@ -426,7 +438,7 @@ def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route:
 
 
 def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: bool = False) -> Records:
-    """Return the (w,) records of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    """Return the waypoints of a route as w records of `flight.guidance.lateral_reference_laws.WAYPOINT`.
 
     The last waypoint has the airspeed of the leg before it.
 
@@ -470,7 +482,7 @@ def waypoint_records(route: Route, mission: Mission | None = None, *, fly_over: 
 
 
 def _turn_before_return(route: Route, index: int, items: dict[int, MissionItem]) -> float:
-    """Return the turn that ArduPlane computes at the waypoint before an RTL, rad; a right angle if it is unknown.
+    """Return the turn angle that ArduPlane computes at the waypoint before an RTL, rad; a right angle if unknown.
 
     The RTL item has no position, which ArduPlane reads as 0 N, 0 E (`AP_Mission::get_next_ground_course_cd`,
     `Location::get_bearing_to`).
@@ -487,9 +499,9 @@ def _bearing_to_origin(item: MissionItem) -> float:
 
 
 def _set_exit_bearing(waypoints: Records, last: int, items: dict[int, MissionItem]) -> None:
-    """Set the bearing to which ArduPlane exits a loiter before an RTL: the bearing of 0 N, 0 E.
+    """Set the bearing on which ArduPlane leaves a loiter before an RTL: the bearing of 0 N, 0 E.
 
-    ArduPlane reads the position of the RTL item, which has none, as 0 N, 0 E.
+    The RTL item has no position, which ArduPlane reads as 0 N, 0 E.  Without such a loiter nothing is set.
 
     last: index of the last waypoint before the RTL.
     """
@@ -513,7 +525,7 @@ def _set_landing(waypoints: Records, mission: Mission | None) -> None:
 
 
 def _set_circles(corners: Records, route: Route) -> None:
-    """Set radius and center of the loiter of each corner of a route."""
+    """Set radius, center and altitude of the loiter at each corner of a route; the radius is 0 without a loiter."""
     turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
     corners["loiter_radius"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
     # The center lies at a right angle to the course halfway through the turn.
@@ -529,7 +541,7 @@ def _set_circles(corners: Records, route: Route) -> None:
 
 
 def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
-    """Set the end condition of each corner's loiter according to its item."""
+    """Set the end condition of the loiter at each corner, from the mission item of the loiter."""
     waypoints["loiter_time"] = math.nan
     for k in np.flatnonzero(waypoints["loiter_radius"]).tolist():
         item = items.get(int(waypoints["item"][k]))
@@ -545,12 +557,12 @@ def _set_loiters(waypoints: Records, items: dict[int, MissionItem]) -> None:
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
-    """Return the index of the piece at each distance (n,) along the path, m."""
+    """Return the index of the piece at each of n distances (m) along the path, (n,)."""
     return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
 
 
 def _path_points(path: FlyByPath, distances: Floats) -> Floats:
-    """Return the points (n, 3) of the path at distances (n,) along it, m."""
+    """Return the points of the path at n distances (m) along it, m, (n, 3)."""
     pieces = path.pieces[_piece_index(path, distances)]
     course, curvature, distances_along = pieces["course"], pieces["curvature"], distances - pieces["start"]
     is_straight = curvature == 0.0
@@ -566,7 +578,7 @@ def _path_points(path: FlyByPath, distances: Floats) -> Floats:
 
 
 def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
-    """Return the path as a polyline of points (n, 3), and the leg of each of its n - 1 segments.
+    """Return the path as a polyline: its n points, m, (n, 3), and the leg of each of its n - 1 segments.
 
     Chords of arcs turn by at most `MAX_CHORD_TURN_RAD`; on a 160 m radius they deviate from the arc by 0.15 m.
 

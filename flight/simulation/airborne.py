@@ -101,7 +101,7 @@ class Airborne(ABC):
         )
         waypoints = waypoint_records(setup.route, setup.mission, fly_over=setup.scenario.flight.fly_over)
         waypoints["is_mission_end"] &= setup.autopilot.loiters.ends_in_circle
-        self._airspeeds = setup.autopilot.speeds.flown(setup.route.airspeed, setup.airspeed)
+        self._airspeeds = setup.autopilot.speeds.flown_airspeeds(setup.route.airspeed, setup.airspeed)
         waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
         waypoints["min_ground_speed"] = setup.min_ground_speeds
         self._workspace = Workspace(self._gains, self.path, waypoints, None if self._law is None else self._law.memory)
@@ -136,10 +136,10 @@ class Airborne(ABC):
 
     @abstractmethod
     def _fly_ticks(self, count: int) -> int:
-        """Fly up to ``count`` ticks, fill the workspace's rows, and return the last status, 0 if the flight goes on."""
+        """Fly up to ``count`` ticks, fill the workspace's rows, and return the end code; 0 if the flight continues."""
 
     def _start_disturbances(self, setup: FlightSetup) -> None:
-        """Set the wind, and start turbulence and navigation error."""
+        """Set the mean wind, and initialise turbulence and navigation error from their random streams."""
         wind, record = setup.scenario.wind, self._work
         wind_course = wind.to_course
         w20 = W20[wind.turbulence]
@@ -183,7 +183,7 @@ class Airborne(ABC):
         return (row_blocks[0] if len(row_blocks) == 1 else join_rows(row_blocks)), end_reason
 
     def _fill_workspace(self, count: int) -> tuple[Rows, str]:
-        """Fly up to ``count`` ticks, at most one workspace of rows; return values as for `fly_block`."""
+        """Fly up to ``count`` ticks, whose rows must fit in the workspace; return values as for `fly_block`."""
         workspace = self._workspace
         workspace.turbulence[:count] = self._random.standard_normal((count, 3))
         if self._navigation_random is not None:
@@ -199,7 +199,7 @@ class Airborne(ABC):
         return rows, ""
 
     def _timeout_text(self) -> str:
-        """Return the end reason of a flight that exceeded its time limit, in a loiter at an item or elsewhere."""
+        """Return the end reason of a flight that exceeded its time limit; in a loiter, name the loiter's item."""
         route, next_waypoint = self.setup.route, min(int(self.memory.leg) + 1, self.setup.route.legs)
         time_text = f"not finished after {self.max_ticks * self.dt:.0f} s"
         if route.arcs[next_waypoint] > 0.0 and route.rtl_start < 0:
@@ -208,7 +208,7 @@ class Airborne(ABC):
 
 
 def _extra_loiter_length(setup: FlightSetup, waypoints: Records) -> float:
-    """Return the length that loiters too tight for the bank limit add to the path, m.
+    """Return by how much loiters that are too tight for the bank limit lengthen the flight, m.
 
     An autopilot that steers to a loiter's center flies around the center at the radius that the bank limit requires,
     and once more until the next waypoint lies ahead. A loiter that cannot be flown in the wind adds nothing, because

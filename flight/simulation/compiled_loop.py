@@ -19,7 +19,7 @@ _OUTPUT_OFFSET = int(_FIELDS["output"][1]) // 8
 
 @inner
 def read_state(block: Floats, registers: Floats, code: Code) -> None:
-    """Copy the state of the model to the workspace, in JSBSim's units."""
+    """Copy the state of the compiled model to the block of a workspace, in JSBSim's units."""
     first_read = code[READS_START]
     for k in range(code[WRITES_START] - first_read):
         block[_STATE_OFFSET + k] = registers[code[first_read + k]]
@@ -29,7 +29,7 @@ def read_state(block: Floats, registers: Floats, code: Code) -> None:
 def advance_model(
     block: Floats, frame: Record, registers: Floats, code: Code, contacts: Records, frictions: Records
 ) -> None:
-    """Copy the outputs of the workspace to the model, and step it to the next tick."""
+    """Copy the outputs of the workspace's block to the compiled model, and step the model to the next tick."""
     first_write = code[WRITES_START]
     for k in range(code[CODE_END] - first_write):
         registers[code[first_write + k]] = block[_OUTPUT_OFFSET + k]

@@ -87,7 +87,7 @@ class Ground:
     """Terrain for the compiled tick; without terrain, a raster without data.
 
     known: True if there is terrain.
-    heights: altitudes of the ground, (rows, columns) m; NaN if unknown.
+    heights: altitudes of the ground, m, (rows, columns); NaN where unknown.
     to_pixel: transformation from map positions (east, north) to column and row of ``heights``.
     """
 

@@ -239,7 +239,7 @@ class FlightSetup:
 
     def __post_init__(self) -> None:
         """Compute the demanded airspeeds and, with them, the reference path."""
-        airspeed = self.autopilot.speeds.flown(self.route.airspeed, self.airspeed)
+        airspeed = self.autopilot.speeds.flown_airspeeds(self.route.airspeed, self.airspeed)
         keeps_commands = self.source is not None or np.array_equal(airspeed, self.route.airspeed)
         demanded_route = self.route if keeps_commands else replace(self.route, airspeed=airspeed)
         object.__setattr__(self, "demanded_route", demanded_route)
@@ -267,7 +267,7 @@ class FlightSetup:
 
     @property
     def min_ground_speeds(self) -> Floats:
-        """Minimum ground speeds on the leg to each waypoint, (w,) m/s; 0 or less for none."""
+        """Minimum ground speed on the leg to each waypoint, m/s, (w,); 0 or less for no minimum."""
         stated_speeds = self.route.min_ground_speed
         return np.where(np.isnan(stated_speeds), self.autopilot.speeds.min_ground_speed, stated_speeds)
 
@@ -307,7 +307,7 @@ class FlightSetup:
 
     @property
     def display_waypoints(self) -> Floats:
-        """Waypoints of the route for pictures and tables, (w, 3) m, with the ends on the ground that are flown."""
+        """Waypoints of the route for pictures and tables, m, (w, 3), including ground ends that are flown."""
         return display_waypoints(self.route, self.ground_phases)
 
     @property

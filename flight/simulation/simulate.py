@@ -38,7 +38,7 @@ def make_loop(
     step_model: Callable[[], object],
     steps: int,
 ) -> Callable[[int], int]:
-    """Return a function that flies up to a number of ticks, and returns 0 or the status of the flight's end.
+    """Return a function that flies up to a given number of ticks in JSBSim, and returns the end code or 0.
 
     getters: getters of the state, in the order of `flight.simulation.tick.READ_FIELDS`.
     setters: setters of the outputs, in the order of `flight.simulation.tick.OUTPUT`.
@@ -233,7 +233,7 @@ class TrackBuilder:
         self._pending_rows: list[Rows] = []
 
     def add(self, rows: Rows) -> None:
-        """Add rows that follow those added before."""
+        """Add rows that follow the rows added before."""
         self._pending_rows.append(rows)
         if len(self._pending_rows) >= _MAX_PENDING_BLOCKS:
             self._store_pending_rows()
@@ -320,7 +320,7 @@ class Flight(Airborne):
         self._loop = self._make_loop()
 
     def divert(self, setup: FlightSetup, local_map: LocalMap) -> None:
-        """Leave the route for the route of another setup, which starts at the aircraft's position at time 0.
+        """Change to the route of another setup, which starts at the aircraft's position at time 0.
 
         The aircraft, its wind and the estimates of guidance are kept; the state of guidance on the old route is
         discarded.
@@ -374,7 +374,7 @@ class Flight(Airborne):
         return self._loop(count)
 
     def _choose_engine(self, setup: FlightSetup) -> tuple[CompiledModel | None, str]:
-        """Return the compiled model, or None for JSBSim, and the name of the engine with the reason."""
+        """Choose the engine; return the compiled model (None for JSBSim), and a text with the engine and the reason."""
         if self._chosen_engine == "jsbsim":
             return None, "JSBSim, as chosen"
         if self._law.loop is None:
@@ -394,7 +394,7 @@ class Flight(Airborne):
         return model, f"compiled model, bit-identical to JSBSim {JSBSIM_VERSION} in {PROOF_STEPS} steps"
 
     def _make_loop(self) -> Callable[[int], int]:
-        """Return a function that flies a number of ticks, fills the workspace's rows, and returns the last status."""
+        """Return a function that flies up to a number of ticks, fills the rows, and returns the end code or 0."""
         record, workspace, access = self._work, self._workspace, self.fdm.loop_access()
         record.state_factors = access.factors[0]
         record.scale_positive, record.scale_negative = (tuple(scales) for scales in zip(*access.scales, strict=True))
@@ -415,4 +415,4 @@ class Flight(Airborne):
 
 
 def _discard(_value: float) -> None:
-    """Discard the value of an output that is not used."""
+    """Ignore the value of an output that is not used."""

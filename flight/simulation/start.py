@@ -23,7 +23,7 @@ class Start:
     course: true course of the first leg, rad.
     slope: slope of the first leg, rad.
     airspeed: m/s, true.
-    wind: (3,) m/s, velocity of the air, north, east, down.
+    wind: velocity of the air, north, east and down, m/s.
     ground: altitude of the ground, m AMSL.
     """
 
@@ -45,7 +45,7 @@ def find_start(
     airspeed: float,
     offset: tuple[float, float, float],
 ) -> Start:
-    """Return the start of the route.
+    """Return the start of the route, with the airspeed limited to the aircraft's range.
 
     airspeed: airspeed of the first leg, m/s.
     offset: east, north and up from the first waypoint to the start, m.
@@ -78,11 +78,11 @@ def find_start(
 
 
 def start_trimmed(fdm: Fdm, source: str, start: Start) -> Trim:
-    """Start the aircraft trimmed on the slope of the start, or level if it cannot hold that slope.
+    """Start the aircraft trimmed on the slope of the first leg, or level if it cannot hold that slope.
 
     source: file of the mission, for messages.
 
-    Raises StartError if the aircraft can hold neither.
+    Raises StartError if the aircraft can fly neither the slope nor level.
     """
     start_values = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
     try:
@@ -109,8 +109,9 @@ class Release:
 
     position: latitude and longitude, deg, and altitude, m AMSL.
     attitude: roll, pitch, yaw (true), rad.
-    velocity, wind: velocities of the aircraft over the ground and of the air, (3,) m/s, north, east, down.
-    ground: m AMSL.
+    velocity: velocity of the aircraft over the ground, north, east and down, m/s.
+    wind: velocity of the air, north, east and down, m/s.
+    ground: altitude of the ground, m AMSL.
     """
 
     position: tuple[float, float, float]
@@ -130,7 +131,7 @@ def default_gear(ground_phases: GroundPhases) -> Gear:
 def find_release(
     setup: FlightSetup, local_map: LocalMap, ground: Ground, aircraft: Aircraft, take_off: TakeOff
 ) -> Release:
-    """Return the state of the aircraft at the start of a take-off."""
+    """Return the state of the aircraft at the release: at the end of the launch, or at rest on the runway."""
     launch = take_off.launch
     position, velocity = take_off.release()
     if launch.method == "runway":

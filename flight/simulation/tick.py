@@ -128,14 +128,14 @@ class Workspace:
     block: (n,) numbers of the workspace, of the control law's own record, and of the path.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
-    own: record of the control law's memory, or None.
-    path: rows of `PATH_ROW`, as many as the largest of the numbers of pieces, nodes and waypoints.
+    own: the control law's own record, or None.
+    path: records of `PATH_ROW`; their number is the largest of the numbers of pieces, nodes and waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.
     commands: (4,) the fields of `flight.dynamics.state.COMMANDS`.
     on_last_leg: (1,) of the workspace's settings.
     ticks_flown, rows_filled: (1,) of the workspace's timing.
-    turbulence, navigation: (BLOCK_TICKS, 3) random numbers of each.
+    turbulence, navigation: random numbers for the turbulence and for the navigation error, (BLOCK_TICKS, 3) each.
     rows: (BLOCK_TICKS,) rows of the track.
     """
 
@@ -234,7 +234,7 @@ _OUTPUT_FIELDS = field_names(OUTPUT)
 
 @inner
 def begin_tick(workspace: Record, heights: Heights) -> bool:
-    """Convert the state from JSBSim's units, and estimate the motion; return False if a value is not finite.
+    """Convert the state from JSBSim's units, and estimate the motion; return False if the state is not finite.
 
     workspace: a record of `WORKSPACE`.
     heights: altitudes of the terrain.
@@ -256,7 +256,7 @@ def begin_tick(workspace: Record, heights: Heights) -> bool:
 
 @inner
 def _read_sensors(workspace: Record, heights: Heights) -> bool:
-    """Convert the state to SI and to the map, and look up the ground; return False if a value is not finite.
+    """Convert the state to SI units and map axes, and look up the ground; return False if a value is not finite.
 
     Sets ``state``, ``true`` and ``place`` of a record of `flight.simulation.tick.WORKSPACE`.
     """
@@ -293,17 +293,17 @@ def _read_sensors(workspace: Record, heights: Heights) -> bool:
 def end_tick(workspace: Record) -> int:
     """Advance the wind, fill a row of the track, count the tick, and set the outputs in JSBSim's units.
 
-    Return a key of `ENDS`, or 0 if the flight continues.
+    Return the code of the flight's end, a key of `ENDS`, or 0 if the flight continues.
     """
     fill_tick(workspace)
-    return status_in_air(workspace)
+    return airborne_end_code(workspace)
 
 
 @inner
-def status_in_air(workspace: Record) -> int:
-    """Return a key of `ENDS` if a flight in the air has ended, otherwise 0."""
+def airborne_end_code(workspace: Record) -> int:
+    """Return the code (a key of `ENDS`) for why an airborne flight ends in this tick; 0 if it continues."""
     settings, air = workspace.settings, workspace.air
-    return _air_status(
+    return _find_airborne_end(
         workspace.state,
         workspace.memory,
         workspace.place.clearance,
@@ -333,11 +333,11 @@ def fill_tick(workspace: Record) -> None:
 
 @inner
 def update_rtl_loiter(motion: Record, waypoint: Record, memory: Record, dt: float) -> None:
-    """Update the progress of an RTL around its loiter, and end the flight after the loiter.
+    """Update the progress of an RTL around its loiter, and end the flight once the loiter is complete.
 
-    This is for an autopilot that flies an RTL by its own control law or its own program, which follows no line: there
-    is no cross-track error. The flight ends once the aircraft has arrived at the loiter and flown a full circle at the
-    loiter's altitude, and after `rtl_loiter_timeout` at the latest.
+    For autopilots that fly an RTL by their own control law or program: they follow no line, so the cross-track error is
+    NaN.  The loiter is complete after a full circle and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`, both counted
+    from the arrival at the loiter and its altitude, or after `rtl_loiter_timeout`.
 
     motion: a record of `flight.guidance.navigation_error.MOTION`.
     waypoint: any waypoint of the RTL, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
@@ -382,16 +382,16 @@ def update_end_loiter(motion: Record, memory: Record, dt: float) -> None:
 
 @compiled
 def rtl_loiter_timeout(radius: float) -> float:
-    """Return the timeout of an RTL in its loiter, s.
+    """Return the time after which a flight ends on its RTL loiter, s.
 
-    radius: m.
+    radius: radius of the loiter, m, of either sign.
     """
     return LOITER_TIMEOUT_FACTOR * max(ENDLESS_LOITER_TIME_S, 2.0 * math.pi * abs(radius) / _CIRCLING_SPEED_MPS)
 
 
 @inner
 def _to_si(state: Record, factors: Record) -> bool:
-    """Convert the state to SI; return False if it contains a NaN or an infinity."""
+    """Convert the state to SI units in place; return False if a value is NaN or infinite."""
     total = 0.0
     for name in literal_unroll(_STATE_FIELDS):
         value = state[name] * factors[name]
@@ -401,10 +401,13 @@ def _to_si(state: Record, factors: Record) -> bool:
 
 
 @inner
-def _air_status(
+def _find_airborne_end(
     state: Record, memory: Record, height_above_ground: float, min_airspeed: float, is_battery_empty: bool
 ) -> int:
-    """Return a key of `ENDS` if a flight in the air has ended, otherwise 0."""
+    """Return the code (a key of `ENDS`) of the first condition that ends an airborne flight; 0 if it continues.
+
+    The conditions, in this order: ground contact, bank, stall, end of the route, empty battery.
+    """
     if height_above_ground <= 0.0:
         return GROUND
     if abs(state.roll) > LOSS_OF_CONTROL_BANK_RAD:
@@ -421,7 +424,7 @@ def _air_status(
 
 @inner
 def _set_output(output: Record, commands: Record, air: Record, scale_positive: Record, scale_negative: Record) -> None:
-    """Set the outputs from commands, wind and ground altitude, in JSBSim's units."""
+    """Set the values for JSBSim, in JSBSim's units: commands, mean wind plus gust, and ground altitude."""
     output.elevator, output.aileron = commands.elevator, commands.aileron
     output.rudder, output.throttle = commands.rudder, commands.throttle
     # Mean wind is set as part of the gust: three properties a tick instead of six.
@@ -444,7 +447,7 @@ def _update_wind(
     air: Record,
     dt: float,
 ) -> None:
-    """Set the mean wind and the next gust at the aircraft in ``air``, true north, east and down.
+    """Set the mean wind and the next gust at the aircraft in ``air``, along true north, east and down.
 
     convergence_cos, convergence_sin: cosine and sine of the map course of true north.
     """
@@ -456,10 +459,10 @@ def _update_wind(
     if wind.w20 > 0.0:
         # Over unknown ground use the turbulence scales for more than 300 m.
         gust_height = height_above_ground if not math.isnan(height_above_ground) else 1000.0
-        along, across, down = step_gusts(gusts, noise, wind.w20, gust_height, state.airspeed, dt)
-        air.gust_north = along * cos - across * sin
-        air.gust_east = along * sin + across * cos
-        air.gust_down = down
+        gust_downwind, gust_crosswind, gust_down = step_gusts(gusts, noise, wind.w20, gust_height, state.airspeed, dt)
+        air.gust_north = gust_downwind * cos - gust_crosswind * sin
+        air.gust_east = gust_downwind * sin + gust_crosswind * cos
+        air.gust_down = gust_down
 
 
 @inner
@@ -504,7 +507,7 @@ def _fill_row(
 
 @inner
 def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:
-    """Set the row's wind in map axes.
+    """Set the wind of a `flight.simulation.track.TRACK_ROW` record, in map axes.
 
     cos, sin: cosine and sine of the map course of true north.
     """

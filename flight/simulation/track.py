@@ -137,7 +137,6 @@ class Track:
         write_track_parquet(self, Path(path))
 
     def __repr__(self) -> str:
-
         return f"<{track_title(self)}>"
 
     def _repr_html_(self) -> str:
@@ -195,7 +194,7 @@ _STEPS_PER_UNIT = np.exp2(
 
 
 def quantise(rows: Rows) -> Rows:
-    """Return a copy of flown rows (t,) rounded to the resolution of `DIGITS`, without negative zeros.
+    """Return a copy of the rows of a flight, rounded to the resolution of `DIGITS` and without negative zeros.
 
     Rows are rounded as they are flown, so that the verdict and every reader of the log see the same numbers.
     """
@@ -211,7 +210,11 @@ def _as_matrix(rows: Rows) -> Floats:
 
 @compiled
 def _round_to_steps(values: Floats, steps: Floats) -> None:
-    """Round values (t, n) to whole steps; ``steps`` (n,) is the number of steps per unit."""
+    """Round values in place to multiples of a step in each column.
+
+    values: (t, n).
+    steps: number of steps per unit for each column, (n,).
+    """
     for row in range(values.shape[0]):
         for k in range(steps.size):
             # Adding 0.0 removes a negative zero.
@@ -235,7 +238,7 @@ def join_rows(parts: Sequence[Rows]) -> Rows:
 
 
 def as_track(rows: Rows) -> Track:
-    """Return the track of flown rows, (t,) of `TRACK_ROW`.
+    """Return the track of a flight from its rows, records of `TRACK_ROW`.
 
     >>> rows = np.zeros(2, TRACK_ROW)
     >>> rows["time"] = 0.0, 0.5
@@ -250,7 +253,7 @@ def as_track(rows: Rows) -> Track:
 
 
 def track_rows(track: Track) -> Rows:
-    """Return the rows of a track, (t,) of `TRACK_ROW`.
+    """Return the rows of a track as records of `TRACK_ROW`.
 
     >>> rows = np.zeros(3, TRACK_ROW)
     >>> rows["airspeed"] = 25.0
@@ -297,7 +300,7 @@ _ROWS_PER_WRITE = 10_000
 
 
 def track_columns(track: Track) -> dict[str, NDArray[Any]]:
-    """Return the columns (t,) of a track by name, in order, each with the type in the track.
+    """Return the columns of a track by name, in order, each with the data type that it has in the track.
 
     >>> from flight.simulation.track import TRACK_ROW, as_track
     >>> columns = track_columns(as_track(np.zeros(3, TRACK_ROW)))
@@ -382,9 +385,11 @@ _LIMIT_TOLERANCE_FRACTION = 1e-3
 
 
 def control_limits(aircraft: str) -> list[tuple[str, float]]:
-    """Return each control with its limit in either direction, rad; NaN for an unknown aircraft.
+    """Return pairs of control and limit in either direction, rad; NaN for the surfaces of an unknown aircraft.
 
     The limit of the throttle is 1.
+
+    aircraft: name or folder of the aircraft.
 
     >>> for name, limit in control_limits("aerosonde"):
     ...     print(f"{name} {limit:.2f}")
@@ -403,7 +408,9 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
 
 
 def saturated_rows(track: Track, control: int, min_command: float, max_command: float) -> NDArray[np.bool_]:
-    """Flag the rows at which the command of a control (a column of `Track.commands`) is saturated, (t,).
+    """Return a mask of the rows at which the command of a control is saturated, (t,).
+
+    control: column of `Track.commands`.
 
     min_command, max_command: limits of the control; no row is saturated if they are NaN.
 

@@ -17,7 +17,7 @@ GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_firs
 
 @inner
 def dryden_scales(height: float) -> tuple[float, float, float]:
-    """Return length scales L_u = L_v and L_w (m), and sigma_u / sigma_w, at a height above ground (m).
+    """Return the length scales L_u = L_v and L_w (m) and the ratio sigma_u / sigma_w at a height above ground (m).
 
     MIL-F-8785C 3.7.3.4 with heights in feet: L_w = h, L_u = h / (0.177 + 0.000823 h)^1.2, sigma_u / sigma_w = 1 /
     (0.177 + 0.000823 h)^0.4, 10 ft <= h <= 1,000 ft.
@@ -30,7 +30,11 @@ def dryden_scales(height: float) -> tuple[float, float, float]:
 
 
 def start_gusts(noise: Floats, filters: Record) -> None:
-    """Draw the stationary state of the filters, a record of `GUST_FILTERS`, from (5,) unit normals."""
+    """Initialise the gust filters, so that the statistics of the gusts do not change over the flight.
+
+    noise: random numbers from the standard normal distribution, (5,).
+    filters: a record of `GUST_FILTERS`, which is set.
+    """
     filters.along, filters.across_first, across, filters.down_first, down = noise.tolist()
     # In the stationary state the second of two filters has variance 1/2, and covariance 1/2 with the first.
     filters.across_second = 0.5 * filters.across_first + 0.5 * across
@@ -41,11 +45,14 @@ def start_gusts(noise: Floats, filters: Record) -> None:
 def step_gusts(
     filters: Record, noise: Floats, w20: float, height: float, airspeed: float, dt: float
 ) -> tuple[float, float, float]:
-    """Advance by dt and return the gust along the mean wind, across it to the right, and down, m/s.
+    """Advance the gust filters by a tick; return the gust along the mean wind, to the right of it, and down, m/s.
 
     filters: a record of `GUST_FILTERS`.
-    noise: (3,) unit normals.
+    noise: random numbers from the standard normal distribution, (3,).
     w20: wind at 20 ft, m/s; sigma_w = 0.1 w20.
+    height: height above ground, m.
+    airspeed: m/s.
+    dt: duration of the tick, s.
 
     Longitudinal: sigma / (1 + T s); transverse: sigma (1 + sqrt(3) T s) / (1 + T s)^2, as the sum of the outputs of two
     equal lags in series.
@@ -67,7 +74,7 @@ def step_gusts(
 
 @inner
 def _step_transverse(first: float, second: float, noise: float, decay: float) -> tuple[float, float, float]:
-    """Advance two lags in series by a tick, and return both with their weighted sum of unit variance."""
+    """Advance two lags in series by a tick; return both lags and a transverse gust of unit variance."""
     previous = first
     first = decay * previous + math.sqrt(1.0 - decay * decay) * noise
     second = decay * second + (1.0 - decay) * 0.5 * (previous + first)

@@ -155,7 +155,7 @@ def fly_and_judge(
         return _judge_unflown(requirements, log, reason, reference)
     try:
         if autopilot is not None:
-            return _fly_with_program(task, setup, program_class_for(autopilot).flying(setup.autopilot, autopilot))
+            return _fly_with_program(task, setup, program_class_for(autopilot).with_model(setup.autopilot, autopilot))
         off_nominal_flight = off_nominal or OffNominal(Variation())
         flight = Flight(
             setup, airframe.aircraft, off_nominal_flight.variation, start_offset=off_nominal_flight.start_offset

@@ -123,7 +123,7 @@ class ArduPlane(Autopilot):
         return cls(ArduPilotParameters.restore(stored.parameters, version))
 
     def store(self) -> StoredAutopilot:
-        """Return its parameters and its release for a log."""
+        """Return the parameters and the release of ArduPlane for a log."""
         parameters = self.parameters
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
         return StoredAutopilot(parameters=stored, program=self.program, version=parameters.version)
@@ -192,9 +192,9 @@ class ArduPlane(Autopilot):
         return {name: value for name, value, _ in self.parameters.values}
 
     def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
-        """Return `_NEUTRAL` settings that are not neutral, an own fence, RTL over terrain, and others.
+        """Describe settings that change the flight of a mission but are not simulated.
 
-        The others are those of `flight.autopilots.arduplane.open_settings`.
+        by_program: True for a flight of ArduPlane's own program, which flies more settings.
         """
         parameters, values = self.parameters, self._stated_values
         texts = [
@@ -224,7 +224,10 @@ class ArduPlane(Autopilot):
         )
 
     def _turn_distance(self, turn: float, amsl: float) -> float:
-        """Return WP_RADIUS for a right angle, more in thin air, and a fraction of it for a smaller turn."""
+        """Return the distance before a waypoint at which ArduPlane turns, m.
+
+        It is WP_RADIUS for a right angle, a fraction of WP_RADIUS for a smaller turn, and more in thin air.
+        """
         factor = float(true_by_equivalent(amsl))
         return float(turn_distance(0.0, turn, self.parameters.wp_radius, math.inf, factor))
 
@@ -232,8 +235,8 @@ class ArduPlane(Autopilot):
     def speeds(self) -> SpeedRules:
         """Rules of airspeeds from AIRSPEED_MIN, AIRSPEED_MAX, AIRSPEED_CRUISE and MIN_GROUNDSPEED.
 
-        A command of another speed changes nothing: commanded to fly at 17 m/s with AIRSPEED_MIN at 18, ArduPlane 4.6
-        flew on at its 25 m/s.
+        A commanded speed outside the limits changes nothing: commanded to fly at 17 m/s with AIRSPEED_MIN 18, ArduPlane
+        4.6 flew on at its 25 m/s.
         """
         parameters = self.parameters
         limits = SpeedLimits(parameters.airspeed_min, parameters.airspeed_max, "AIRSPEED_MIN", "AIRSPEED_MAX")
@@ -258,7 +261,10 @@ class ArduPlane(Autopilot):
         return ArduPlaneFromGround(self, ground_phases, aircraft, tuple(contacts)).control_law
 
     def _landing_airspeed(self, cruise: float, tail_wind: float, amsl: float) -> float:
-        """Return the airspeed by TECS_LAND_ARSPD, or AIRSPEED_CRUISE and AIRSPEED_MIN, and LAND_WIND_COMP."""
+        """Return the true airspeed on the landing glide, m/s, by TECS_LAND_ARSPD and LAND_WIND_COMP.
+
+        ``cruise`` is ignored: without TECS_LAND_ARSPD, AIRSPEED_CRUISE and AIRSPEED_MIN decide.
+        """
         return landing_airspeed(self.parameters, tail_wind) * self.speeds.true_airspeed_factor(amsl)
 
     @property
@@ -267,7 +273,7 @@ class ArduPlane(Autopilot):
         return ReturnBehaviour(self._return_rules, self._rtl_parameters)
 
     def _rtl_parameters(self, settings: RtlSettings) -> dict[str, float]:
-        """Return RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX for a scenario's settings of the RTL.
+        """Return the values of RTL_ALTITUDE, RTL_AUTOLAND and TECS_LAND_PMAX that a scenario's RTL settings require.
 
         RTL_AUTOLAND is 1 unless a file states it: with 0 ArduPlane does not arm if the mission has a landing.  On a
         field that is lower than home the flare would climb (`flight.autopilots.arduplane.ground_law`): there
@@ -288,7 +294,7 @@ class ArduPlane(Autopilot):
         return values
 
     def _landing_glide(self, height: float, run: float, tail_wind: float, amsl: float) -> LandingGlide:
-        """Return the glide by LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
+        """Return the landing glide by LAND_FLARE_*, LAND_WIND_COMP, TECS_LAND_SINK and TECS_LAND_ARSPD."""
         airspeed = self._landing_airspeed(0.0, tail_wind, amsl)
         return landing_glide(height, run, airspeed + tail_wind, self.parameters)
 
@@ -351,7 +357,7 @@ class ArduPlane(Autopilot):
         )
 
     def with_parameters(self, **values: float) -> "ArduPlane":
-        """Return ArduPlane's control law with the given parameters changed; it replaces a recorded program."""
+        """Return the simulated ArduPlane with the given parameters changed, also for a program."""
         return ArduPlane(self.parameters.changed(**values))
 
 
@@ -398,7 +404,7 @@ class ArduPlaneFromGround:
 
     @property
     def released_throttle(self) -> float:
-        """Throttle at the end of the rail."""
+        """Throttle at the end of the rail, 0..1."""
         parameters = self.parameters
         # Without a slew limit the throttle opens at once (not 0 times infinity); it is closed if the motor starts
         # later.
@@ -531,9 +537,9 @@ def read_loiter_radius(loiter: Loiter) -> float:
 
 
 def _radius_growth(up: float) -> float:
-    """Return the factor by which a loiter is wider at an altitude (m AMSL) than at sea level.
+    """Return the ratio of a loiter's radius at an altitude (m AMSL) to its radius at sea level.
 
-    It is the square of the ratio of true to equivalent airspeed.
+    The ratio is the square of the ratio of true to equivalent airspeed.
     """
     return float(true_by_equivalent(up)) ** 2
 

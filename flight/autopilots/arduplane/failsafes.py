@@ -69,7 +69,7 @@ _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided",
 def failsafe_causes(
     parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
 ) -> tuple[Cause, ...]:
-    """Return the causes that can end a mission in AUTO, in the order of interest to pilots.
+    """Return the causes that can end a mission in AUTO, with ArduPlane's reaction to each, in a fixed order.
 
     has_fence: True if the mission carries a fence.
     has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
@@ -130,7 +130,7 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
             if action == "land" and not has_landing:
                 action = "return"
             has_voltage = parameters[f"{monitor}_{level}_VOLT"] > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0
-            has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and _acts_by_charge(parameters, monitor)
+            has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and _measures_current(parameters, monitor)
             if action != "on" and not (monitor in monitors and (has_voltage or has_charge)):
                 action = "never"
             causes.append(Cause(f"battery{number} {name}", action, parameter, value))
@@ -138,10 +138,10 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
 
 
 def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe, ...]:
-    r"""Return the failsafes of all battery monitors that leave a mission at a charge or a voltage.
+    r"""Return, for all battery monitors, the failsafes that end a mission at a charge or voltage threshold.
 
-    A monitor of the voltage alone never acts by the charge, and BATT_LOW_TIMER 0 switches off the failsafes by the
-    voltage (`AP_BattMonitor_Backend::update_failsafes`, `check_failsafe_types`).
+    A monitor that measures only voltage never triggers on charge, and BATT_LOW_TIMER 0 disables the voltage failsafes
+    (`AP_BattMonitor_Backend::update_failsafes`, `check_failsafe_types`).
 
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.of_text("BATT_CAPACITY 8000\nBATT_LOW_MAH 1500\nBATT_FS_LOW_ACT 1\n", "mine.param")
@@ -156,7 +156,7 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
             charge, voltage = parameters[f"{monitor}_{level}_MAH"], parameters[f"{monitor}_{level}_VOLT"]
             if _BATTERY_FAILSAFE.get(int(action), "on") == "on":
                 continue
-            if charge > 0.0 and _acts_by_charge(parameters, monitor):
+            if charge > 0.0 and _measures_current(parameters, monitor):
                 used_charge = parameters[f"{monitor}_CAPACITY"] - charge
                 found.append(BatteryFailsafe(f"{monitor}_{level}_MAH", charge, used_charge, len(monitors) > 1))
             if voltage > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0:
@@ -181,6 +181,6 @@ def monitored_batteries(parameters: ArduPilotParameters) -> list[str]:
     ]
 
 
-def _acts_by_charge(parameters: ArduPilotParameters, monitor: str) -> bool:
+def _measures_current(parameters: ArduPilotParameters, monitor: str) -> bool:
     """Return True if a battery monitor measures the current."""
     return int(parameters[f"{monitor}_MONITOR"]) not in _MONITORS_WITHOUT_CURRENT

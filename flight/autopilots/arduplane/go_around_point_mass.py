@@ -1,11 +1,11 @@
-"""Simulate an aborted landing with a point mass in a few milliseconds, back to the line-up.
+"""Simulate a go-around with a point mass in a few milliseconds, up to the return to the landing approach.
 
-It follows `AP_Landing::type_slope_verify_abort_landing` and `restart_landing_sequence` (libraries/AP_Landing) and
-`Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  The aircraft climbs with
-level wings at the pitch of the last take-off and open throttle until it is above the go-around altitude, which is
+The simulation follows `AP_Landing::type_slope_verify_abort_landing`, `restart_landing_sequence` (libraries/AP_Landing)
+and `Plane::takeoff_calc_pitch`, `takeoff_calc_throttle` (ArduPlane/takeoff.cpp) in ArduPlane 4.6.  The aircraft climbs
+with level wings at the pitch of the last take-off and open throttle until it is above the go-around altitude, which is
 relative to *home*: at an airfield above home, the climb may end at once.  Then it joins the nearest landing sequence:
-it takes the shorter turn to the first stop of the sequence, on a straight slope from its altitude, and flies the other
-stops back to the line-up.
+it takes the shorter turn to the first stop of the sequence, on a straight slope from its altitude, and then flies the
+other stops.
 
 The point mass and the control law are the same as in `flight.autopilots.arduplane.rtl_point_mass`.
 """
@@ -26,8 +26,8 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     fill_stage,
     fly_stages,
     rtl_timeout,
-    straight_on,
     truncate_at_first_loiter,
+    waypoint_ahead,
 )
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.mission.return_path import LandingStart, nearest_landing_sequence
@@ -42,7 +42,7 @@ class GoArounds:
 
     flown: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
     ways: n arrays (t, 3) of positions at intervals of 1 s, m.
-    landings: landing sequence that each go-around joins, n.
+    landings: n landing sequences, one that each go-around joins.
     """
 
     flown: Records
@@ -50,20 +50,23 @@ class GoArounds:
     landings: tuple[LandingStart, ...]
 
 
-def climb_rows(positions: Floats, end_altitude: float) -> int:
-    """Return the number of positions (t, 3) of a go-around before its climb ends; t if the climb never ends.
+def count_climb_rows(positions: Floats, end_altitude: float) -> int:
+    """Return the number of positions before the climb of a go-around ends; all of them if the climb never ends.
 
-    >>> climb_rows(np.array([[0.0, 0.0, 10.0], [0.0, 20.0, 14.0], [0.0, 40.0, 18.0]]), 13.0)
+    positions: positions of the go-around, m, (t, 3).
+    end_altitude: altitude above which the climb ends, m AMSL.
+
+    >>> count_climb_rows(np.array([[0.0, 0.0, 10.0], [0.0, 20.0, 14.0], [0.0, 40.0, 18.0]]), 13.0)
     1
     """
     is_above = positions[:, 2] > end_altitude
     return int(np.argmax(is_above)) if is_above.any() else len(positions)
 
 
-def abort_start(
+def make_abort_start(
     position: Sequence[float], course: float, slope: float, airspeed: float, aircraft: PointMass
 ) -> Records:
-    """Return the start of a go-around at a position on a glide, (1,) of `RETURN_START`.
+    """Return the start of a go-around at a position on a landing glide, as one `RETURN_START` record, (1,).
 
     position: east, north, up, m.
     course: course of the glide over the ground, rad.
@@ -94,7 +97,7 @@ def fly_go_arounds(
     aircraft: PointMass,
     environment: ReturnEnvironment,
 ) -> GoArounds:
-    """Simulate a go-around from each of n starts on a glide to the end of a landing sequence.
+    """Simulate n go-arounds, each from a start on a landing glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
     end_altitude, pitch: altitude above which the climb ends, m AMSL, and its pitch, rad.
@@ -110,21 +113,21 @@ def fly_go_arounds(
     >>> from world.wind import Wind
     >>> aerosonde = load_aircraft("aerosonde")
     >>> made = point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
-    >>> start = abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, made)
+    >>> start = make_abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, made)
     >>> behind = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
     >>> world, law = surroundings(load_scenario("jacksboro")), ArduPilotParameters.load(aerosonde)
     >>> (way,) = fly_go_arounds(start, 840.0, 0.17, behind, law, made, world).ways
-    >>> k = climb_rows(way, 840.0)
+    >>> k = count_climb_rows(way, 840.0)
     >>> bool(abs(way[k, 0]) < 1.0), bool(abs(way[-1, 0] - 800.0) < 100.0), bool(way[:, 2].min() > 797.0)
     (True, True, True)
     """
     flown = np.zeros(len(starts), RETURN_RESULT)
     record, climb_parameters, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
-    climb.climbs, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
+    climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
 
     def fly(k: int, landing: LandingStart) -> Floats:
-        stages = np.concatenate([straight_on(starts[k]), _make_stages((landing, *landing.next_stops), parameters)])
+        stages = np.concatenate([waypoint_ahead(starts[k]), _make_stages((landing, *landing.next_stops), parameters)])
         stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
         timeout = rtl_timeout(starts[k], stages[1:], aircraft) + max(0.0, end_altitude - float(starts[k]["up"]))
         track = np.zeros((int(timeout) + 2, 3))
@@ -155,7 +158,7 @@ def fly_go_arounds(
     for k in range(len(starts)):
         track, landing = fly(k, landings[0]), landings[0]
         # The climb does not depend on the sequence.
-        climb_end = track[min(climb_rows(track, end_altitude), len(track) - 1)]
+        climb_end = track[min(count_climb_rows(track, end_altitude), len(track) - 1)]
         nearest_sequence = nearest_landing_sequence(tuple(climb_end.tolist()), landings)
         if nearest_sequence is not None and nearest_sequence != landing:
             track, landing = fly(k, nearest_sequence), nearest_sequence
@@ -164,7 +167,7 @@ def fly_go_arounds(
 
 
 def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
-    """Return the climb's parameters, as in a take-off: TECS_SPDWEIGHT 2, and both pitch limits at ``pitch``, rad."""
+    """Return the control parameters of the climb: TECS_SPDWEIGHT 2, and both pitch limits at ``pitch`` (rad)."""
     climb_parameters = parameters.record()
     climb_parameters.tecs_speed_weight = 2.0
     climb_parameters.tecs_pitch_min = 0.0
@@ -173,9 +176,9 @@ def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:
 
 
 def _make_stages(sequence: Sequence[LandingStart], parameters: ArduPilotParameters) -> Records:
-    """Return the stops up to the first loiter, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`."""
-    places = truncate_at_first_loiter(sequence)
-    stages: Records = np.zeros(len(places), WAYPOINT)
-    for stage, place in zip(stages, places, strict=True):
-        fill_stage(stage, place, parameters)
+    """Return the stops of a landing sequence up to its first loiter, as n `WAYPOINT` records."""
+    stops = truncate_at_first_loiter(sequence)
+    stages: Records = np.zeros(len(stops), WAYPOINT)
+    for stage, stop in zip(stages, stops, strict=True):
+        fill_stage(stage, stop, parameters)
     return stages

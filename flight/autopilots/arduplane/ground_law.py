@@ -54,9 +54,9 @@ from flight.simulation.tick import (
     STALLED,
     WORKSPACE,
     WORKSPACE_NUMBERS,
+    airborne_end_code,
     begin_tick,
     fill_tick,
-    status_in_air,
 )
 from world.arrays import Floats, Heights
 from world.geometry import wrap
@@ -167,9 +167,9 @@ _MOTOR_START_TIMEOUT_S = 10.0
 
 @compiled
 def ground_tick(block: Floats, heights: Heights) -> int:
-    """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick.
 
-    Return a key of its `ENDS`, or 0 to fly on.
+    Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
     """
     path_begins = WORKSPACE_NUMBERS + GROUND_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
@@ -220,7 +220,10 @@ def ground_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+
+    The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+    """
     for _ in range(count):
         read_state(block, numbers, code)
         status = ground_tick(block, heights)
@@ -232,7 +235,7 @@ def ground_loop(
 
 @inner
 def update_ground_contact(state: Record, clearance: float, ground: Record) -> None:
-    """Update whether the aircraft touches the ground, and whether it is tipped over; assume level ground, as in JSBSim.
+    """Update the flags for ground contact and for a tipped aircraft; the ground is level, as in JSBSim.
 
     state: a `flight.dynamics.state.STATE` record.
     clearance: height of the center of gravity above ground, m.
@@ -253,15 +256,15 @@ def update_ground_contact(state: Record, clearance: float, ground: Record) -> No
 
 @inner
 def end_status(work: Record, ground: Record) -> int:
-    """Return a key of `ENDS` if the flight has ended, or 0 to fly on.
+    """Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
 
     work: a `flight.simulation.tick.WORKSPACE` record.
-    ground: a `GROUND_STATE` record, whose stage any control law may set.
+    ground: a `GROUND_STATE` record, of this or of another control law.
     """
     state, ground_speed = work.state, math.hypot(work.true.velocity_east, work.true.velocity_north)
     is_battery_empty = work.air.energy >= work.settings.battery
     if ground.stage == IN_AIR:
-        return GROUND if ground.touches_ground else status_in_air(work)
+        return GROUND if ground.touches_ground else airborne_end_code(work)
     if abs(state.roll) > LOSS_OF_CONTROL_BANK_RAD:
         return END_OVERBANK
     if ground.is_tipped and ground_speed > ground.turnover_speed:
@@ -291,7 +294,7 @@ def end_status(work: Record, ground: Record) -> int:
 
 @inner
 def _tick_take_off(work: Record, arduplane: Record, waypoints: Records, pieces: Records) -> None:
-    """Run one tick of the take-off, which fills the commands; at the end of the take-off, begin the first leg."""
+    """Set the commands for one tick of the take-off; once the take-off is complete, begin the first leg."""
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
     eas2tas = true_by_equivalent(estimated.up)
@@ -361,7 +364,7 @@ def _limit_rotation_pitch(estimated: Record, parameters: Record, ground: Record,
 def _set_take_off_parameters(
     estimated: Record, parameters: Record, stage_parameters: Record, ground: Record, roll_error: float
 ) -> None:
-    """Set the parameters of the take-off: fixed pitch, speed by pitch, and a bank limit that grows with height.
+    """Set the control parameters of the take-off: a fixed pitch, speed by pitch, bank limit by height.
 
     Follows `Plane::takeoff_calc_pitch` and `Plane::takeoff_calc_roll`.
 
@@ -382,7 +385,7 @@ def _set_take_off_parameters(
 
 @inner
 def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) -> float:
-    """Return the fraction of the minimum pitch that applies near the end of the take-off.
+    """Return the factor (0..1) on the minimum pitch near the end of the take-off; 1 before.
 
     Follows `Plane::get_takeoff_pitch_min_cd`: the pitch is reduced once the climb would reach the end altitude within
     TKOFF_PLIM_SEC.
@@ -403,7 +406,7 @@ def _leveling_fraction(estimated: Record, parameters: Record, ground: Record) ->
 
 @inner
 def _demand_heading(state: Record, estimated: Record, parameters: Record, ground: Record, memory: Record) -> None:
-    """Set the lateral acceleration demand to hold the heading, or to 0 before that heading is known.
+    """Set the lateral acceleration demand to hold the take-off heading; 0 while the heading is not known.
 
     Follows `AP_L1_Control::update_heading_hold`.
     """
@@ -427,7 +430,7 @@ def _demand_heading(state: Record, estimated: Record, parameters: Record, ground
 def _begin_first_leg(
     estimated: Record, waypoints: Records, pieces: Records, guidance: Record, ground: Record, memory: Record
 ) -> None:
-    """Begin the leg after the take-off at the aircraft's position; the leg follows no line (`Plane::set_next_WP`)."""
+    """Begin the leg after the take-off at the aircraft's position, without a line to follow (`Plane::set_next_WP`)."""
     ground.stage = IN_AIR
     memory.leg = ground.leg
     memory.from_east, memory.from_north, memory.from_up = estimated.east, estimated.north, estimated.up
@@ -444,9 +447,9 @@ def _begin_first_leg(
 
 @inner
 def _tick_landing(work: Record, arduplane: Record, landing_point: Record) -> None:
-    """Run one tick of the landing.
+    """Set the commands for one tick of the landing.
 
-    landing_point: waypoint of the landing point.
+    landing_point: waypoint record of the landing point.
     """
     state, estimated, ground, memory = work.state, work.estimated, arduplane.ground, arduplane.memory
     dt, stage_parameters = work.timing.dt, arduplane.stage_parameters
@@ -485,14 +488,14 @@ def _follow_line_to_point(
 
     Follows `AP_L1_Control::update_waypoint`.
 
-    Return the remaining distance along the line (m), the flown fraction of the line, the magnitude of L1's angle
-    (`_last_Nu`, rad), and the cross-track distance (m).
+    Return the remaining distance along the line (m), the fraction of the line already flown, the magnitude of L1's
+    angle (`_last_Nu`, rad), and the magnitude of the cross-track error (m).
     """
     leg_e, leg_n = ground.east - memory.from_east, ground.north - memory.from_north
     line_length = max(1e-6, math.hypot(leg_e, leg_n))
     unit_e, unit_n = leg_e / line_length, leg_n / line_length
     offset_e, offset_n = estimated.east - memory.from_east, estimated.north - memory.from_north
-    along, cross_track = offset_e * unit_e + offset_n * unit_n, offset_e * unit_n - offset_n * unit_e
+    distance_along, cross_track = offset_e * unit_e + offset_n * unit_n, offset_e * unit_n - offset_n * unit_e
     extended_length = math.hypot(offset_e, offset_n) + _LINE_EXTENSION_M
     ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
     l1_distance = l1_length(ground_speed, parameters.navl1_period, parameters.navl1_damping)
@@ -511,7 +514,7 @@ def _follow_line_to_point(
         angle += aim_angle + memory.cross_track_integrator
     angle = keep_turn_side(estimated, angle, ground.east, ground.north, memory)
     memory.lateral_acceleration = l1_acceleration(angle, ground_speed, l1_distance, parameters.navl1_damping)
-    return line_length - along, along / line_length, abs(angle), abs(cross_track)
+    return line_length - distance_along, distance_along / line_length, abs(angle), abs(cross_track)
 
 
 @inner
@@ -522,7 +525,7 @@ def _update_stage(
     memory: Record,
     line_position: tuple[float, float, float, float],
 ) -> None:
-    """Change to the approach stage or to the flare once the stage's condition is met.
+    """Begin the approach stage or the flare once its condition is met.
 
     Follows `AP_Landing::type_slope_verify_land`.
 
@@ -561,7 +564,9 @@ def _update_stage(
 def _demand_glide(
     estimated: Record, parameters: Record, ground: Record, memory: Record, remaining_distance: float
 ) -> None:
-    """Set the altitude and climb rate demands of the glide, or of the flare, whose sink rate blends to TECS_LAND_SINK.
+    """Set the altitude and climb rate demands on the glide or in the flare.
+
+    In the flare the sink rate changes gradually to TECS_LAND_SINK.
 
     Follows `AP_Landing::type_slope_setup_landing_glide_slope` and `AP_TECS::_update_height_demand`.
 
@@ -591,9 +596,9 @@ def _demand_glide(
 def _set_landing_parameters(
     estimated: Record, parameters: Record, stage_parameters: Record, ground: Record, line_fraction: float
 ) -> None:
-    """Set the parameters of the landing.
+    """Set the control parameters of the current landing stage in ``stage_parameters``.
 
-    line_fraction: flown fraction of the line to the landing point.
+    line_fraction: fraction of the line to the landing point that is already flown.
     """
     stage_parameters.tecs_time = parameters.landing_time
     stage_parameters.airspeed_min, stage_parameters.tecs_pitch_damping = (

@@ -1,8 +1,8 @@
-"""Compute ArduPlane's glide from the waypoint before the landing, and its go-around altitude.
+"""Compute ArduPlane's landing glide and the height of its go-around.
 
-From that waypoint ArduPlane flies a straight slope to the start of the flare, before and above the landing point.  The
-height at the start of the flare is the sink rate of the slope times LAND_FLARE_SEC, at most twice LAND_FLARE_ALT; the
-distance from the landing point is flown while the sink rate falls to TECS_LAND_SINK.  Follows
+From the waypoint before the landing point ArduPlane flies a straight slope to the start of the flare.  The height of
+the flare is the sink rate of the slope times LAND_FLARE_SEC, at most twice LAND_FLARE_ALT; its length is the distance
+flown while the sink rate falls to TECS_LAND_SINK.  Follows
 `AP_Landing::type_slope_setup_landing_glide_slope` and `type_slope_get_target_airspeed_cm`
 (libraries/AP_Landing/AP_Landing_Slope.cpp) in ArduPlane 4.6.
 """
@@ -16,12 +16,12 @@ _MAX_FLARE_FRACTION = 0.5
 _MIN_GROUND_SPEED_MPS = 0.5
 # Lower limit of the mean sink rate in the flare, m/s.
 _MIN_SINK_MPS = 0.1
-# Default altitude of a go-around over home, m, if neither the landing item nor a take-off states one.
-_GO_AROUND_ALTITUDE_M = 30.0
+# Default height of a go-around above home, m, if neither the landing item nor a take-off states one.
+_GO_AROUND_HEIGHT_M = 30.0
 
 
 def landing_airspeed(parameters: ArduPilotParameters, tail_wind: float) -> float:
-    """Return the equivalent airspeed on the glide, m/s.
+    """Return the equivalent airspeed on the landing glide, m/s.
 
     The airspeed is TECS_LAND_ARSPD, or by default midway between AIRSPEED_MIN and AIRSPEED_CRUISE, increased in a head
     wind, and never above AIRSPEED_CRUISE.
@@ -72,9 +72,12 @@ def landing_glide(height: float, distance: float, ground_speed: float, parameter
 
 
 def go_around_height(stated_height: float, takeoff_height: float) -> float:
-    """Return the height of a go-around above home, m: from the landing item, else from the take-off, else 30 m.
+    """Return the height of a go-around above home, m: as the landing item or else the take-off states it, or 30 m.
+
+    stated_height: height that the landing item states, m; 0 if it states none.
+    takeoff_height: height of the take-off item above home, m; 0 without a take-off.
 
     >>> go_around_height(50.0, 80.0), go_around_height(0.0, 80.0), go_around_height(0.0, 0.0)
     (50.0, 80.0, 30.0)
     """
-    return next((height for height in (stated_height, takeoff_height) if height > 0.0), _GO_AROUND_ALTITUDE_M)
+    return next((height for height in (stated_height, takeoff_height) if height > 0.0), _GO_AROUND_HEIGHT_M)

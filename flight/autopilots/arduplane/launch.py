@@ -21,7 +21,7 @@ _MOTOR_START_TIMEOUT_S = 5.0
 
 
 def motor_start(acceleration: float, speed: float, incline: float, parameters: ArduPilotParameters) -> float:
-    """Return the time of the motor start after the release, s; it is negative on the rail.
+    """Return the time from the release to the motor start, s; negative if the motor starts on the rail.
 
     The result is inf if the motor never starts, and -inf if the motor runs before the launch.
 

@@ -1,4 +1,4 @@
-"""Implement ArduPlane's control law as compiled code, with its memory, the altitude demand of a leg, and a tick."""
+"""Implement ArduPlane's control law as compiled code: its memory, the altitude demand on a leg, and one tick."""
 
 import math
 
@@ -153,10 +153,10 @@ def update_height_demand(estimated: Record, target: Record, parameters: Record, 
 
 @inner
 def _is_altitude_step(start_altitude: float, altitude_change: float, target: Record, parameters: Record) -> bool:
-    """Return True if the altitude demand of a leg jumps to the altitude of the leg's end instead of following a slope.
+    """Return True if the altitude demand jumps to the altitude of the leg's end instead of following a slope.
 
-    A descent follows a slope. A climb is a step if FLIGHT_OPTIONS demands immediate climbs, and in 4.6 also if the
-    leg begins low over home (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
+    A descent follows a slope.  A climb is a step if FLIGHT_OPTIONS demands immediate climbs, and in 4.6 also if the
+    leg begins at a low height above home (`Plane::setup_glide_slope`, in 4.7 `setup_alt_slope`).
 
     start_altitude: altitude of the leg's start, m AMSL.
     altitude_change: height of the leg's end above the aircraft, m.
@@ -171,10 +171,10 @@ def _is_altitude_step(start_altitude: float, altitude_change: float, target: Rec
 
 @inner
 def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude demand of a leg at the aircraft, m AMSL: on the leg's slope, or the altitude of its end.
+    """Return the altitude demand on a leg at the aircraft, m AMSL: on the leg's slope, or the altitude of its end.
 
-    The slope of a leg to a loiter leads to the loiter's center. The altitude of the leg's end applies if the altitude
-    changes in a step or only a little, on a loiter, and in 4.7 in a climb while the aircraft is low over home
+    The slope of a leg to a loiter leads to the loiter's center.  The altitude of the leg's end applies if the altitude
+    changes in a step or only a little, on a loiter, and in 4.7 in a climb while the aircraft is low above home
     (`Plane::set_target_altitude_proportion`).
     """
     end_altitude: float = target.up
@@ -217,11 +217,11 @@ def _leg_altitude(estimated: Record, target: Record, parameters: Record, memory:
 
 @inner
 def _leg_altitude_above_terrain(estimated: Record, target: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude demand of a leg above terrain at the aircraft, m AMSL.
+    """Return the altitude demand at the aircraft on a leg that follows the terrain, m AMSL.
 
-    The demanded height above ground changes linearly along the leg, from the height of the leg's start above the ground
-    there (`Plane::set_target_altitude_proportion_terrain`).  The rise of the terrain ahead that exceeds half of the
-    maximum climb rate is added, less the leg's descent (`lookahead_adjustment` in ArduPlane/altitude.cpp).
+    The demanded height above ground changes linearly along the leg, from the height above ground of the leg's start
+    (`Plane::set_target_altitude_proportion_terrain`).  If the terrain ahead rises faster than half of the maximum climb
+    rate allows, the excess is added, less the leg's descent (`lookahead_adjustment` in ArduPlane/altitude.cpp).
     """
     if memory.terrain_leg != memory.leg + 1:
         # The leg began in this update: `update_terrain_lookahead` has not yet looked up the ground at its start.
@@ -244,7 +244,7 @@ def _leg_altitude_above_terrain(estimated: Record, target: Record, parameters: R
 def update_terrain_lookahead(
     work: Record, heights: Heights, waypoints: Records, parameters: Record, memory: Record
 ) -> None:  # pragma: no cover
-    """Update the ground below the aircraft and the terrain lookahead on a leg above terrain.
+    """Update the ground altitude at the aircraft and the terrain lookahead on a leg that follows the terrain.
 
     At the first update of a leg, store the height above ground of its start.  The lookahead follows
     `AP_Terrain::lookahead` with half of TECS_CLMB_MAX as the climb: one sample every TERRAIN_SPACING towards the
@@ -253,7 +253,7 @@ def update_terrain_lookahead(
     work: a record of `flight.simulation.tick.WORKSPACE`.
     """
     target = waypoints[memory.leg + 1]
-    # Before the law's first update, the start of the first leg is not set.
+    # Before the first update of the control law, the start of the first leg is not set.
     if (
         not memory.is_initialised
         or not target.follows_terrain
@@ -290,7 +290,7 @@ def update_terrain_lookahead(
 
 @inner
 def _rtl_altitude(estimated: Record, rtl: Record, parameters: Record, memory: Record) -> float:
-    """Return the altitude demand of an RTL, m AMSL: on a straight slope in a descent, else the target's altitude.
+    """Return the altitude demand of an RTL, m AMSL: in a descent on a straight slope, otherwise the target's altitude.
 
     The slope leads from the start of the RTL to the center of its loiter; on the loiter the target's altitude applies
     (`Plane::setup_glide_slope`, `Mode::update_target_altitude`).  The slope down to a rally point is computed as if the
@@ -334,9 +334,9 @@ _MAX_PITCH_RATE_RADPS = math.radians(40.0)
 
 @compiled
 def arduplane_tick(block: Floats, heights: Heights) -> int:
-    """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick.
 
-    Return a key of its `ENDS`, or 0 to fly on.
+    Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
     """
     path_begins = WORKSPACE_NUMBERS + ARDUPLANE_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
@@ -373,7 +373,10 @@ def arduplane_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+
+    The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+    """
     for _ in range(count):
         read_state(block, numbers, code)
         status = arduplane_tick(block, heights)
@@ -397,7 +400,7 @@ def control_as_ardupilot(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick of ``dt`` seconds, and update both memories.
+    """Compute the commands for one tick of ``dt`` seconds, and update ``guidance`` and ``memory``.
 
     guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
@@ -445,7 +448,7 @@ def control_as_ardupilot(
 def initialise_memory(
     state: Record, estimated: Record, waypoints: Records, guidance: Record, parameters: Record, memory: Record
 ) -> None:
-    """Initialise the memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
+    """Initialise the control law's memory for steady flight at the first waypoint (`AP_TECS::_initialise_states`)."""
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
     memory.altitude_demand_in = estimated.up

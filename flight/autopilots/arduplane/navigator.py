@@ -65,9 +65,12 @@ def turn_distance(acceptance: float, turn_angle: float, wp_radius: float, l1_dis
 
 @inner
 def is_past_finish_line(estimated: Record, from_east: float, from_north: float, east: float, north: float) -> bool:
-    """Return True if the aircraft is past the line across the leg's end (east, north), or if the leg has no length.
+    """Return True if the aircraft is past the line across the end of a leg, or if the leg has no length.
 
     Follows `Location::past_interval_finish_line`.
+
+    from_east, from_north: start of the leg, m.
+    east, north: end of the leg, m.
     """
     leg_e, leg_n = east - from_east, north - from_north
     remaining_e, remaining_n = east - estimated.east, north - estimated.north
@@ -90,7 +93,7 @@ def navigate_legs(
     parameters: of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
     memory: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
     eas2tas: ratio of true to equivalent airspeed.
-    dt: s since the last update.
+    dt: time since the last update, s.
     """
     target = waypoints[memory.leg + 1]
     ground_speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
@@ -115,9 +118,9 @@ def navigate_legs(
 
 @inner
 def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
-    """Return east and north (m) of the leg's end: the target, or a point beyond the target with a pass-by distance.
+    """Return east and north of the leg's end, m: the target, or a point beyond it if it has a pass-by distance.
 
-    Follows `Plane::verify_nav_wp`, which moves the waypoint along the leg by that distance.
+    Follows `Plane::verify_nav_wp`, which moves the waypoint along the leg by the pass-by distance.
     """
     leg_e, leg_n = target.east - memory.from_east, target.north - memory.from_north
     leg_length = math.hypot(leg_e, leg_n)
@@ -128,7 +131,7 @@ def _leg_end(target: Record, memory: Record) -> tuple[float, float]:
 
 @inner
 def target_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north (m) of a waypoint, or of the loiter's center for a waypoint of a loiter."""
+    """Return east and north of a waypoint, m; for a waypoint on a loiter, of the loiter's center."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0 and not waypoint.is_rtl
@@ -168,7 +171,7 @@ def _follow_line(
 
 @inner
 def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: float, memory: Record) -> float:
-    """Return L1's angle (rad), or L1's last angle if a turn of almost 180 degrees has just changed its side.
+    """Return L1's angle, rad; in a turn of almost 180 degrees, the last angle if the new one would reverse the turn.
 
     Follows `AP_L1_Control::_prevent_indecision`, with the course instead of the heading.
 
@@ -191,7 +194,7 @@ def keep_turn_side(estimated: Record, angle: float, target_e: float, target_n: f
 def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
     """Return the turn angle at the target that ArduPlane uses, rad, positive (`Plane::setup_turn_angle`).
 
-    If the target or the next waypoint belongs to a loiter, the leg there leads from or to the loiter's center.
+    If the current or the next leg begins or ends on a loiter, its course is measured from or to the loiter's center.
     """
     turn_angle: float = target.turn
     if memory.leg + 2 >= waypoints.shape[0]:
@@ -206,7 +209,11 @@ def _turn_angle(waypoints: Records, target: Record, memory: Record) -> float:
 
 @inner
 def _begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
-    """Begin a leg on the line between its two waypoints, or from the aircraft if the aircraft is past the leg's end."""
+    """Begin the leg with the index ``leg``, and reset the memory of the last loiter.
+
+    The leg's line starts at its first waypoint.  It starts at the aircraft if the aircraft leaves a loiter on a
+    tangent, or is already past the leg's end.
+    """
     start, target = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
     # The next loiter has not been captured yet, even if the current one was.
@@ -239,7 +246,8 @@ def _is_leg_over(
 ) -> bool:
     """Return True if the leg's end is within the turn distance, or if the aircraft is past the line across the end.
 
-    Follows `Plane::verify_nav_wp`. Beyond WP_MAX_RADIUS from the target the leg is never over.
+    Follows `Plane::verify_nav_wp`.  Beyond WP_MAX_RADIUS from the target the leg is never over; an aircraft that passes
+    the target there turns back to it.
 
     end_e, end_n: end of the leg, m; with a pass-by distance it lies beyond the target, and the aircraft flies to it.
     turn_angle: turn of the route at the target, rad.
@@ -276,7 +284,7 @@ def _update_loiter(
 
     Follows `Plane::update_loiter`.
 
-    loiter: the corner of the route that stands for the loiter; its circle has the radius at its altitude.
+    loiter: waypoint on the loiter; its loiter_radius is the radius at the altitude of the waypoint.
     """
     eas2tas_ratio = eas2tas / true_by_equivalent(loiter.up)
     radius = abs(loiter.loiter_radius) * eas2tas_ratio * eas2tas_ratio
@@ -317,7 +325,10 @@ def _update_loiter(
 
 @inner
 def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: float) -> None:
-    """Update the time and the angle around a loiter since its capture (`Plane::loiter_angle_update`)."""
+    """Update the time on a loiter and the angle flown around it, both since the aircraft captured the loiter.
+
+    Also record that the loiter's altitude is reached.  Follows `Plane::loiter_angle_update`.
+    """
     bearing = math.atan2(estimated.east - loiter.centre_east, estimated.north - loiter.centre_north)
     if memory.loiter_started:
         memory.loiter_time += dt
@@ -336,6 +347,7 @@ def _update_loiter_angle(estimated: Record, loiter: Record, memory: Record, dt: 
 def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
     """Return True once the loiter's turns or time are complete, or its altitude is reached.
 
+    An altitude that the aircraft hardly approaches in three laps is treated as reached.
     Follows `Plane::verify_loiter_turns`, `verify_loiter_time` and `verify_loiter_to_alt`.
     """
     if not memory.loiter_started:
@@ -357,9 +369,10 @@ def _is_loiter_done(estimated: Record, loiter: Record, memory: Record) -> bool:
 def _is_heading_lined_up(
     estimated: Record, next_waypoint: Record, loiter: Record, radius: float, memory: Record
 ) -> bool:
-    """Return True if the tangent of a loiter's circle at the aircraft leads to the next waypoint, within the tolerance.
+    """Return True if an aircraft on a loiter heads for the next waypoint, within a tolerance that grows with each lap.
 
-    No tangent leads to a waypoint inside the circle: the aircraft then leaves on a tangent that passes the waypoint.
+    From a loiter with an exit bearing, the aircraft leaves on this bearing.  No tangent leads to a waypoint inside the
+    circle: the aircraft then leaves on a tangent that passes the waypoint.
     Follows `ModeLoiter::isHeadingLinedUp`, whose tangent touches the circle in the direction of the aircraft from the
     center.
 
@@ -425,7 +438,9 @@ def _navigate_rtl(estimated: Record, rtl: Record, parameters: Record, memory: Re
 
 @inner
 def _join_landing(estimated: Record, waypoints: Records, rtl: Record, memory: Record) -> None:
-    """Leave the RTL loiter for the landing sequence, if any, once the aircraft loiters near the loiter's altitude.
+    """Leave the RTL loiter for the landing sequence once the aircraft loiters near the target altitude.
+
+    Without a landing sequence the aircraft stays on the loiter.
 
     Follows `ModeRTL::navigate` of ArduPlane 4.6 with RTL_AUTOLAND 1.  The next leg begins at the aircraft.
     """
@@ -457,8 +472,8 @@ def _loiter_acceleration(
     """Return the lateral acceleration that a loiter demands, m/s^2 (`AP_L1_Control::update_loiter`).
 
     The aircraft steers straight to the center until the circle demands the sharper turn, and then flies around the
-    circle.  The circle then counts as reached, even if a gust or a radius that is too small takes the aircraft out of
-    it.
+    circle.  From then on the loiter is marked as reached, even if a gust or too small a radius takes the aircraft out
+    of the circle.
     """
     direction = math.copysign(1.0, loiter.loiter_radius)
     offset_e, offset_n = estimated.east - loiter.centre_east, estimated.north - loiter.centre_north

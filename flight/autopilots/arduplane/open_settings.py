@@ -189,17 +189,17 @@ def describe_open_settings(parameters: ArduPilotParameters, mission: MissionPart
         and not (setting.zero_is_off and values[name] == 0.0)
         and not (by_program and setting.by_program)
     ]
-    return [*texts, *_describe_others(parameters, values, mission, by_program=by_program)]
+    return [*texts, *_describe_dependent_settings(parameters, values, mission, by_program=by_program)]
 
 
-def _describe_others(
+def _describe_dependent_settings(
     parameters: ArduPilotParameters, values: dict[str, float], mission: MissionParts, *, by_program: bool
 ) -> Iterator[str]:
-    """Describe settings that depend on one another, on the mission or on the aircraft."""
+    """Describe settings whose effect depends on other settings, on the mission or on the aircraft."""
     yield from _describe_airspeed_sensor(values)
-    yield from _describe_estimate(values)
+    yield from _describe_position_estimate(values)
     yield from _describe_arming(parameters, values, mission)
-    yield from _describe_outputs(parameters, values)
+    yield from _describe_missing_outputs(parameters, values)
     if mission.follows_terrain and parameters.terrain_spacing > _MAX_TERRAIN_SPACING_M:
         # `AP_Terrain::height_amsl` interpolates between points of that spacing.
         yield (
@@ -251,7 +251,10 @@ def _describe_others(
 
 
 def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe an airspeed that is not measured or not used: `AP_Airspeed::update` takes the first sensor there is."""
+    """Describe settings without which no airspeed is measured or used.
+
+    `AP_Airspeed::update` takes the first sensor if the primary one is missing.
+    """
     primary = int(values["ARSPD_PRIMARY"]) + 1
     prefixes = {number: f"ARSPD{number if number > 1 else ''}" for number in range(1, _AIRSPEED_SENSORS + 1)}
     present = [number for number, prefix in prefixes.items() if values[f"{prefix}_TYPE"] != 0.0]
@@ -264,8 +267,8 @@ def _describe_airspeed_sensor(values: Mapping[str, float]) -> Iterator[str]:
         yield f"{use} {values[use]:g} affects the flight, but is not simulated"
 
 
-def _describe_estimate(values: Mapping[str, float]) -> Iterator[str]:
-    """Describe settings with which ArduPlane has no position, or not that of EKF3."""
+def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
+    """Describe settings with which ArduPlane has no position, or a position from another estimator than EKF3."""
     type_names: tuple[str, ...] = ("GPS1_TYPE", "GPS2_TYPE")
     if values["GPS_AUTO_SWITCH"] == 0.0:
         type_names = type_names[int(values["GPS_PRIMARY"] != 0.0) :][:1]
@@ -285,7 +288,7 @@ def _describe_estimate(values: Mapping[str, float]) -> Iterator[str]:
 def _describe_arming(
     parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
 ) -> Iterator[str]:
-    """Describe missing items, marks and limits with which ArduPlane does not arm."""
+    """Describe missing items, items that RTL_AUTOLAND 0 forbids, and values that prevent arming."""
     # 4.7 has ARMING_SKIPCHK for ARMING_CHECK.
     if values["ARMING_CHECK"] == 0.0 or values["ARMING_SKIPCHK"] != 0.0 or values["ARMING_REQUIRE"] == 0.0:
         return
@@ -302,8 +305,8 @@ def _describe_arming(
             yield f"ARMING_MIS_ITEMS {values['ARMING_MIS_ITEMS']:g} prevents arming without {command.name}"
 
 
-def _describe_outputs(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe outputs that move no ailerons, no elevator or no motor."""
+def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
+    """Describe each of ailerons, elevator and motor to which the user's file assigns no servo output."""
     if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
         return
     count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
@@ -316,7 +319,7 @@ def _describe_outputs(parameters: ArduPilotParameters, values: Mapping[str, floa
 
 
 def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
-    """Describe limits of the pitch rate that hold back a turn or a climb, deg/s.
+    """Describe limits of the pitch rate that are too low for turns or for changes of pitch.
 
     `AP_PitchController::get_servo_out` limits the rate that a turn needs together with the rate that changes the pitch.
     """
@@ -332,7 +335,7 @@ def _describe_pitch_rates(parameters: ArduPilotParameters, values: Mapping[str, 
 
 
 def _describe_rate_gains(parameters: ArduPilotParameters, aircraft: Aircraft | None) -> Iterator[str]:
-    """Describe gains of the file with which the aircraft does not follow its attitude.
+    """Describe gains of the user's file that are too low or too high to hold the aircraft's attitude.
 
     The gains of the aircraft's own file are assumed to suit the aircraft, and so are ArduPlane's defaults.
     """

@@ -439,14 +439,14 @@ class ArduPilotParameters(ParameterSet):
         object.__setattr__(self, "altitude_slope_min", self.altitude_slope_min or math.inf)
 
     @classmethod
-    def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
+    def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
         """Return the values in the aircraft's file that the control law reads, or that leave a verdict open."""
         values, _ = cls.table.read(entries)
         return {name: value for name, value in values.items() if name not in _NEEDED_BY_AIRCRAFT}
 
     @classmethod
-    def _known_in_release(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Return the sources without parameters that 4.6 does not have, and the names of those in the file."""
+    def _without_unknown(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
+        """Remove parameters that 4.6 lacks; return the remaining sources, and the removed names of the file."""
         if not fields or fields[0] != "4.6":
             return sources, ()
         stated_names = [name for origin, values in sources for name in values if origin == "file"]
@@ -457,7 +457,7 @@ class ArduPilotParameters(ParameterSet):
         return [*known, ("default", _FIXED_IN_4_6)], tuple(name for name in stated_names if name in _FIXED_IN_4_6)
 
     def in_release(self, version: ArduPlaneVersion) -> Self:
-        """Return the same parameters in another release.
+        """Return the same parameters for another ArduPlane release.
 
         >>> ArduPilotParameters.defaults().in_release("4.6").climb_slope_height
         20.0
@@ -467,7 +467,7 @@ class ArduPilotParameters(ParameterSet):
 
     @property
     def resets_jump_counters(self) -> bool:
-        """True if an exhausted counter of a jump is reset: in 4.7, unless bit 3 of MIS_OPTIONS is set.
+        """True if ArduPlane resets the counter of a completed jump: in 4.7, unless bit 3 of MIS_OPTIONS is set.
 
         >>> [ArduPilotParameters.defaults().changed(MIS_OPTIONS=bits).resets_jump_counters for bits in (0, 8)]
         [True, False]
@@ -490,7 +490,7 @@ class ArduPilotParameters(ParameterSet):
 
     @property
     def has_fence_of_its_own(self) -> bool:
-        """True if its fence is on, acts, and has a circle about home or altitudes.
+        """True if ArduPlane's own fence (a circle about home, or altitude limits) is on and triggers an action.
 
         >>> default = ArduPilotParameters.defaults()
         >>> [default.changed(FENCE_ENABLE=1, FENCE_TYPE=kind).has_fence_of_its_own for kind in (4, 6)]
@@ -503,8 +503,9 @@ class ArduPilotParameters(ParameterSet):
     def return_radius(self) -> float:
         """Radius of the RTL loiter, m at sea level, negative to the left.
 
-        RTL_RADIUS, or WP_LOITER_RAD if RTL_RADIUS is 1 m or less, or 60 m if both are; to the side of RTL_RADIUS if
-        that is not 0 (`ModeRTL::navigate` in ArduPlane/mode_rtl.cpp, `Plane::update_loiter` in navigation.cpp).
+        It is RTL_RADIUS, or WP_LOITER_RAD if RTL_RADIUS is at most 1 m, or 60 m if both are at most 1 m.  The sign is
+        the sign of RTL_RADIUS unless RTL_RADIUS is 0 (`ModeRTL::navigate` in ArduPlane/mode_rtl.cpp,
+        `Plane::update_loiter` in navigation.cpp).
 
         >>> made = ArduPilotParameters.defaults()
         >>> [made.changed(RTL_RADIUS=m, WP_LOITER_RAD=-80.0).return_radius for m in (0.0, -150.0, 1.0)]

@@ -1,7 +1,7 @@
 """Model an aircraft as a point mass for compiled code, with drag, thrust and power from its trims.
 
-Bank and pitch are given; the flight path is below the pitch by the angle of attack, which grows with the load factor.
-Specific excess power is taken from trims at the throttle, airspeed and altitude, less the induced drag of the bank.
+Bank and pitch are inputs; the path angle is the pitch minus the angle of attack, which grows with the load factor.
+Specific excess power is interpolated from trims by throttle, airspeed and altitude, less the induced drag of the bank.
 """
 
 import functools
@@ -33,14 +33,14 @@ _ALTITUDES_M = (0.0, 2000.0, 4000.0)
 # altitude of the grid.
 POINT_MASS = record_dtype(
     "airspeed",  # m/s, commanded, equivalent
-    "slowest",  # m/s, true, of the first row
-    "speed_step",
-    "height_step",
+    "first_airspeed",  # m/s, true airspeed of the first row
+    "airspeed_step",  # m/s between rows
+    "altitude_step",  # m between columns
     "alpha",  # rad, angle of attack without lift
     "alpha_lift",  # rad m^2/s^2, angle of attack from lift in straight flight, times the square of airspeed
     "induced",  # m^2/s^2, induced drag per weight in straight flight, times the square of airspeed
     "wind_speed",  # m/s at the reference height
-    "wind_east",  # unit vector towards which it blows
+    "wind_east",  # unit vector of the direction to which the wind blows
     "wind_north",
     "wind_gradient",
     "wind_reference",
@@ -49,11 +49,11 @@ POINT_MASS = record_dtype(
 
 
 class PointMass(NamedTuple):
-    """Aircraft model for a simulated RTL.
+    """Aircraft model for a simulated RTL, with tables by airspeed (v) and altitude (h).
 
-    record: of `POINT_MASS`.
-    excess: (t, v, h) specific excess power, by throttle, m/s.
-    power: (3, v, h) electric power at idle, in level flight and at full throttle, W.
+    record: a record of `POINT_MASS`.
+    excess: specific excess power, m/s, (t, v, h), with t throttles from 0 to 1.
+    power: electric power at idle, in level flight and at full throttle, W, (3, v, h).
     glides: True if the excess power with closed throttle is known from trims.
     """
 
@@ -70,16 +70,16 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
 
     Beyond the grid of trims, the values at the grid's edge apply.
     """
-    speeds, trims, alpha, lift = _trimmed(aircraft)
-    excess = filled_excess(trims)
+    speeds, trims, alpha, lift = _load_trim_tables(aircraft)
+    excess = fill_excess_power(trims)
     has_power = bool(envelope.power_level.size)
     power = np.full((3, len(speeds), len(_ALTITUDES_M)), np.nan)
     if has_power:
         power_tables = (envelope.power_idle, envelope.power_level, envelope.power_full)
-        power = np.stack([_resample(envelope, table, speeds) for table in power_tables])
+        power = np.stack([_resample_power(envelope, table, speeds) for table in power_tables])
     record: Record = np.zeros(1, POINT_MASS)[0]
-    record.airspeed, record.slowest, record.has_power = airspeed, speeds[0], has_power
-    record.speed_step, record.height_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
+    record.airspeed, record.first_airspeed, record.has_power = airspeed, speeds[0], has_power
+    record.airspeed_step, record.altitude_step = speeds[1] - speeds[0], _ALTITUDES_M[1] - _ALTITUDES_M[0]
     record.alpha, record.alpha_lift = alpha, lift
     record.induced = _induced_drag_factor(speeds, excess[0, :, 0])
     record.wind_speed, record.wind_gradient, record.wind_reference = wind.speed, wind.gradient, wind.reference_amsl
@@ -87,16 +87,17 @@ def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wi
     return PointMass(record, excess, power, bool(np.isfinite(trims[0]).any()))
 
 
-# Version of the cached tables: increase it with any change of `_trims`.
+# Version of the cached tables: increase it with any change of `_compute_trim_tables`.
 _CACHE_VERSION = 2
 
 
 @functools.lru_cache(maxsize=8)
-def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
-    """Return airspeeds (v,), specific excess power (t, v, h), and two terms of the angle of attack.
+def _load_trim_tables(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
+    """Return airspeeds, specific excess power and two coefficients of the angle of attack, from trims or their cache.
 
-    The first term is the angle without lift; the second term, divided by the square of airspeed, is added for lift.
-    Excess power is NaN without a trim.  Trims are cached in the user's cache folder, like the envelope.
+    The airspeeds (v,) and the excess power (t, v, h) are in m/s; the excess power is NaN where no trim exists.  The
+    angle of attack is the first coefficient (rad) plus the second one (rad m^2/s^2) divided by the square of airspeed.
+    Trims are cached in the user's cache folder, like the envelope.
     """
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, _AIRSPEED_COUNT)
     version = model_hash(aircraft)
@@ -105,19 +106,22 @@ def _trimmed(aircraft: Aircraft) -> tuple[Floats, Floats, float, float]:
     shapes = {"excess": (_THROTTLE_COUNT, _AIRSPEED_COUNT, len(_ALTITUDES_M)), "alpha": (_AIRSPEED_COUNT,)}
     tables = read_tables(file, key, shapes)
     if tables is None:
-        tables = _trims(aircraft, speeds)
+        tables = _compute_trim_tables(aircraft, speeds)
         write_tables(file, key, tables)
     alphas = tables["alpha"]
-    _fill(alphas)
+    _fill_gaps(alphas)
     terms = np.stack([np.ones(_AIRSPEED_COUNT), speeds**-2.0], axis=1)
     alpha, lift = least_squares(terms, np.nan_to_num(alphas))
     return speeds, tables["excess"], float(alpha), float(lift)
 
 
-def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
-    """Return specific excess power (t, v, h), and angle of attack at the lowest altitude (v,); both NaN without a trim.
+def _compute_trim_tables(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
+    """Trim the aircraft at each point of the grid; return its specific excess power and its angle of attack.
 
-    speeds: (v,) m/s.
+    "excess" is the specific excess power, m/s, (t, v, h); "alpha" is the angle of attack at the lowest altitude, rad,
+    (v,).  Both are NaN where no trim exists.
+
+    speeds: airspeeds of the grid, m/s, (v,).
     """
     simulator = Fdm(aircraft)
     excess = np.full((_THROTTLE_COUNT, _AIRSPEED_COUNT, len(_ALTITUDES_M)), np.nan)
@@ -138,54 +142,63 @@ def _trims(aircraft: Aircraft, speeds: Floats) -> dict[str, Floats]:
     return {"excess": excess, "alpha": alphas}
 
 
-def filled_excess(trims: Floats) -> Floats:
-    """Return specific excess power (t, v, h) in m/s, with values instead of NaN at grid points without a trim.
+def fill_excess_power(trims: Floats) -> Floats:
+    """Return a table of specific excess power with the gaps (NaN) at grid points without a trim filled, m/s, (t, v, h).
 
-    Such a point takes the value of the nearest throttle, then of the nearest airspeed, then of the nearest altitude.  A
-    closed throttle is filled only from closed throttles, if there are any, because with more throttle the aircraft has
-    thrust and does not glide.
+    A gap is filled from other throttles, then from other airspeeds, then from other altitudes.  With closed throttle it
+    is filled only from trims with closed throttle, if there are any: with more throttle the aircraft does not glide.
 
     >>> trims = np.array([[[-2.0], [np.nan]], [[1.0], [0.5]]])
-    >>> filled_excess(trims)[0].tolist(), filled_excess(trims)[1].tolist()
+    >>> fill_excess_power(trims)[0].tolist(), fill_excess_power(trims)[1].tolist()
     ([[-2.0], [-2.0]], [[1.0], [0.5]])
     """
     excess, closed = trims.copy(), trims[:1].copy()
-    _fill_along(excess, 0)
+    _fill_gaps_along(excess, 0)
     for table in (excess, closed):
-        _fill_along(table, 1)
-        _fill_along(table, 2)
+        _fill_gaps_along(table, 1)
+        _fill_gaps_along(table, 2)
     if np.isfinite(closed).any():
         excess[:1] = closed
     return excess
 
 
-def _fill_along(table: Floats, axis: int) -> None:
-    """Fill NaN in each line along an axis; see `_fill`."""
+def _fill_gaps_along(table: Floats, axis: int) -> None:
+    """Fill the gaps (NaN) of a table along one axis, in place; see `_fill_gaps`."""
     lines = np.moveaxis(table, axis, -1)
     for index in np.ndindex(lines.shape[:-1]):
-        _fill(lines[index])
+        _fill_gaps(lines[index])
 
 
-def _fill(values: Floats) -> None:
-    """Replace NaN by interpolation between known values, and by the nearest known value beyond them."""
+def _fill_gaps(values: Floats) -> None:
+    """Fill gaps (NaN) in place: interpolate between known values, and beyond them repeat the nearest known value.
+
+    Values without any known value are left unchanged.
+    """
     is_known = ~np.isnan(values)
     if is_known.any():
         values[:] = np.interp(np.arange(len(values)), np.flatnonzero(is_known), values[is_known])
 
 
-def _resample(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
-    """Return a table of the envelope at airspeeds (v,) and the grid's altitudes; beyond an edge, the edge's value."""
+def _resample_power(envelope: Envelope, table: Floats, speeds: Floats) -> Floats:
+    """Interpolate a table of the envelope to the airspeeds (v,) and altitudes (h,) of the grid; return it as (v, h).
+
+    Beyond an edge of the table, the value at the edge applies.
+    """
     filled = np.array(table)
     for column in filled.T:
-        _fill(column)
+        _fill_gaps(column)
     by_speed = np.stack([np.interp(speeds, envelope.airspeed, column) for column in filled.T], axis=1)
     return np.stack([np.interp(_ALTITUDES_M, envelope.amsl, row) for row in by_speed])
 
 
 def _induced_drag_factor(speeds: Floats, excess: Floats) -> float:
-    """Return induced drag per weight times the square of airspeed, from glides with closed throttle.
+    """Return the induced drag per weight times the square of airspeed (m^2/s^2), fitted to glides with closed throttle.
 
-    Drag per weight is a V^2 + b / V^2 in straight flight; bank increases b as the square of the load factor.
+    Drag per weight is a V^2 + b / V^2 in straight flight; the result is b, at least 0.  In a bank b grows as the square
+    of the load factor.
+
+    speeds: airspeeds of the glides, m/s, (v,).
+    excess: specific excess power of the glides, m/s, (v,).
     """
     terms = np.stack([speeds**2, speeds**-2.0], axis=1)
     return max(0.0, float(least_squares(terms, -excess / speeds)[1]))
@@ -209,7 +222,12 @@ def advance_point_mass(
     power: Floats,
     dt: float,
 ) -> float:
-    """Move a point mass by ``dt`` s on a path angle relative to the air (rad), and return the power used, W."""
+    """Move a point mass by ``dt`` s, and return the electric power used, W.
+
+    path_angle: climb angle relative to the air, rad.
+    aircraft: a record of `POINT_MASS`.
+    excess_table, power: tables of a `PointMass`.
+    """
     thrust_power = excess_power(excess_table, throttle, state.airspeed, estimated.up, aircraft)
     tan_bank = math.tan(min(1.2, abs(state.roll)))
     net_power = thrust_power - aircraft.induced / state.airspeed * tan_bank * tan_bank
@@ -233,7 +251,10 @@ def advance_point_mass(
 def _electric_power(
     thrust_power: float, excess_table: Floats, power: Floats, airspeed: float, amsl: float, aircraft: Record
 ) -> float:
-    """Return electric power at a specific excess power, W, by the parabola of `Envelope.power`."""
+    """Return the electric power (W) at a specific excess power (m/s), by the parabola of `Envelope.power`.
+
+    Beyond the excess power at idle or at full throttle, the power at idle or at full throttle applies.
+    """
     if not aircraft.has_power:
         return 0.0
     idle_power = _interpolate(power[0], airspeed, amsl, aircraft)
@@ -269,8 +290,8 @@ def excess_power(excess_table: Floats, throttle: float, airspeed: float, amsl: f
 @inner
 def _interpolate(table: Floats, airspeed: float, amsl: float, aircraft: Record) -> float:
     """Interpolate a table (v, h) bilinearly at an airspeed and an altitude; beyond an edge, use the edge's value."""
-    x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.slowest) / aircraft.speed_step))
-    y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.height_step))
+    x = min(table.shape[0] - 1.0, max(0.0, (airspeed - aircraft.first_airspeed) / aircraft.airspeed_step))
+    y = min(table.shape[1] - 1.0, max(0.0, amsl / aircraft.altitude_step))
     i, j = min(table.shape[0] - 2, int(x)), min(table.shape[1] - 2, int(y))
     p, q = x - i, y - j
     low = (1.0 - q) * table[i, j] + q * table[i, j + 1]

@@ -37,18 +37,22 @@ class FileRelease(NamedTuple):
 
 
 def simulated_release(program: str) -> ArduPlaneVersion:
-    """Return the simulated release that is nearest to a program's; the newest if the program states none.
+    """Return the simulated release for a program: the newest one that is not newer than the program's release.
+
+    It is the oldest simulated release for an older program, and the newest one if the program states no release.
 
     >>> programs = ("ArduPlane V4.5.7", "ArduPlane V4.6.3 (3fc7011a)", "ArduPlane V4.7.0-dev", "ArduPilot")
     >>> [simulated_release(program) for program in programs]
     ['4.6', '4.6', '4.7', '4.7']
     """
     found = _PROGRAM_RELEASE.search(program)
-    return NEWEST_ARDUPLANE if found is None else _nearest((int(found[1]), int(found[2])))
+    return NEWEST_ARDUPLANE if found is None else _simulated_release_for((int(found[1]), int(found[2])))
 
 
 def release_note(program: str) -> str:
-    """Return a note if the simulated release differs from a program's release; "" if not, or if none is stated.
+    """Return a note if the simulated release differs from the release of a program that flew; otherwise "".
+
+    The result is also "" if the program states no release.
 
     >>> release_note("ArduPlane V4.5.7"), release_note("ArduPlane V4.7.3")
     ('ArduPlane 4.5 flew it, and 4.6 is simulated', '')
@@ -59,7 +63,7 @@ def release_note(program: str) -> str:
     return f"ArduPlane {int(found[1])}.{int(found[2])} flew it, and {simulated_release(program)} is simulated"
 
 
-def _nearest(release: tuple[int, int]) -> ArduPlaneVersion:
+def _simulated_release_for(release: tuple[int, int]) -> ArduPlaneVersion:
     """Return the newest simulated release that is not newer than a release, or the oldest simulated release."""
     known = [tuple(map(int, version.split("."))) for version in _VERSIONS]
     older = [version for version, numbers in zip(_VERSIONS, known, strict=True) if numbers <= release]
@@ -69,7 +73,7 @@ def _nearest(release: tuple[int, int]) -> ArduPlaneVersion:
 def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
     r"""Return the release that wrote a parameter file, or None if unknown.
 
-    A comment has priority over the names.  Returns None for a file with names of both 4.6 and 4.7, or of neither.
+    A comment has priority over the names.  Return None if the file has names of both 4.6 and 4.7, or of neither.
 
     >>> file_release("#NOTE: ArduPlane V4.5.7\nALT_SLOPE_MIN 15", ["ALT_SLOPE_MIN"])
     FileRelease(release='4.5', evidence='ArduPlane V4.5')
@@ -97,7 +101,7 @@ class ReleaseChoice(NamedTuple):
 
 
 def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> ReleaseChoice:
-    """Return the release to simulate: the stated release, or that of the parameter file, or the newest.
+    """Return the release to simulate: the stated release, or the release of the parameter file, or the newest.
 
     A note names the parameters of the file that have another name in this release.
 
@@ -126,7 +130,7 @@ def _choose_for_file(
     if found is None:
         return stated or NEWEST_ARDUPLANE, ()
     major, minor = map(int, found.release.split("."))
-    version = stated or _nearest((major, minor))
+    version = stated or _simulated_release_for((major, minor))
     if version == found.release:
         return version, ()
     because = ", as named" if stated else ", the nearest release that planfly simulates"

@@ -52,8 +52,8 @@ from world.wind import mean_wind_speed
 
 # Progress around the RTL loiter since the aircraft captured it at the target altitude.
 _LOITER_PROGRESS = record_dtype(
-    "seconds",
-    "turned",  # rad, positive to the right
+    "seconds",  # s since the capture
+    "turned",  # rad flown around the center since then, positive to the right
     "bearing",  # rad, bearing from the center, at the last tick
 )
 
@@ -62,8 +62,8 @@ RETURN_START = record_dtype("east", "north", "up", "velocity_east", "velocity_no
 
 # Climb at the start of a flight, as in a go-around.
 CLIMB = record_dtype(
-    ("climbs", np.bool_),
-    "top",  # m AMSL, altitude above which it ends
+    ("is_required", np.bool_),
+    "top",  # m AMSL, altitude above which the climb ends
     "throttle",  # 0..1, throttle of the climb
     "slew",  # fraction of the throttle range, 1/s
 )
@@ -125,9 +125,9 @@ ENGINE_FAILURE_REACTION_S = 3.0
 class ReturnEnvironment:
     """Terrain and threats that an RTL can meet, for compiled code.
 
-    heights, to_pixel: of the terrain; one pixel without data if there is no terrain.
-    spheres, radii: (m, 3) centers and (m,) radii of kill spheres, m; a radius of 0 stands for no sphere.
-    known: True if the terrain is known.
+    heights, to_pixel: altitudes of the terrain, and the map from position to pixel; all NaN without terrain.
+    spheres, radii: centers (m, 3) and radii (m,) of the kill spheres, m; a sphere with radius 0 is ignored.
+    known: True if the scenario has terrain.
     """
 
     heights: Heights
@@ -150,7 +150,7 @@ class SimulatedReturns:
 
 
 def surroundings(scenario: Scenario) -> ReturnEnvironment:
-    """Return the terrain and the kill spheres of a scenario."""
+    """Return the terrain and the kill spheres of a scenario, for simulated RTLs."""
     threats, terrain = scenario.threats, scenario.terrain
     spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
     if terrain is None:
@@ -205,7 +205,7 @@ def fly_returns(
         for target, landing in zip(targets, landings or [None] * len(targets), strict=True)
     ]
     if engine_out:
-        stages = [np.concatenate([straight_on(start), route]) for start, route in zip(starts, stages, strict=True)]
+        stages = [np.concatenate([waypoint_ahead(start), route]) for start, route in zip(starts, stages, strict=True)]
     flown = np.zeros(len(starts), RETURN_RESULT)
     timeouts = [rtl_timeout(start, route, aircraft) for start, route in zip(starts, stages, strict=True)]
     positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if keep else 0, 3))
@@ -241,50 +241,50 @@ def fly_returns(
 def _make_stages(
     target: ReturnCircle | None, landing: LandingStart | None, parameters: ArduPilotParameters, aircraft: PointMass
 ) -> Records:
-    """Return the successive targets of an RTL as `flight.guidance.lateral_reference_laws.WAYPOINT` records, (n,).
+    """Return the successive targets of an RTL, as n `flight.guidance.lateral_reference_laws.WAYPOINT` records.
 
-    A stop of a landing sequence is a waypoint, or the center of a loiter of the mission, which is the last target.
+    The first target is the RTL loiter, if any; the others are the stops of the landing sequence up to its first loiter.
     """
-    places = truncate_at_first_loiter(() if landing is None else (landing, *landing.next_stops))
-    stages: Records = np.zeros((target is not None) + len(places), WAYPOINT)
+    stops = truncate_at_first_loiter(() if landing is None else (landing, *landing.next_stops))
+    stages: Records = np.zeros((target is not None) + len(stops), WAYPOINT)
     stages["airspeed"], stages["min_ground_speed"] = aircraft.record.airspeed, parameters.ground_speed_min
     if target is not None:
         first = stages[0]
         first.centre_east, first.centre_north, first.up, first.loiter_radius, first.slope_base = target
         first.east, first.north, first.is_rtl = target.east, target.north, True
-    for stage, place in zip(stages[len(stages) - len(places) :], places, strict=True):
-        fill_stage(stage, place, parameters)
+    for stage, stop in zip(stages[len(stages) - len(stops) :], stops, strict=True):
+        fill_stage(stage, stop, parameters)
         # The first leg of an RTL to a landing sequence follows no line, as after any mode change.
-        stage.without_crosstrack = place is landing
+        stage.without_crosstrack = stop is landing
     return stages
 
 
-def truncate_at_first_loiter(places: Sequence[LandingStart]) -> Sequence[LandingStart]:
+def truncate_at_first_loiter(stops: Sequence[LandingStart]) -> Sequence[LandingStart]:
     """Return the stops of a landing sequence up to the first loiter, whose exit is not simulated.
 
-    >>> spots = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), is_loiter=k == 2) for k in (1, 2, 3)]
-    >>> [one.item for one in truncate_at_first_loiter(spots)]
+    >>> stops = [LandingStart(k, (0.0, 0.0, 50.0), (0.0, 0.0, 50.0), is_loiter=k == 2) for k in (1, 2, 3)]
+    >>> [stop.item for stop in truncate_at_first_loiter(stops)]
     [1, 2]
     """
-    loiter_indices = [k for k, place in enumerate(places) if place.is_loiter]
-    return places[: loiter_indices[0] + 1] if loiter_indices else places
+    loiter_indices = [k for k, stop in enumerate(stops) if stop.is_loiter]
+    return stops[: loiter_indices[0] + 1] if loiter_indices else stops
 
 
-def fill_stage(stage: Record, landing: LandingStart, parameters: ArduPilotParameters) -> None:
-    """Fill a stage with a stop of a landing sequence, which is a waypoint or the center of a loiter."""
-    stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = landing.position
-    stage.pass_by, stage.home_up = landing.pass_by, landing.home_up
+def fill_stage(stage: Record, stop: LandingStart, parameters: ArduPilotParameters) -> None:
+    """Fill the record of a stage from a stop of a landing sequence, which is a waypoint or the center of a loiter."""
+    stage.east, stage.north, stage.up = stage.centre_east, stage.centre_north, stage.up = stop.position
+    stage.pass_by, stage.home_up = stop.pass_by, stop.home_up
     # The turn to the next leg is unknown: use a right angle, as at a mission's end.
     stage.turn = 0.5 * math.pi
-    stage.loiter_radius = (landing.radius or parameters.loiter_radius) if landing.is_loiter else 0.0
+    stage.loiter_radius = (stop.radius or parameters.loiter_radius) if stop.is_loiter else 0.0
 
 
 # Length of a leg on the current course, m, long enough never to be flown to its end.
 _STRAIGHT_LEG_LENGTH_M = 10_000.0
 
 
-def straight_on(start: Record) -> Records:
-    """Return a waypoint far ahead on course and slope, as `flight.guidance.lateral_reference_laws.WAYPOINT` (1,)."""
+def waypoint_ahead(start: Record) -> Records:
+    """Return a waypoint far ahead on the present course and slope, as one `WAYPOINT` record, (1,)."""
     ahead: Records = np.zeros(1, WAYPOINT)
     ground_speed = max(1.0, math.hypot(start["velocity_east"], start["velocity_north"]))
     for axis, velocity in (("east", "velocity_east"), ("north", "velocity_north"), ("up", "velocity_up")):
@@ -293,7 +293,7 @@ def straight_on(start: Record) -> Records:
 
 
 def rtl_timeout(start: Record, stages: Records, aircraft: PointMass) -> float:
-    """Return the timeout of an RTL, s."""
+    """Return the timeout of an RTL, s, from the distances and altitude changes between the start and the stages."""
     min_ground_speed = max(5.0, aircraft.record.airspeed - aircraft.record.wind_speed)
     east, north, altitude, seconds = start["east"], start["north"], start["up"], 0.0
     for end in stages:
@@ -326,12 +326,12 @@ def fly_stages(
     positions: Floats,
     result: Record,
 ) -> None:
-    """Fly from stage to stage for at most ``timeout`` s, and fill in the outcome.
+    """Simulate the flight from stage to stage for at most ``timeout`` s, and fill in ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    climb, climb_parameters: a record of `CLIMB`, and the parameters during that climb.
+    climb, climb_parameters: climb at the start, a record of `CLIMB`, and the control parameters during the climb.
     min_clearance, min_outside: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions, result: (t, 3) array to fill with a position each second until it is full; a record of `RETURN_RESULT`.
+    positions, result: (t, 3) array to fill with one position per second, until full, and a record of `RETURN_RESULT`.
     """
     # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
@@ -368,7 +368,7 @@ def fly_stages(
             stage += 1
             _load_stage(stages, stage, waypoints, estimated, memory)
         state.pitch, glides = pitch, engine_out and stage > 0
-        if climb.climbs and stage == 0:
+        if climb.is_required and stage == 0:
             _demand_climb(state, estimated, climb_parameters, memory, climb, target.airspeed, eas2tas, dt)
         else:
             _update_demands(state, estimated, waypoints, parameters, memory, aircraft, excesses, eas2tas, glides, dt)
@@ -387,7 +387,7 @@ def fly_stages(
 
 @inner
 def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
-    """Return the fractions by which roll, pitch and flight path approach their demands in a tick of ``dt`` s."""
+    """Return the fractions by which roll, pitch and path angle approach their demands in a tick of ``dt`` s."""
     return (
         1.0 - math.exp(-dt / (ROLL_LAG_RATIO * parameters.roll_time)),
         1.0 - math.exp(-dt / (PITCH_LAG_RATIO * parameters.pitch_time)),
@@ -397,7 +397,7 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
 
 @inner
 def _store_position(estimated: Record, positions: Floats, result: Record) -> None:
-    """Store a position unless the array is full."""
+    """Append the present position to the stored positions, unless the array is full."""
     if result.rows < positions.shape[0]:
         positions[result.rows, 0], positions[result.rows, 1], positions[result.rows, 2] = (
             estimated.east,
@@ -424,23 +424,26 @@ def _is_stage_complete(
     memory: Record,
     loiter: Record,
     climb: Record,
-    is_reacting: bool,
-    is_first: bool,
+    is_before_reaction: bool,
+    is_first_stage: bool,
     time: float,
-    is_last: bool,
+    is_last_stage: bool,
     arrival_radius: float,
     dt: float,
 ) -> bool:
-    """Return True if the current stage is complete.
+    """Return True if the current stage is complete: the flight straight ahead, the climb, or the leg to the target.
 
-    is_reacting: True while the aircraft flies straight on, until the engine failure is noticed.
+    loiter: progress around the loiter, a record of `_LOITER_PROGRESS`.
+    is_before_reaction: True until the engine failure is noticed; the aircraft flies straight on.
+    time: time since the start, s.
+    arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     """
-    if is_reacting:
+    if is_before_reaction:
         return time >= ENGINE_FAILURE_REACTION_S
-    if climb.climbs and is_first:
+    if climb.is_required and is_first_stage:
         # The climb lasts at least one tick.
         return time > 0.0 and estimated.up > climb.top
-    return _is_target_reached(estimated, target, memory, loiter, is_last, arrival_radius, dt)
+    return _is_target_reached(estimated, target, memory, loiter, is_last_stage, arrival_radius, dt)
 
 
 @inner
@@ -454,7 +457,7 @@ def _demand_climb(
     eas2tas: float,
     dt: float,
 ) -> None:
-    """Demand a climb straight ahead, with level wings, the pitch of ``climb_parameters``, and increasing throttle.
+    """Demand a climb straight ahead: level wings, the pitch limit of ``climb_parameters``, and increasing throttle.
 
     airspeed_demand: equivalent airspeed, m/s.
     """
@@ -484,20 +487,24 @@ def _is_target_reached(
     target: Record,
     memory: Record,
     loiter: Record,
-    is_last: bool,
+    is_last_stage: bool,
     arrival_radius: float,
     dt: float,
 ) -> bool:
-    """Return True once a waypoint is reached, the last loiter is complete, or a loiter is left for the landing.
+    """Return True once the waypoint is reached or the loiter is complete, and update ``loiter`` on the last loiter.
+
+    A loiter before a landing sequence is complete as soon as the aircraft is on it near the target altitude.  The last
+    loiter is complete after one lap and `flight.mission.itinerary.ENDLESS_LOITER_TIME_S`.
 
     target: waypoint of the stage.
+    loiter: progress around the last loiter, a record of `_LOITER_PROGRESS`.
     arrival_radius: distance from the center, m, within which the aircraft has arrived at the loiter.
     dt: s since the last call.
     """
     if target.loiter_radius == 0.0:
         return memory.leg > 0
     altitude_error = abs(estimated.up - target.up)
-    if not is_last:
+    if not is_last_stage:
         return memory.reached_loiter_target and altitude_error < LANDING_JOIN_ALTITUDE_TOLERANCE_M
     offset_e, offset_n = estimated.east - target.centre_east, estimated.north - target.centre_north
     bearing = math.atan2(offset_e, offset_n)
@@ -516,7 +523,7 @@ def _is_target_reached(
 def _initialise_outcome(
     start: Record, estimated: Record, has_terrain: bool, result: Record
 ) -> None:  # pragma: no cover
-    """Set the motion to the start, and the outcome to its values before the flight."""
+    """Set ``estimated`` to the start of the flight, and ``result`` to the values before the flight."""
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
@@ -534,10 +541,10 @@ def _initialise_outcome(
 
 @inner
 def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Record, memory: Record) -> None:
-    """Make the stage ``index`` the target of the current leg.
+    """Make the stage with the given index the target of a new leg.
 
-    The leg starts at the previous stage if the aircraft has passed it, otherwise at the aircraft. Waypoints 1 and 2
-    both become a copy of the stage.
+    The leg starts at the previous stage, or at the aircraft if there is none or the aircraft is already past this leg.
+    Waypoints 1 and 2 both become a copy of the stage.
     """
     stage, is_previous_reached = stages[index], memory.leg > 0
     for k in range(1, 3):
@@ -580,8 +587,8 @@ def _initialise_memory(
 ) -> None:
     """Set the state from the motion over the ground, and the control law's memory as after a long steady flight.
 
-    Follows `flight.autopilots.arduplane.law.initialise_memory`, but on a slope: the altitude demand is ahead by its
-    lag.
+    Follows `flight.autopilots.arduplane.law.initialise_memory`, but also for a climb or a descent: the altitude demand
+    is ahead of the aircraft by the demand's lag.
     """
     wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)
     air_east = start.velocity_east - wind * aircraft.wind_east
@@ -623,11 +630,11 @@ def _update_demands(
     is_gliding: bool,
     dt: float,
 ) -> None:
-    """Update the demands of bank, altitude, throttle and pitch on the leg to the second waypoint."""
+    """Update the demands for bank, altitude, throttle and pitch on the leg to ``waypoints[1]``."""
     target = waypoints[1]
     navigate_legs(estimated, waypoints[: 2 if target.loiter_radius != 0.0 else 3], parameters, memory, eas2tas, dt)
     if memory.reached_loiter_target and not target.is_rtl:
-        # On a loiter of the mission its altitude applies at once (`Plane::update_loiter`).
+        # On a loiter of the mission the loiter's altitude applies at once (`Plane::update_loiter`).
         memory.from_up = target.up
     update_height_demand(estimated, target, parameters, memory, dt)
     airspeed_demand = airspeed_target(state, estimated, target.airspeed, target, parameters, memory, eas2tas)
@@ -649,12 +656,13 @@ def _demand_throttle_and_pitch(
     is_gliding: bool,
     dt: float,
 ) -> None:
-    """Demand throttle and pitch by TECS, or in a turn without thrust the pitch for an airspeed.
+    """Demand throttle and pitch by TECS; in a gliding turn, demand the pitch that holds the airspeed.
 
-    airspeed_demand: equivalent, m/s.  In a bank it grows as the root of the load factor, at the same angle of attack.
+    airspeed_demand: equivalent airspeed, m/s.  In a bank it grows as the square root of the load factor, which keeps
+        the angle of attack.
 
-    Six of eight ArduPlane flights turned back like this, and lost 55 m in their turn; the other two, which had been
-    sinking before, held their altitude and slowed down, and lost half of that.  The worse case is simulated.
+    Six of eight ArduPlane flights turned back like this and lost 55 m in the turn.  The other two, which had been
+    sinking before, held their altitude, slowed down, and lost half as much.  The worse case is simulated.
     """
     seb_integrator, ske_integrator = memory.seb_integrator, memory.ske_integrator
     update_tecs(state, estimated, parameters, memory, airspeed_demand * eas2tas, eas2tas, dt)
@@ -682,7 +690,10 @@ def _update_clearances(
     has_terrain: bool,
     result: Record,
 ) -> None:
-    """Update the minimum clearances above ground and outside the spheres; end the RTL on or outside the terrain."""
+    """Update the minimum height above ground and the minimum distance outside the kill spheres.
+
+    End the RTL outside the elevation data, or once the aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
+    """
     for m in range(spheres.shape[0]):
         radius = radii[m]
         if radius <= 0.0:

@@ -18,7 +18,7 @@ MIN_ROLL_LIMIT_RAD = math.radians(25.0)
 
 @inner
 def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> float:
-    """Return the bank for a lateral acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.
+    """Return the bank that gives a lateral acceleration (m/s^2), rad, limited to ROLL_LIMIT_DEG.
 
     Follows `AP_L1_Control::nav_roll_cd`.
 
@@ -31,10 +31,10 @@ def nav_roll(lateral_acceleration: float, pitch: float, parameters: Record) -> f
 
 @inner
 def min_airspeed(bank: float, parameters: Record) -> float:
-    """Return the minimum equivalent airspeed in a demanded bank (rad), m/s.
+    """Return the minimum equivalent airspeed at a demanded bank (rad), m/s (`AP_TECS::_update_speed`).
 
-    It is AIRSPEED_MIN divided by the root of cos bank, for the load factor of the turn; or, if AIRSPEED_STALL is
-    stated, AIRSPEED_STALL divided by that root, but at least AIRSPEED_MIN (`AP_TECS::_update_speed`).
+    It is AIRSPEED_MIN times the square root of the load factor of the turn.  If AIRSPEED_STALL is stated, it is
+    AIRSPEED_STALL times this root, but at least AIRSPEED_MIN.  Without stall prevention it is AIRSPEED_MIN.
     """
     if parameters.stall_prevention <= 0.0:
         return parameters.airspeed_min
@@ -46,7 +46,7 @@ def min_airspeed(bank: float, parameters: Record) -> float:
 
 @inner
 def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank: float) -> float:
-    """Return the maximum bank without a stall at an airspeed, rad, but at least ``min_bank``.
+    """Return the maximum bank at which the wing does not stall at an airspeed, rad, but at least ``min_bank``.
 
     airspeed: m/s.
     min_level_airspeed: minimum airspeed in straight flight, m/s; both airspeeds are equivalent, or both are true.
@@ -58,7 +58,7 @@ def load_factor_roll_limit(airspeed: float, min_level_airspeed: float, min_bank:
 
 @inner
 def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float, parameters: Record) -> float:
-    """Return the bank for a lateral acceleration (m/s^2), limited by ROLL_LIMIT_DEG and the stall, rad.
+    """Return the bank that gives a lateral acceleration (m/s^2), rad, limited to ROLL_LIMIT_DEG and by the stall.
 
     Follows `Plane::calc_nav_roll` and `Plane::update_load_factor`.
 
@@ -88,7 +88,7 @@ def limited_nav_roll(lateral_acceleration: float, pitch: float, airspeed: float,
 # documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list).  The formulas of throttle and
 # pitch were found by regression of ArduPlane 4.6's flight logs (messages TECS, TEC2, TEC3); they reproduce the logged
 # pitch demands to eight digits.  The limits of the airspeed demand, bad descent and the fading of saturated integrators
-# are rules of libraries/AP_TECS/AP_TECS.cpp (4.6.3), stated there and written anew here.
+# are rules of libraries/AP_TECS/AP_TECS.cpp (4.6.3), rewritten here.
 #
 # Energies are per kilogram, m^2/s^2; their rates m^2/s^3.  Speeds are true airspeeds.  Names as in AP_TECS: SPE and SKE
 # are potential and kinetic energy, STE their sum, SEB their balance.
@@ -170,7 +170,9 @@ def _update_speed(state: Record, estimated: Record, parameters: Record, memory: 
 
 @inner
 def detect_underspeed(estimated: Record, parameters: Record, memory: Record, tas_min: float, dt: float) -> bool:
-    """Return True while speed has priority over altitude (`AP_TECS::_detect_underspeed`).
+    """Update the underspeed flag and return it: True while speed has priority over altitude.
+
+    Follows `AP_TECS::_detect_underspeed`.
 
     tas_min: AIRSPEED_MIN as a true airspeed, m/s.
 
@@ -195,26 +197,26 @@ def airspeed_target(
     state: Record,
     estimated: Record,
     commanded_airspeed: float,
-    target: Record,
+    waypoint: Record,
     parameters: Record,
     memory: Record,
     eas2tas: float,
 ) -> float:
-    """Return the target airspeed (equivalent, m/s): the commanded airspeed plus an increase for a minimum ground speed.
+    """Return the target equivalent airspeed, m/s: the commanded airspeed plus an increase for a minimum ground speed.
 
-    The increase is the amount by which the ground speed along the heading is too low, rounded to whole m/s. It grows at
-    once, and drops only by the hysteresis or more (`Plane::calc_airspeed_errors`, `Plane::calc_gndspeed_undershoot`).
-    The result is limited to AIRSPEED_MIN and AIRSPEED_MAX.
+    The increase is the shortfall of the ground speed along the heading, rounded to whole m/s.  It rises immediately,
+    but falls only when the change is at least `_GROUND_SPEED_HYSTERESIS_MPS`.  The result is limited to AIRSPEED_MIN
+    and AIRSPEED_MAX.  Follows `Plane::calc_airspeed_errors` and `Plane::calc_gndspeed_undershoot`.
 
-    commanded_airspeed: equivalent, m/s.
-    target: record of the leg's end point, which holds the minimum ground speed, m/s; 0 for none.
+    commanded_airspeed: equivalent airspeed, m/s.
+    waypoint: end of the leg, which states the minimum ground speed, m/s; 0 for none.
     """
     target_airspeed = commanded_airspeed
-    if target.min_ground_speed > 0.0:
+    if waypoint.min_ground_speed > 0.0:
         forward_ground_speed = estimated.velocity_east * math.sin(state.yaw) + estimated.velocity_north * math.cos(
             state.yaw
         )
-        required_airspeed = (memory.airspeed_smoothed + target.min_ground_speed - forward_ground_speed) / eas2tas
+        required_airspeed = (memory.airspeed_smoothed + waypoint.min_ground_speed - forward_ground_speed) / eas2tas
         undershoot = float(math.floor(max(0.0, required_airspeed - commanded_airspeed) + 0.5))
         if (
             undershoot >= memory.ground_speed_undershoot
@@ -274,7 +276,7 @@ def _update_tas_max(
     ste_rate_min: float,
     dt: float,
 ) -> float:
-    """Return the maximum true airspeed, m/s, which falls to AIRSPEED_CRUISE while the throttle is saturated.
+    """Update and return the maximum true airspeed, m/s, which falls to AIRSPEED_CRUISE while the throttle is saturated.
 
     Follows `AP_TECS::_update_speed`, which slows down an aircraft that cannot climb at its maximum airspeed.
 
@@ -346,11 +348,12 @@ def _update_throttle(
     ste_rate_min: float,
     dt: float,
 ) -> None:
-    """Set the throttle demand from the STE error (m^2/s^2) and the STE rate (m^2/s^3).
+    """Set the throttle demand for an STE rate demand, from the STE error and the STE rate.
 
     Follows `AP_TECS::_update_throttle_with_airspeed`.
 
-    ste_rate_demand: m^2/s^3.
+    ste_error: m^2/s^2.
+    ste_rate_demand, ste_rate: m^2/s^3.
     ste_rate_max, ste_rate_min: STE rates at full and at idle throttle, m^2/s^3.
     """
     # There is no reverse thrust (`Plane::apply_throttle_limits`).
@@ -407,7 +410,7 @@ def _update_pitch_integrators(
     pitch_max: float,
     dt: float,
 ) -> None:
-    """Change the integrators of the pitch demand, which fade while the pitch demand is beyond a limit.
+    """Update the SEB and SKE integrators of the pitch demand; both fade while the pitch demand is beyond a limit.
 
     Follows `AP_TECS::_update_pitch`.
 

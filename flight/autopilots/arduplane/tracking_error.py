@@ -73,7 +73,7 @@ def tracking_error(
     fly_over: bool = False,
     turbulence: Turbulence = "none",
 ) -> TrackingError:
-    """Return the margins that a plan needs for ArduPlane's deviations at an equivalent airspeed (m/s).
+    """Return ArduPlane's deviations from a plan at an equivalent airspeed (m/s), for which the plan needs margins.
 
     nav: accuracy of navigation.
     fly_over: True if ArduPlane flies on to each waypoint before it turns.
@@ -111,7 +111,10 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 def _corner_tables(
     parameters: ArduPilotParameters, airspeed: float, fly_over: bool
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
+    """Return the acceptance radius, the excursion and the affected lengths of both legs of corners, m.
+
+    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`.
+    """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_RATIOS * airspeed
     _measure_corners(record, airspeed, TURNS, speeds, fly_over, corners, waypoint_column(3))
@@ -134,7 +137,10 @@ def _measure_corners(
     corners: Records,
     waypoints: Records,
 ) -> None:
-    """Simulate a turn for each turn angle and ground speed, and store its tracking in `CORNER_TRACKING` records."""
+    """Fill the `CORNER_TRACKING` records of all corners, one row per turn angle and one column per ground speed.
+
+    Search for the acceptance radius with the smallest excursion; with ``fly_over`` simulate one turn only.
+    """
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
             corner = corners[i, j]
@@ -171,9 +177,10 @@ def _fly_corner(
     fly_over: bool,
     waypoints: Records,
 ) -> tuple[float, float]:
-    """Return the maximum distance from the two legs, and the distance along the second leg until the flight settles, m.
+    """Simulate one corner; return the excursion and the settling distance, m.
 
-    The first leg leads north to the origin; the turn leads to the right.
+    The excursion is the maximum distance from the nearer leg.  The settling distance is the distance along the second
+    leg beyond which the aircraft stays close to it.  The first leg leads north to the origin; the turn is a right turn.
     """
     motions, memories = np.zeros(1, MOTION), np.zeros(1, ARDUPILOT_MEMORY)
     estimated, memory = motions[0], memories[0]

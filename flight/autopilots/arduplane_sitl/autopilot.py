@@ -28,13 +28,13 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
         return cls(ArduPlane.restore(stored).parameters, stored.program)
 
     @classmethod
-    def recognises(cls, program: Path) -> bool:
-        """Return True for any program, because ArduPlane reports its release only after its start."""
+    def accepts_program(cls, program: Path) -> bool:
+        """Return True for any program, because ArduPlane does not report its version until it has started."""
         return True
 
     @classmethod
-    def flying(cls, model: ArduPlane, binary: Path) -> Self:
-        """Return the program's autopilot with the parameters of the simulated ArduPlane."""
+    def with_model(cls, model: ArduPlane, binary: Path) -> Self:
+        """Return ArduPlane's program as an autopilot, with the parameters of the simulated ArduPlane."""
         return cls(model.parameters, binary=binary)
 
     @classmethod
@@ -54,7 +54,7 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
         return replace(super().checks, battery_failsafes=())
 
     def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
-        """Describe the settings that the program does not get, or that its flight does not show."""
+        """Describe the settings that the program does not receive, or that have no effect on its simulated flight."""
         settings = self.settings_not_flown(mission, by_program=True)
         return [text for text in settings if not text.startswith(_FLOWN_BY_PROGRAM)]
 

@@ -39,7 +39,7 @@ _MIN_FLARE_HEIGHT_M = 6.0
 
 @compiled
 def program_ground_tick(block: Floats, heights: Heights) -> int:
-    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as the tick of a control law does.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick; return an end code or 0.
 
     The program has set the commands in the block.
     """
@@ -55,13 +55,13 @@ def program_ground_tick(block: Floats, heights: Heights) -> int:
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
     memory.is_finished = False
-    find_phase(work.true, ground, settings.on_last_leg)
+    update_phase(work.true, ground, settings.on_last_leg)
     fill_tick(work)
     return end_status(work, ground)
 
 
 @inner
-def find_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
+def update_phase(true: Record, ground: Record, on_last_leg: bool) -> None:
     """Change to the next phase when its condition is met: lift-off, end of the climb, last item, flare.
 
     true: a `flight.guidance.navigation_error.MOTION` record.

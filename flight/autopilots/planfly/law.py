@@ -67,9 +67,9 @@ FULL_LEAD_TICK_S = 1.0 / 60.0
 
 @compiled
 def planfly_tick(block: Floats, heights: Heights) -> int:
-    """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick.
 
-    Return a key of its `ENDS`, or 0 to fly on.
+    Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
     """
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
     path: Record = block[WORKSPACE_NUMBERS:].view(PATH_ROW)
@@ -101,7 +101,10 @@ def planfly_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+
+    The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+    """
     for _ in range(count):
         read_state(block, numbers, code)
         status = planfly_tick(block, heights)
@@ -155,7 +158,12 @@ def _cross_track_bank_command(
     course: float,
     dt: float,
 ) -> float:
-    """Return the bank command from the curvature ahead and a second-order law on the cross-track error, rad."""
+    """Return the bank command of planfly's own law, rad: curvature feed-forward plus cross-track correction.
+
+    Also set the sideslip setpoint and the maximum ground speed for the arcs ahead.
+
+    course: course of the path at the aircraft, rad.
+    """
     speed = max(5.0, math.hypot(estimated.velocity_east, estimated.velocity_north))
     ground_course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     course_error = wrap(ground_course - course)
@@ -213,13 +221,15 @@ def _limit_nose_angle(bank_demand: float, nose_angle: float, max_bank: float) ->
 def _correct_roll_offset(
     curvature: float, gains: Record, memory: Record, turn_acceleration: float, speed: float, crab: float, dt: float
 ) -> float:
-    """Return the acceleration (m/s^2 to the right) that corrects the offset from rolling into arcs.
+    """Return the acceleration to the right (m/s^2) that corrects the offset caused by rolling into and out of arcs.
 
-    No aircraft can change its bank in one step. ``memory.roll_offset`` is therefore the planned offset from the path
-    after a jump of the curvature.
+    An aircraft needs time to change its bank, so it leaves the path where the curvature changes in one step.
+    ``memory.roll_offset`` is this planned offset, computed with a model of the roll.
 
-    curvature: curvature of the path here, 1/m.
+    curvature: curvature of the path at the aircraft, 1/m.
     turn_acceleration: acceleration to the right for the path ahead, m/s^2.
+    speed: ground speed, m/s.
+    crab: cosine of the angle between heading and ground course.
     """
     memory.path_bank, memory.path_bank_rate, _ = step_roll_model(
         math.atan(turn_acceleration / (GRAVITY * crab)), memory.path_bank, memory.path_bank_rate, gains, dt
@@ -244,7 +254,12 @@ def _lateral_correction(
     crab: float,
     dt: float,
 ) -> float:
-    """Return the acceleration to the right that corrects cross-track error and disturbances, m/s^2."""
+    """Return the acceleration to the right that corrects the cross-track error and compensates disturbances, m/s^2.
+
+    speed: ground speed, m/s.
+    course_error: ground course minus course of the path, rad.
+    crab: cosine of the angle between heading and ground course.
+    """
     frequency = gains.cross_track_frequency
     rate_gain = 2.0 * gains.cross_track_damping * frequency
     max_cross_track_rate = speed * math.sin(gains.intercept)
@@ -263,7 +278,7 @@ def _lateral_correction(
 
 @inner
 def _pressure_ratio(state: Record, gains: Record) -> float:
-    """Return the ratio of the dynamic pressure to its value at the reference airspeed."""
+    """Return the ratio of the dynamic pressure to the dynamic pressure at the reference airspeed."""
     return (state.airspeed / gains.reference_airspeed) ** 2
 
 
@@ -271,17 +286,18 @@ def _pressure_ratio(state: Record, gains: Record) -> float:
 def _unexplained_acceleration(
     state: Record, estimated: Record, gains: Record, memory: Record, speed: float, crab: float, dt: float
 ) -> float:
-    """Return the smoothed lateral acceleration that neither lift nor ailerons explain, m/s^2 to the right."""
+    """Return the smoothed acceleration to the right that neither lift nor ailerons explain, m/s^2.
+
+    The estimate starts at the second tick, because it needs the previous velocity.
+    """
     if memory.last_velocity_east != 0.0 or memory.last_velocity_north != 0.0:
         change_east = estimated.velocity_east - memory.last_velocity_east
         change_north = estimated.velocity_north - memory.last_velocity_north
         lateral_change = change_east * estimated.velocity_north - change_north * estimated.velocity_east
         lift_acceleration = (GRAVITY + (estimated.velocity_up - memory.last_velocity_up) / dt) * math.tan(state.roll)
         aileron_acceleration = gains.side_per_aileron * _pressure_ratio(state, gains) * state.aileron
-        new_estimate = lateral_change / (speed * dt) - (lift_acceleration + aileron_acceleration) * crab
-        memory.unexplained_acceleration += (new_estimate - memory.unexplained_acceleration) * min(
-            1.0, dt / gains.side_lag
-        )
+        estimate = lateral_change / (speed * dt) - (lift_acceleration + aileron_acceleration) * crab
+        memory.unexplained_acceleration += (estimate - memory.unexplained_acceleration) * min(1.0, dt / gains.side_lag)
     memory.last_velocity_east = estimated.velocity_east
     memory.last_velocity_north = estimated.velocity_north
     memory.last_velocity_up = estimated.velocity_up
@@ -316,7 +332,11 @@ def _l1_bank_command(
 def _field_bank_command(
     estimated: Record, curvature: float, gains: Record, memory: Record, course: float, dt: float
 ) -> float:
-    """Return the bank command from the bank of the orbit and a PI law on the course of the vector field, rad."""
+    """Return the bank command of the vector field, rad: the bank for the arc, plus a PI law on the course error.
+
+    curvature: curvature of the path at the aircraft, 1/m.
+    course: course of the path at the aircraft, rad.
+    """
     speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     course_demand = field_course(
         course, memory.cross_track, curvature, gains.field_approach, gains.field_path, gains.field_orbit
@@ -343,7 +363,10 @@ def steer_height(
     course: float,
     dt: float,
 ) -> None:
-    """Set the elevator to follow the altitude profile, and the throttle to hold the airspeed."""
+    """Set the elevator to follow the altitude profile, and the throttle to hold the airspeed.
+
+    course: course of the path at the aircraft, rad.
+    """
     airspeed = max(8.0, state.airspeed)
     speed_along = max(1.0, estimated.velocity_east * math.sin(course) + estimated.velocity_north * math.cos(course))
     path_altitude, slope, _ = profile_at(nodes, memory.distance)
@@ -422,7 +445,11 @@ def _set_throttle(
     speed_along: float,
     dt: float,
 ) -> None:
-    """Set the throttle from level flight, the slope relative to the air, and the airspeed error."""
+    """Set the throttle: trim of level flight, feed-forward for the slope ahead, and PI feedback of the airspeed error.
+
+    slope_ahead: slope of the altitude profile ahead, m per m.
+    speed_along: ground speed along the path, m/s.
+    """
     airspeed_error = memory.speed_command - airspeed
     if memory.max_arc_speed > 0.0:
         # In and before an arc also limit the ground speed, as far as the airspeed allows.

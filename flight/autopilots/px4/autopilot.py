@@ -154,7 +154,7 @@ class Px4(Autopilot):
         stored = StoredParameters(parameters.values, parameters.unused, parameters.source)
         return StoredAutopilot(parameters=stored, version=parameters.version)
 
-    def of_release(self, version: Px4Version) -> Self:
+    def in_release(self, version: Px4Version) -> Self:
         """Return the same autopilot with the controllers of another PX4 release."""
         return replace(self, parameters=replace(self.parameters, version=version))
 
@@ -207,7 +207,10 @@ class Px4(Autopilot):
         )
 
     def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
-        """Describe settings that end a mission or change its flight and are not simulated."""
+        """Describe settings that end a mission or change its flight, but are not simulated.
+
+        by_program: True for a flight of PX4's own program, which flies more settings.
+        """
         # `FeasibilityChecker` refuses a mission beyond GF_MAX_*, whatever GF_ACTION is.
         parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]
         if parameters["COM_WIND_MAX_ACT"] > _WARN_OF_WIND and parameters["COM_WIND_MAX"] < mission.wind:
@@ -227,7 +230,7 @@ class Px4(Autopilot):
         return [*ending_texts, *changing_texts, *([] if by_program else self._describe_mission_settings(mission))]
 
     def _describe_mission_settings(self, mission: MissionParts) -> Iterator[str]:
-        """Describe settings that change only some missions or releases."""
+        """Describe settings that matter only for certain missions or releases."""
         parameters = self.parameters
         if parameters["NPFG_EN_MIN_GSP"] == 0.0 and self.version == "1.16":
             yield "NPFG_EN_MIN_GSP 0 keeps no minimum ground speed, which is not simulated"
@@ -256,7 +259,7 @@ class Px4(Autopilot):
             yield f"RTL_LAND_DELAY {parameters['RTL_LAND_DELAY']:g} lands after the return, which is not simulated"
 
     def _describe_endings(self, mission: MissionParts) -> Iterator[str]:
-        """Describe settings with which PX4 may leave a mission in flight."""
+        """Describe settings with which PX4 may abort a mission in flight."""
         parameters = self.parameters
         if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
             yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated"
@@ -271,9 +274,10 @@ class Px4(Autopilot):
                     yield f"{name} {parameters[name]:g} terminates a flight within {limit}, which is not simulated"
 
     def _battery_failsafes(self) -> tuple[BatteryFailsafe, ...]:
-        """Return the failsafe that leaves the mission first, which PX4's own program does not get.
+        """Return the battery failsafe that ends the mission first; PX4's own program flies without it.
 
         COM_LOW_BAT_ACT acts at BAT_CRIT_THR and at BAT_EMERGEN_THR, which `Battery::determineWarning` tests first.
+
 
         >>> made = Px4Parameters.defaults().changed(COM_LOW_BAT_ACT=3.0, BAT1_CAPACITY=5000.0, BAT_CRIT_THR=0.1)
         >>> Px4(made).checks.battery_failsafes[0].used_charge
@@ -394,7 +398,7 @@ class Px4(Autopilot):
     def _tracking_error(
         self, airspeed: float, nav: Navigation, *, fly_over: bool = False, turbulence: Turbulence = "none"
     ) -> TrackingError | None:
-        """Return PX4's deviations with these parameters; PX4 flies over no waypoint."""
+        """Return PX4's deviations with these parameters; ``fly_over`` has no effect, as PX4 flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
     def with_parameters(self, **values: float) -> "Px4":

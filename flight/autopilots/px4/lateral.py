@@ -27,7 +27,7 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 @inner
 def feasibility(airspeed: float, wind_cross_bearing: float, wind_dot_bearing: float) -> float:
-    """Return the feasibility of a course: 1 with enough airspeed, 0 if the wind is stronger than the airspeed.
+    """Return the feasibility of a course, 0..1: 1 with enough airspeed, 0 if the wind is too strong for the course.
 
     Follows `bearingFeasibility`.
 
@@ -86,10 +86,11 @@ def adapted_period(
     track_proximity: float,
     parameters: Record,
 ) -> float:
-    """Return a period that is stable with the roll lag and short enough for a curve in wind, s.
+    """Return the period of the guidance on a track, s: long enough for the roll lag, short enough for a curve in wind.
 
-    track_feasibility: feasibility of the track, 0..1.
-    track_proximity: proximity to the track, 0..1.
+    curvature: curvature of the track, 1/m.
+    track_feasibility: feasibility of the track's course, 0..1; see `feasibility`.
+    track_proximity: 0 far from the track, 1 on the track.
     """
     wind_factor = 2.0 * (1.0 - math.sqrt(1.0 - min(1.0, wind_speed / max(0.1, airspeed))))
     turn_rate = abs(curvature) * airspeed
@@ -117,9 +118,9 @@ def adapted_period(
 def reference_air_velocity(
     bearing_east: float, bearing_north: float, wind_east: float, wind_north: float, airspeed: float
 ) -> tuple[float, float]:
-    """Return the air velocity (m/s, east and north) that flies a course in a wind.
+    """Return the air velocity (east and north, m/s) with which the aircraft flies a course in a wind.
 
-    If no heading flies the course, return the velocity whose ground track deviates least from it.
+    If the wind is too strong for the course, return the air velocity whose ground course deviates least from it.
 
     bearing_east, bearing_north: unit vector of the course.
     """
@@ -228,10 +229,13 @@ def follow_leg(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Guide the aircraft onto the line from the leg's start to its end (m), or straight to one of these points.
+    """Guide the aircraft onto the line from the leg's start to its end, or straight to one of these points.
 
     Before the start and further away than the switch distance, the aircraft flies to the start; past the end, it
-    flies back to the end (`navigateWaypoints`).  Other arguments as for `guide_to_path`.
+    flies back to the end (`navigateWaypoints`).
+
+    end_east, end_north: end of the leg, m.
+    Other arguments as for `guide_to_path`.
     """
     leg_east, leg_north = end_east - memory.from_east, end_north - memory.from_north
     length = math.hypot(leg_east, leg_north)
@@ -289,8 +293,9 @@ def follow_loiter(
     parameters: Record,
     memory: Record,
 ) -> None:
-    """Guide the aircraft onto a loiter circle about a center, m (`navigateLoiter`).
+    """Guide the aircraft onto a loiter circle (`navigateLoiter`).
 
+    center_east, center_north: center of the circle, m.
     radius: m, positive to the right.
     Other arguments as for `guide_to_path`.
     """
@@ -319,6 +324,6 @@ def follow_loiter(
 
 @inner
 def roll_setpoint(lateral_acceleration: float, parameters: Record) -> float:
-    """Return the roll setpoint for a lateral acceleration (m/s^2), within FW_R_LIM, rad."""
+    """Return the roll setpoint that gives a lateral acceleration (m/s^2), rad, limited to FW_R_LIM."""
     roll = math.atan(lateral_acceleration / GRAVITY)
     return min(parameters.roll_limit, max(-parameters.roll_limit, roll))

@@ -79,9 +79,9 @@ MISSION_END_TIMEOUT_S = 300.0
 
 @compiled
 def px4_tick(block: Floats, heights: Heights) -> int:
-    """Advance the block of a `flight.simulation.tick.Workspace` by one tick.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick.
 
-    Return a key of its `ENDS`, or 0 to fly on.
+    Return the code of the flight's end, a key of `flight.simulation.tick.ENDS`, or 0 if the flight continues.
     """
     path_begins = WORKSPACE_NUMBERS + PX4_NUMBERS
     work = block[:WORKSPACE_NUMBERS].view(WORKSPACE)[0]
@@ -123,7 +123,10 @@ def px4_loop(
     frictions: Records,
     count: int,
 ) -> int:
-    """Fly up to a number of ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return the last status."""
+    """Fly up to ``count`` ticks with a `flight.dynamics.compiled_model.CompiledModel`, and return a status.
+
+    The status is 0 if the flight continues, otherwise a key of `flight.simulation.tick.ENDS`.
+    """
     for _ in range(count):
         read_state(block, numbers, code)
         status = px4_tick(block, heights)
@@ -149,7 +152,7 @@ def control_as_px4(
     commands: Record,
     dt: float,
 ) -> None:
-    """Compute the commands for one tick of ``dt`` seconds, and update both memories.
+    """Compute the commands for one tick of ``dt`` seconds, and update ``guidance`` and ``memory``.
 
     wind_east, wind_north: velocity of the air, m/s.
     guidance: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
@@ -194,7 +197,7 @@ def control_as_px4(
 def _end_mission(
     estimated: Record, last_waypoint: Record, guidance: Record, parameters: Record, memory: Record, dt: float
 ) -> None:
-    """End the flight once the aircraft is past the last waypoint and at its altitude, or after a timeout.
+    """End the flight once the aircraft is past the last waypoint and near the waypoint's altitude, or after a timeout.
 
     If PX4 loiters without end at the mission's end (`MissionBase::setEndOfMissionItems`), the flight ends after one
     circle of that loiter.  A circle before the waypoint, which corrects the altitude, does not end the flight.
@@ -229,7 +232,7 @@ def _initialise_memory(
     memory: Record,
     eas_to_tas: float,
 ) -> None:
-    """Initialise the memory for steady flight at the first waypoint."""
+    """Initialise the control law's memory for steady flight at the first waypoint."""
     memory.is_initialised = True
     memory.from_east, memory.from_north, memory.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
     memory.min_distance_to_end = math.inf

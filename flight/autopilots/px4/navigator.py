@@ -60,7 +60,7 @@ def _altitude_acceptance_radius(target: Record, parameters: Record) -> float:
 
 @inner
 def is_past_waypoint(estimated: Record, target: Record, memory: Record) -> bool:
-    """Return True if the aircraft is past the vertical plane across the leg at its end.
+    """Return True if the aircraft is past the vertical plane through the leg's end, perpendicular to the leg.
 
     The result is False for a leg without length.
     """
@@ -117,7 +117,7 @@ def find_target(waypoints: Records, memory: Record) -> int:
 
 @inner
 def _is_past_gate(estimated: Record, gate: Record, target: Record) -> bool:
-    """Return True past the vertical plane through a gate, perpendicular to the line from the gate to the target."""
+    """Return True if the aircraft is past the plane through a gate, perpendicular to the course to the target."""
     normal_east, normal_north = target.east - gate.east, target.north - gate.north
     distance_past = (estimated.east - gate.east) * normal_east + (estimated.north - gate.north) * normal_north
     return distance_past >= 0.0
@@ -135,9 +135,10 @@ def _navigate_waypoint(
     memory: Record,
     dt: float,
 ) -> None:
-    """Follow the leg to a waypoint, and circle at the waypoint while the aircraft is too high or too low.
+    """Follow the leg to a waypoint, circle there while too high or too low, and then begin the next leg.
 
-    Once the last waypoint of a mission is reached, the aircraft circles about it.
+    Once the last waypoint of a mission is reached, the aircraft circles about this waypoint; up to 1.16 about the
+    position at which it reached the waypoint.
     """
     target = waypoints[target_index]
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
@@ -195,9 +196,9 @@ def _navigate_loiter(
     memory: Record,
     dt: float,
 ) -> None:
-    """Fly to a loiter and around it until its end condition holds.
+    """Fly to a loiter and around it until its end condition is met, then begin the next leg.
 
-    loiter: the corner of the route that stands for the loiter.
+    loiter: waypoint on the loiter.
     """
     ground_speed = math.hypot(estimated.velocity_east, estimated.velocity_north)
     distance = math.hypot(loiter.centre_east - estimated.east, loiter.centre_north - estimated.north)
@@ -240,7 +241,7 @@ def _navigate_loiter(
 
 @inner
 def is_last_target(waypoints: Records, memory: Record) -> bool:
-    """Return True if only corners of the same loiter follow the target."""
+    """Return True if the target is the last one of the route; waypoints on the same loiter are one target."""
     target_index = find_target(waypoints, memory)
     target = waypoints[target_index]
     return target_index + 1 >= waypoints.shape[0] or (target.loiter_radius != 0.0 and waypoints[-1].stop == target.stop)
@@ -248,7 +249,7 @@ def is_last_target(waypoints: Records, memory: Record) -> bool:
 
 @inner
 def _setpoint_position(waypoint: Record) -> tuple[float, float]:
-    """Return east and north (m) of a waypoint's setpoint, which for a loiter is its center."""
+    """Return east and north of the position setpoint of a waypoint, m: the waypoint, or the center of its loiter."""
     return (
         (waypoint.centre_east, waypoint.centre_north)
         if waypoint.loiter_radius != 0.0
@@ -258,11 +259,9 @@ def _setpoint_position(waypoint: Record) -> tuple[float, float]:
 
 @inner
 def _is_on_exit_course(estimated: Record, next_waypoint: Record, loiter: Record) -> bool:
-    """Return True if the ground course points to the setpoint after a loiter, within `EXIT_COURSE_TOLERANCE_RAD`.
+    """Return True if the ground course points to the waypoint after a loiter, within `EXIT_COURSE_TOLERANCE_RAD`.
 
-    The result is also True for a setpoint so close to the loiter's center that the course can never point to it.
-
-    next_waypoint: the waypoint after the loiter.
+    The result is also True if this waypoint is so close to the loiter's center that the course never points to it.
     """
     next_east, next_north = _setpoint_position(next_waypoint)
     if math.hypot(next_east - loiter.centre_east, next_north - loiter.centre_north) <= _MIN_EXIT_DISTANCE_RATIO * abs(
@@ -332,8 +331,8 @@ def _navigate_rtl(
 def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -> None:
     """Make ``leg`` the current leg, along the line between its two waypoints.
 
-    After a loiter the line starts at the loiter's center.  After a loiter by turns, which PX4 refuses, the line starts
-    at the aircraft.
+    After a loiter the line starts at the loiter's center, or at the tangent point on the circle if the item says so.
+    After a loiter by turns, which PX4 refuses, the line starts at the aircraft.
     """
     start, end = waypoints[leg], waypoints[leg + 1]
     memory.leg = leg
@@ -358,7 +357,7 @@ def begin_leg(estimated: Record, waypoints: Records, leg: int, memory: Record) -
 
 @inner
 def is_past_corner(estimated: Record, corner: Record) -> bool:
-    """Return True if an aircraft on a loiter has passed the route's corner for this part of the loiter."""
+    """Return True if an aircraft on a loiter is past a corner of the route on this loiter, by less than 90 degrees."""
     corner_bearing = math.atan2(corner.east - corner.centre_east, corner.north - corner.centre_north)
     bearing = math.atan2(estimated.east - corner.centre_east, estimated.north - corner.centre_north)
     angle_past = wrap(bearing - corner_bearing) * math.copysign(1.0, corner.loiter_radius)
@@ -367,7 +366,7 @@ def is_past_corner(estimated: Record, corner: Record) -> bool:
 
 @inner
 def foh_altitude(end_east: float, end_north: float, end_up: float, lead_distance: float, memory: Record) -> float:
-    """Return the altitude setpoint on the slope of a leg, m: PX4's first-order hold.
+    """Return the altitude setpoint on the slope of a leg, m AMSL: PX4's first-order hold (FOH).
 
     The slope ends ``lead_distance`` m before the end of the leg, and uses the minimum horizontal distance to the end
     on this leg.  On a leg no longer than ``lead_distance`` the setpoint is the altitude of its end.

@@ -46,20 +46,20 @@ _GAIN_FACTOR = math.degrees(1.0) / 45.0
 
 
 def describe_open_settings(parameters: Px4Parameters, aircraft: Aircraft | None, *, by_program: bool) -> Iterator[str]:
-    """Describe the settings with such a value, without a full stop.
+    """Describe settings that leave the aircraft without a position or control, each in a text without a full stop.
 
-    aircraft: None if it is not known here.
-    by_program: True if PX4's own program flies, which gets the gains of the rate controllers.
+    aircraft: None if the aircraft is not known.
+    by_program: True if PX4's own program flies, which uses the gains of the rate controllers.
     """
-    yield from _describe_estimate(parameters)
-    yield from _describe_outputs(parameters)
+    yield from _describe_position_estimate(parameters)
+    yield from _describe_control_allocation(parameters)
     yield from _describe_slew_rates(parameters)
     yield from _describe_connections(parameters)
     if not by_program:
         yield from _describe_rate_gains(parameters, aircraft)
 
 
-def _describe_estimate(parameters: Px4Parameters) -> Iterator[str]:
+def _describe_position_estimate(parameters: Px4Parameters) -> Iterator[str]:
     """Describe settings with which EKF2 has no position or no altitude."""
     gps_bits = int(parameters["EKF2_GPS_CTRL"])
     if not gps_bits & _GPS_POSITION_BIT:
@@ -71,7 +71,7 @@ def _describe_estimate(parameters: Px4Parameters) -> Iterator[str]:
         yield "GPS_1_CONFIG 0 connects no GPS, which is not simulated"
 
 
-def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
+def _describe_control_allocation(parameters: Px4Parameters) -> Iterator[str]:
     """Describe a control allocation of the file that is not a fixed wing's, or lacks ailerons, elevator or motor.
 
     A release before control allocation (SYS_CTRL_ALLOC 0) states no airframe.
@@ -93,7 +93,7 @@ def _describe_outputs(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe outputs that move slowly: `ControlAllocation::applySlewRateLimit`, s for the whole range."""
+    """Describe slew rate limits of the outputs (`ControlAllocation::applySlewRateLimit`; s for the whole range)."""
     stated = parameters.by_origin("file")
     for name in SLEW_NAMES:
         if (value := stated.get(name, 0.0)) > 0.0:
@@ -101,7 +101,7 @@ def _describe_slew_rates(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
-    """Describe outputs of the file of which none is a motor, or none a surface."""
+    """Describe output functions of the file that include no motor, or no control surface."""
     stated = parameters.by_origin("file")
     functions = {stated[name] for name in OUTPUT_FUNCTION_NAMES if name in stated}
     if not functions:
@@ -112,9 +112,9 @@ def _describe_connections(parameters: Px4Parameters) -> Iterator[str]:
 
 
 def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -> Iterator[str]:
-    """Describe gains of the file with which the aircraft does not follow its attitude.
+    """Describe gains of the user's file that are too low or too high to hold the aircraft's attitude.
 
-    ArduPlane's gains of the aircraft are assumed to suit the aircraft, and so are PX4's defaults.
+    The gains of the aircraft's own file for ArduPlane are assumed to suit the aircraft, and so are PX4's defaults.
     """
     own = {} if aircraft is None or not (aircraft.folder / AIRCRAFT_FILE).exists() else rate_gains(aircraft)
     stated = parameters.by_origin("file")
@@ -135,7 +135,7 @@ def _describe_rate_gains(parameters: Px4Parameters, aircraft: Aircraft | None) -
 
 
 def rate_gains(aircraft: Aircraft) -> dict[str, float]:
-    """Return the gains of the rate controllers, from the aircraft's gains for ArduPlane.
+    """Return PX4's gains of the rate controllers by name, converted from the aircraft's gains for ArduPlane.
 
     Raises ParameterError if the file is invalid.
 

@@ -256,7 +256,7 @@ class Px4Parameters(ParameterSet):
             raise ParameterError(message, file=self.source, field="px4_version", value=self.version, allowed=allowed)
 
     @classmethod
-    def _of_aircraft(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
+    def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
         """Return the values of the aircraft's file that PX4 also has, limited to PX4's ranges."""
         values = {}
         for name, entry in entries.items():
@@ -267,20 +267,20 @@ class Px4Parameters(ParameterSet):
         return values
 
     @classmethod
-    def _counts_as_set(cls, definition: Definition, value: float) -> bool:
-        """Return False for a parameter that is not simulated and has its default: stations save every parameter."""
+    def _is_set_on_purpose(cls, definition: Definition, value: float) -> bool:
+        """Return False for the default value of a parameter that is not simulated: stations save every parameter."""
         return definition.name not in NOT_FLOWN or value != definition.default
 
     @property
     def is_whole_set(self) -> bool:
-        """True if the file is a complete set, so that a parameter missing from it has the release's default."""
+        """True if the user's file is a complete set: a parameter that it lacks has the default of the release."""
         return len(self.unused) + len(self.by_origin("file")) >= _COMPLETE_SET_COUNT
 
     @property
     def uses_switch_distance(self) -> bool:
-        """True if the navigator uses guidance's own switch distance.
+        """True if the navigator uses the switch distance of the guidance (NPFG).
 
-        Up to 1.16 the position controller published it; 1.17 split the controller into modules that do not publish it.
+        Up to 1.16 the position controller published this distance; the modules that replaced it in 1.17 do not.
         """
         return self.version == "1.16"
 
@@ -302,7 +302,8 @@ def speed_filter_gains(
 ) -> tuple[float, float, float, float]:
     """Return the 2x2 steady-state Kalman gains of the airspeed filter, row by row (PX4: kKg00 to kKg11).
 
-    The rows are airspeed (1/s, 1) and its rate (1/s^2, 1/s); the columns are the errors of airspeed and of rate.
+    The rows correct the airspeed (1/s, 1) and the airspeed rate (1/s^2, 1/s); the columns are for the errors of the
+    measured airspeed and of the measured rate.
 
     speed_sigma, rate_sigma: standard deviations of the measured airspeed (m/s) and of its measured rate (m/s^2).
     process_sigma: standard deviation of the noise that drives the rate, m/s^2.

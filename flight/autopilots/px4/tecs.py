@@ -20,10 +20,10 @@ _UNDERSPEED_FRACTION = 0.15
 
 @inner
 def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> None:
-    """Move the altitude reference towards the setpoint (`TECSAltitudeReferenceModel`).
+    """Move the altitude reference towards the altitude setpoint (`TECSAltitudeReferenceModel`).
 
-    The reference climbs by at most FW_T_CLMB_R_SP, sinks by at most FW_T_SINK_R_SP, and decelerates in time with
-    FW_T_VERT_ACC.
+    The reference climbs at most at FW_T_CLMB_R_SP and sinks at most at FW_T_SINK_R_SP.  It decelerates at
+    FW_T_VERT_ACC, early enough not to overshoot the setpoint.
     """
     altitude_error = memory.altitude_setpoint - memory.altitude_reference
     rate_towards_setpoint = min(
@@ -43,7 +43,7 @@ def update_altitude_reference(parameters: Record, memory: Record, dt: float) -> 
 def update_airspeed_filter(measured_tas: float, parameters: Record, memory: Record, dt: float) -> None:
     """Update the airspeed filter with a measured true airspeed, m/s (`TECSAirspeedFilter`).
 
-    The measured rate is 0, as in PX4.
+    The measured rate of change of the airspeed is 0, as in PX4.
     """
     tas_error, tas_rate_error = measured_tas - memory.tas, -memory.tas_rate
     memory.tas += (
@@ -66,7 +66,7 @@ def update_tecs(
     """Update the throttle and pitch setpoints in ``memory`` for the altitude setpoint and an airspeed setpoint.
 
     Follows `TECS::update` and `TECSControl::update`, with `_calcAltitudeControlOutput` and
-    `_calcAirspeedControlOutput`.  Rates of kinetic energy are demanded by the airspeed setpoint
+    `_calcAirspeedControlOutput`.  The setpoint of the SKE rate follows from the airspeed setpoint
     (`_calcSpecificEnergyRates`).
 
     state: a record of `flight.dynamics.state.STATE`.
@@ -110,9 +110,10 @@ def update_tecs(
 def _adapt_airspeed_setpoint(
     airspeed_setpoint: float, parameters: Record, memory: Record, eas_to_tas: float, dt: float
 ) -> None:
-    """Move the airspeed setpoint towards an equivalent airspeed, m/s, at a limited rate; limits apply at once.
+    """Move the true airspeed setpoint at a limited rate towards an equivalent airspeed (m/s).
 
-    Follows `adapt_airspeed_setpoint`.  In a bank the minimum airspeed grows as the root of the load factor.
+    Follows `adapt_airspeed_setpoint`.  The limits of the airspeed apply at once; in a bank the minimum grows as the
+    square root of the load factor.
     """
     min_airspeed = parameters.airspeed_min / math.sqrt(max(0.1, math.cos(memory.roll_setpoint)))
     tas_min, tas_max = min_airspeed * eas_to_tas, parameters.airspeed_max * eas_to_tas
@@ -123,7 +124,9 @@ def _adapt_airspeed_setpoint(
 
 @inner
 def detect_underspeed(equivalent_airspeed: float, parameters: Record) -> float:
-    """Return the underspeed ratio (0..1), the priority of speed over altitude (`_detectUnderspeed`).
+    """Return the underspeed ratio, 0 to 1, by which speed gets priority over altitude (`_detectUnderspeed`).
+
+    The ratio is 0 above the underspeed threshold and rises to 1 below it.
 
     equivalent_airspeed: m/s.
     """
@@ -143,7 +146,7 @@ def _calc_pitch_control(
     underspeed_ratio: float,
     dt: float,
 ) -> None:
-    """Set the pitch setpoint from the SEB rate of an altitude rate (m/s) and an SKE rate (m^2/s^3).
+    """Set the pitch setpoint for an altitude rate (m/s) and an SKE rate (m^2/s^3), by the energy balance rate (SEB).
 
     Follows `TECSControl::_updateSpeedAltitudeWeights`, `_calcPitchControlSebRate`, `_calcPitchControlUpdate` and
     `_calcPitchControlOutput`.
@@ -188,7 +191,7 @@ def _calc_throttle_control(
     eas_to_tas: float,
     dt: float,
 ) -> None:
-    """Set the throttle setpoint from the STE rate of an altitude rate (m/s) and an SKE rate (m^2/s^3).
+    """Set the throttle setpoint for an altitude rate (m/s) and an SKE rate (m^2/s^3), by the total energy rate (STE).
 
     Follows `TECSControl::_calcThrottleControlSteRate`, `_calcThrottleControlUpdate` and `_calcThrottleControlOutput`.
 

@@ -105,7 +105,7 @@ def altitude_miss_probability(
     climb_reserve, sink_reserve: unused climb and sink rates, m/s; an up- or downdraft that exceeds them carries the
         aircraft away until the draft ends.
 
-    The probability is computed for moderate turbulence only; for any other turbulence it is 0.
+    The result is 0 for any turbulence other than moderate.
 
     >>> round(altitude_miss_probability(10.0, 4.0, 4.0, "moderate"), 3)
     0.013
@@ -123,7 +123,7 @@ def altitude_miss_probability(
 
 
 def _exceedance_probability(deviations: float) -> float:
-    """Return the probability that a normal variable exceeds a number of standard deviations, on one side."""
+    """Return the probability that a normal variable exceeds its mean by a number of standard deviations."""
     return 0.5 * math.erfc(deviations / math.sqrt(2.0))
 
 
@@ -133,7 +133,10 @@ CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
 
 @lru_cache(maxsize=8)
 def _corner_tables(parameters: Px4Parameters, airspeed: float) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return tables (turns, speeds) of acceptance radius, excursion, and lengths before and after the corner, m."""
+    """Return the acceptance radius, the excursion and the affected lengths of both legs of corners, m.
+
+    Each is a table with one row per turn of `TURNS` and one column per speed of `SPEED_RATIOS`.
+    """
     corners = np.zeros((TURNS.size, SPEED_RATIOS.size), CORNER_TRACKING)
     _measure_corners(parameters.record(), airspeed, TURNS, SPEED_RATIOS * airspeed, corners, waypoint_column(3))
     excursion_factor, right_angle_margin = WIND_SPREAD
@@ -154,7 +157,7 @@ def _measure_corners(
     corners: Records,
     waypoints: Records,
 ) -> None:
-    """Simulate a turn for each turn angle and ground speed, and store its tracking in `CORNER_TRACKING` records."""
+    """Fill the `CORNER_TRACKING` records of all corners, one row per turn angle and one column per ground speed."""
     for i in range(turn_angles.size):
         for j in range(ground_speeds.size):
             corner = corners[i, j]
@@ -170,9 +173,10 @@ def _measure_corners(
 def _fly_corner(
     parameters: Record, airspeed: float, turn: float, speed: float, waypoints: Records
 ) -> tuple[float, float]:
-    """Return the maximum distance from the two legs, and the distance along the second leg until the flight settles, m.
+    """Simulate one corner; return the excursion and the settling distance, m.
 
-    The first leg leads north to the origin.
+    The excursion is the maximum distance from the nearer leg.  The settling distance is the distance along the second
+    leg beyond which the aircraft stays close to it.  The first leg leads north to the origin.
 
     turn: rad, to the right.
     speed: ground speed, m/s.

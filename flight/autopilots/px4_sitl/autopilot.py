@@ -25,13 +25,13 @@ class Px4Sitl(ProgramAutopilot, Px4):
         return cls(Px4.restore(stored).parameters, stored.program)
 
     @classmethod
-    def recognises(cls, program: Path) -> bool:
-        """Return True if a program is PX4 according to its name, or to start-up files next to it."""
+    def accepts_program(cls, program: Path) -> bool:
+        """Return True if the program's name begins with "px4", or if PX4's start-up files are next to it."""
         return program.name.lower().startswith("px4") or startup_files(program) is not None
 
     @classmethod
-    def flying(cls, model: Px4, binary: Path) -> Self:
-        """Return the program's autopilot with the parameters of the simulated PX4."""
+    def with_model(cls, model: Px4, binary: Path) -> Self:
+        """Return PX4's program as an autopilot, with the parameters of the simulated PX4."""
         return cls(model.parameters, binary=binary)
 
     @classmethod
@@ -45,7 +45,7 @@ class Px4Sitl(ProgramAutopilot, Px4):
         return Px4(self.parameters)
 
     def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
-        """Describe the settings that neither PX4's program nor planfly's physics flies."""
+        """Describe the settings that have no effect on a flight of PX4's program in planfly's physics."""
         return self.settings_not_flown(mission, by_program=True)
 
     def store(self) -> StoredAutopilot:

@@ -138,7 +138,7 @@ class Sensors:
 
 
 def halfway_motion(before: BodyMotion, after: BodyMotion) -> BodyMotion:
-    """Return the mean of two motions; the yaw is halfway along the shorter turn."""
+    """Return the motion halfway between two motions; the yaw is halfway along the shorter turn."""
     values = [0.5 * (a + b) for a, b in zip(before, after, strict=True)]
     middle_motion = BodyMotion(*values)
     return middle_motion._replace(yaw=before.yaw + 0.5 * math.remainder(after.yaw - before.yaw, 2.0 * math.pi))

@@ -47,15 +47,15 @@ _MISSION_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_M
 
 
 class _Stopwatch:
-    """Time since its construction, both in the autopilot's time and by the clock."""
+    """Stopwatch that starts when it is created, in the autopilot's time and by the clock."""
 
     def __init__(self, now: Callable[[], float], clock: Callable[[], float]) -> None:
         self._now, self._clock = now, clock
-        self._moments = now(), clock()
+        self._start_times = now(), clock()
 
-    def longer_than(self, seconds: float) -> bool:
+    def has_passed(self, seconds: float) -> bool:
         """Return True if more than ``seconds`` of the autopilot's time and the minimum real time have passed."""
-        start, clock_start = self._moments
+        start, clock_start = self._start_times
         return self._now() - start > seconds and self._clock() - clock_start > min(seconds, _MIN_REAL_TIME_S)
 
 
@@ -87,11 +87,11 @@ class Conversation:
         self._reported = link.reported
 
     def _identify(self, kind: str, message_intervals: dict[int, int], parameters: Iterable[str]) -> Talk:
-        """Wait for the autopilot's heartbeat, request messages, and read the given parameters that the autopilot has.
+        """Wait for the autopilot's heartbeat, request messages, and read parameters.
 
         kind: name of the expected autopilot.
-        message_intervals: requested intervals by the number of the message, microseconds.
-        parameters: names of parameters.
+        message_intervals: interval of each requested message by its number, microseconds.
+        parameters: names of the parameters to read; parameters that the autopilot lacks are skipped.
 
         Raises FlightError if no heartbeat arrives, or if its vehicle is not a fixed wing.
         """
@@ -116,8 +116,8 @@ class Conversation:
     def _wait_for_position(self, message: int, interval: int, excluding_flags: int = 0) -> Talk:
         """Wait until the autopilot's estimator has a position.  Raises FlightError after a timeout.
 
-        message: number of the message that reports the estimator's state, requested every ``interval`` us.
-        excluding_flags: flags that exclude a position.
+        message, interval: number of the message that reports the estimator's state, and its interval, microseconds.
+        excluding_flags: flags that must not be set, because the estimator then has no position.
         """
         reported = self._reported
         yield from self._wait_until(
@@ -129,13 +129,13 @@ class Conversation:
     def _wait_until(
         self, is_done: Callable[[], bool], awaited: Awaited, request: Callable[[], None] | None = None
     ) -> Talk:
-        """Wait until a condition holds, repeating a request each second. Raises FlightError after a timeout."""
+        """Wait until a condition is true, and repeat a request each second.  Raises FlightError after a timeout."""
         stopwatch, last_request = self._start_stopwatch(), None
         while not is_done():
-            if stopwatch.longer_than(awaited.timeout):
+            if stopwatch.has_passed(awaited.timeout):
                 message = f"{awaited.failure_text} within {awaited.timeout:.0f} s{self._last_status_text()}"
                 raise FlightError(message, field=awaited.field)
-            if request is not None and (last_request is None or last_request.longer_than(RETRY_INTERVAL_S)):
+            if request is not None and (last_request is None or last_request.has_passed(RETRY_INTERVAL_S)):
                 last_request = self._start_stopwatch()
                 request()
             yield
@@ -147,6 +147,7 @@ class Conversation:
         return f"; its last message: {self._reported.texts[-1]}" if self._reported.texts else ""
 
     def _send_heartbeat(self) -> None:
+        """Send the heartbeat of a ground station."""
         self._link.send(
             mavlink.MAVLink_heartbeat_message(
                 mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
@@ -196,14 +197,13 @@ class Conversation:
         for name in names:
             self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
         stopwatch, parameters = self._start_stopwatch(), self._reported.parameters
-        while not (parameters.keys() >= set(names) or stopwatch.longer_than(RETRY_INTERVAL_S)):
+        while not (parameters.keys() >= set(names) or stopwatch.has_passed(RETRY_INTERVAL_S)):
             yield
 
     def _upload(self, items: list[MissionItem], kind: MissionType) -> Talk:
         """Upload a mission or rally points (MAVLink mission protocol).
 
-        Retries for up to `UPLOAD_TIMEOUT_S` while the autopilot reports that it has no space.  Raises FlightError if
-        the
+        Retry for up to `UPLOAD_TIMEOUT_S` while the autopilot reports that it has no space.  Raises FlightError if the
         autopilot refuses the items or does not answer.
         """
         stopwatch = self._start_stopwatch()
@@ -213,7 +213,7 @@ class Conversation:
             result = self._reported.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
-            if result != mavlink.MAV_MISSION_NO_SPACE or stopwatch.longer_than(UPLOAD_TIMEOUT_S):
+            if result != mavlink.MAV_MISSION_NO_SPACE or stopwatch.has_passed(UPLOAD_TIMEOUT_S):
                 requested_item = self._reported.requested
                 item_text = (
                     ""
@@ -231,9 +231,9 @@ class Conversation:
         reported.requested = reported.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), kind))
         last_item, stopwatch = None, self._start_stopwatch()
-        while reported.mission_result is None and not stopwatch.longer_than(REPLY_TIMEOUT_S):
+        while reported.mission_result is None and not stopwatch.has_passed(REPLY_TIMEOUT_S):
             if reported.requested is not None and (
-                reported.requested != last_item or stopwatch.longer_than(RETRY_INTERVAL_S)
+                reported.requested != last_item or stopwatch.has_passed(RETRY_INTERVAL_S)
             ):
                 last_item, stopwatch = reported.requested, self._start_stopwatch()
                 if last_item < len(items):
@@ -241,7 +241,7 @@ class Conversation:
             yield
 
     def _wait(self, seconds: float) -> Talk:
-        """Wait for some time of the autopilot, s."""
+        """Wait for a number of seconds of the autopilot's time."""
         start = self._now()
         while self._now() - start < seconds:
             yield

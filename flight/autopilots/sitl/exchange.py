@@ -55,7 +55,11 @@ class BodyMotion(NamedTuple):
 
 
 def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """Return north and east (m) of a position relative to another position (both rad), on ArduPilot's sphere.
+    """Return the north and east offset (m) of a position from another position, on ArduPilot's spherical Earth.
+
+    lat, lon: the position, rad.
+    from_lat, from_lon: the position from which the offset is measured, rad.
+
 
     >>> north, east = offset_on_sphere(math.radians(36.01), -1.5, math.radians(36.0), -1.5)
     >>> round(north, 3), east
@@ -66,7 +70,11 @@ def offset_on_sphere(lat: float, lon: float, from_lat: float, from_lon: float) -
 
 
 def position_on_sphere(north: float, east: float, from_lat: float, from_lon: float) -> tuple[float, float]:
-    """Return latitude and longitude (rad) at an offset (m) from a position (rad): the inverse of `offset_on_sphere`.
+    """Return the latitude and longitude (rad) at an offset from a position; inverse of `offset_on_sphere`.
+
+    north, east: offset, m.
+    from_lat, from_lon: the position from which the offset is measured, rad.
+
 
     >>> position = position_on_sphere(*offset_on_sphere(0.63, -1.49, 0.62, -1.5), 0.62, -1.5)
     >>> [round(angle, 12) for angle in position]
@@ -144,11 +152,12 @@ def rail_end(state: Record, wind: tuple[float, float, float]) -> RailEnd:
 
 
 def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tuple[float, float, float]) -> BodyMotion:
-    """Return the motion ``push_duration`` s after the start of the push, at ``time`` s of the exchange.
+    """Return the motion on the rail ``push_duration`` s after the start of the push.
 
     The aircraft is at rest at the start of the rail if ``push_duration`` is 0 or less, and remains at the end of the
     rail after the push.
 
+    time: time since the start of the exchange, s.
     origin: latitude and longitude (rad) and altitude (m) from which positions are measured.
     """
     push_duration = min(max(0.0, push_duration), end.push_time)
@@ -188,7 +197,7 @@ def motion_on_rail(end: RailEnd, time: float, push_duration: float, origin: tupl
 
 
 def to_body(attitude: tuple[float, float, float], vector: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Rotate a vector north, east, down into body axes, by yaw, then pitch, then roll.
+    """Return the body-axis components of a vector given by its north, east and down components.
 
     attitude: roll, pitch and yaw, rad.
 
@@ -310,7 +319,7 @@ class Lockstep(ABC):
         )
 
     def make_loop(self, tick: Callable[[], int], steps: int, *, gusts: bool, ground: bool) -> Callable[[int], int]:
-        """Return a function that flies up to a number of ticks and returns the last status.
+        """Return a function that flies up to a number of ticks, and returns the end code or 0.
 
         `flight.simulation.simulate` uses it like the compiled loop of a control law.
 
@@ -350,11 +359,12 @@ class Lockstep(ABC):
         return fly
 
     def serve(self) -> None:
-        """Run one more frame: apply the autopilot's commands, and send it the motion."""
+        """Run one more frame: apply the autopilot's commands, and send the motion to the autopilot."""
         self._fdm.write(self._receive_commands())
         self.step()
 
     def _next_time(self) -> float:
+        """Count a frame, poll the MAVLink connection if it is due, and return the time of the exchange, s."""
         self._frame += 1
         if self._frame % POLL_INTERVAL_FRAMES == 0:
             self._poll()

@@ -62,9 +62,9 @@ _SEARCHED_PIECES = 4
 
 @compiled
 def autopilot_tick(block: Floats, heights: Heights) -> int:
-    """Run a tick on the block of a `flight.simulation.tick.Workspace`, as the tick of a control law does.
+    """Advance the flight in the block of a `flight.simulation.tick.Workspace` by one tick; return an end code or 0.
 
-    The commands in the block are the program's.  Once the program reports that it flies to its last item, the flight
+    The program has set the commands in the block.  Once the program reports that it flies to its last item, the flight
     completes where the aircraft passes the end of the path; an RTL completes in its loiter, a loiter without end after
     `ENDLESS_LOITER_TIME_S`, and a mission whose last waypoint is circled completes after one lap.
     """
@@ -95,7 +95,7 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:
 
 @inner
 def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record) -> None:  # pragma: no cover
-    """Set leg, distance, cross-track and altitude error in the memory from the nearest path piece.
+    """Set leg, distance, cross-track error and altitude error in ``memory`` from the nearest piece of the path.
 
     The search starts at the piece of the previous tick.  It skips later pieces that the aircraft flies against, because
     both directions of an out-and-back leg lie on one line.
@@ -105,16 +105,16 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
     nearest_piece, min_distance, distance, cross_track = memory.piece, math.inf, 0.0, 0.0
     for candidate in range(memory.piece, min(memory.piece + _SEARCHED_PIECES, pieces.shape[0])):
         piece = pieces[candidate]
-        along_piece, cross_track_there, course = project(piece, true.east, true.north)
+        piece_distance, piece_cross_track, course = project(piece, true.east, true.north)
         if (
             candidate > memory.piece
             and true.velocity_east * math.sin(course) + true.velocity_north * math.cos(course) < 0.0
         ):
             continue
-        overrun = max(0.0, -along_piece, along_piece - piece.length)
-        if math.hypot(cross_track_there, overrun) < min_distance:
-            nearest_piece, min_distance = candidate, math.hypot(cross_track_there, overrun)
-            distance, cross_track = piece.start + along_piece, cross_track_there
+        overrun = max(0.0, -piece_distance, piece_distance - piece.length)
+        if math.hypot(piece_cross_track, overrun) < min_distance:
+            nearest_piece, min_distance = candidate, math.hypot(piece_cross_track, overrun)
+            distance, cross_track = piece.start + piece_distance, piece_cross_track
     memory.piece = nearest_piece
     memory.distance = distance
     memory.cross_track = cross_track
@@ -124,14 +124,14 @@ def place_on_path(true: Record, pieces: Records, nodes: Records, memory: Record)
 
 @inner
 def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: float) -> None:
-    """Add a tick to the time on a loiter without end, and finish the flight after `ENDLESS_LOITER_TIME_S`.
+    """Update the time on a loiter without end, and finish the flight after `ENDLESS_LOITER_TIME_S`.
 
     The time starts when the aircraft is near the circle, and its speed around the center, in the loiter's direction, is
     higher than its speed towards or away from the center.  Once started, it does not depend on the radius flown.
 
     true: a record of `flight.guidance.navigation_error.MOTION`.
     corner: a corner of the circle, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; its `loiter_time` is that time, s.
+    memory: a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`; `loiter_time` is the time on the loiter, s.
     """
     offset_east, offset_north = true.east - corner.centre_east, true.north - corner.centre_north
     distance = max(0.1, math.hypot(offset_east, offset_north))
@@ -150,11 +150,11 @@ def update_endless_loiter(true: Record, corner: Record, memory: Record, dt: floa
 
 @inner
 def distances_from_route_end(true: Record, waypoints: Records) -> tuple[float, float]:
-    """Return the aircraft's distances to the right of the last leg and past the end of the leg, m, signed."""
-    a, b = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
-    length = math.hypot(b.east - a.east, b.north - a.north)
-    east, north = (b.east - a.east) / length, (b.north - a.north) / length
-    offset_east, offset_north = true.east - b.east, true.north - b.north
+    """Return the signed distances of the aircraft to the right of the last leg, and past the end of this leg, m."""
+    start, end = waypoints[waypoints.shape[0] - 2], waypoints[waypoints.shape[0] - 1]
+    length = math.hypot(end.east - start.east, end.north - start.north)
+    east, north = (end.east - start.east) / length, (end.north - start.north) / length
+    offset_east, offset_north = true.east - end.east, true.north - end.north
     return offset_east * north - offset_north * east, offset_east * east + offset_north * north
 
 
@@ -285,13 +285,13 @@ class SitlFlight(ProgramFlight):
             self._lockstep.hold(self._rail, k / FRAME_HZ)
 
     def keep_log(self, target: Path) -> bool:
-        """End the program in order, and move its own log to a file; return True if there was a log."""
+        """End the program cleanly, and move its own log to a file; return True if there was a log."""
         self._process.end(self._answer_frame)
         return self._process.keep_log(target)
 
     @contextlib.contextmanager
     def _errors_name_program(self, error_class: type[FlightError] = FlightError) -> Iterator[None]:
-        """Raise FlightErrors of this context again as an ``error_class`` that names the program's file."""
+        """Raise any FlightError of this context as an ``error_class`` whose message names the program's file."""
         try:
             yield
         except FlightError as error:
@@ -319,7 +319,7 @@ class SitlFlight(ProgramFlight):
         return rail_end(self.fdm.read(), start.wind)
 
     def _hold_during(self, talk: Talk) -> None:
-        """Hold the aircraft at rest during a conversation."""
+        """Hold the aircraft at rest on the rail until a conversation has ended."""
         while True:
             for _ in range(POLL_INTERVAL_FRAMES):
                 self._lockstep.hold(self._rail)
@@ -329,12 +329,12 @@ class SitlFlight(ProgramFlight):
                 return
 
     def _poll_link(self) -> None:
-        """Read the autopilot's messages, and tell the tick whether the program flies its last leg."""
+        """Read the autopilot's messages, and store for the tick whether the program flies its last leg."""
         self._link.poll()
         self._workspace.on_last_leg[0] = self._is_ending
 
     def _apply_gnss_error(self) -> None:
-        """Set the GNSS position error that the autopilot has on the rail."""
+        """Set the error of the GNSS position while the aircraft stands on the rail."""
         settings, navigation = self._work.settings, self._work.navigation
         scale = settings.navigation_sigma * math.sqrt(2.0)
         east, north, up = (scale * navigation.second).tolist()

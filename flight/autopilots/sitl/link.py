@@ -233,7 +233,7 @@ class UdpLink(AutopilotLink):
 
 
 def free_ports(count: int) -> list[int]:
-    """Return numbers of UDP ports that are free now, on which a program may listen."""
+    """Return UDP port numbers that are not in use at the moment, for a program that is to listen on them."""
     sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
     try:
         for udp_socket in sockets:

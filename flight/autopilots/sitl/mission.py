@@ -34,10 +34,10 @@ _KEPT_COMMANDS = (Command.DO_JUMP, Command.DO_JUMP_TAG, Command.JUMP_TAG, Comman
 
 @dataclass(frozen=True, slots=True)
 class UploadedMission:
-    """Mission as uploaded to the autopilot.
+    """Mission as it is uploaded to the autopilot.
 
-    home: its home; alt is AMSL.
-    items: numbered from 1; the last is the extra waypoint, or the item with which the autopilot ends its mission.
+    home: home position; alt is AMSL.
+    items: items numbered from 1; the last one is the extra waypoint, or the item that ends the autopilot's mission.
     rally: rally points for an RTL, numbered from 0; empty without an RTL.
     last: number of the item at which the last leg begins; 0 for the last item.
     """
@@ -49,9 +49,9 @@ class UploadedMission:
 
 
 def uploaded_mission(setup: FlightSetup) -> UploadedMission:
-    """Return the mission of a setup for the autopilot; altitudes are AMSL except for rally points.
+    """Return the mission to upload for a setup; its altitudes are AMSL, except for rally points.
 
-    A flight from the ground to the ground uses the mission itself.
+    For a flight from the ground to the ground the mission is uploaded unchanged.
     """
     if setup.ground_phases:
         return _unchanged_mission(setup, setup.ground_phases)
@@ -79,7 +79,10 @@ def uploaded_mission(setup: FlightSetup) -> UploadedMission:
 
 
 def _unchanged_mission(setup: FlightSetup, ground_phases: GroundPhases) -> UploadedMission:
-    """Return the mission as in its file, with its home; a home without an altitude is put on the ground."""
+    """Return the mission as in its file, with its home; a home without an altitude gets the ground's altitude.
+
+    Raises ValueError without a home, a take-off or a landing.
+    """
     home, mission = setup.mission.home, setup.mission
     if home is None or ground_phases.take_off is None or ground_phases.approach is None:
         raise ValueError("a mission from the ground to the ground needs a home, a take-off and a landing")
@@ -99,7 +102,7 @@ def _item_with_position(
     """Return a navigation item for the upload: a loiter keeps its parameters, anything else becomes a waypoint.
 
     waypoint_indices: waypoints of the route that belong to the item.
-    earlier: uploaded items before it; a loiter without a position is about the position of the last of them.
+    earlier: items that are uploaded before this one; a loiter without a position is about the last of their positions.
     """
     position = route.waypoints[waypoint_indices[-1]]
     loiter = stated_loiter(item)
@@ -146,7 +149,7 @@ def _extra_point(route: Route) -> Floats:
 
 
 def _renumber(items_in_order: list[MissionItem]) -> tuple[MissionItem, ...]:
-    """Renumber items from 1, and let each jump lead to the first remaining item at or after its target."""
+    """Return copies of the items numbered from 1; a jump leads to the first remaining item at or after its target."""
     items = []
     for number, item in enumerate(items_in_order, 1):
         params = item.params

@@ -86,10 +86,10 @@ class AutopilotProcess:
         guard = self._resources.enter_context(Guard())
         try:
             self._folder = self._resources.enter_context(temporary_folder("planfly-autopilot-"))
-            guard.keep_folder(self._folder)
+            guard.register_folder(self._folder)
             self._launch = prepare(self._folder)
             for file in self._launch.leaves:
-                guard.keep_file(file)
+                guard.register_file(file)
                 self._resources.callback(file.unlink, missing_ok=True)
             self._process = self._spawn(guard)
         except BaseException:
@@ -97,14 +97,16 @@ class AutopilotProcess:
             raise
 
     def _spawn(self, guard: Guard) -> "subprocess.Popen[bytes]":
-        def register_group() -> None:
+        """Start the program in a process group of its own, which the guard kills if planfly is killed."""
+
+        def register_before_start() -> None:
             """Register the process group with the guard before the program runs.
 
-            If it were registered later, it would remain if planfly were killed in between.
+            If it were registered later, the program would survive if planfly were killed in between.
             """
             # Before Python restores the default of the signal, with which a dead guard would end this process here.
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
-            guard.keep_group(os.getpid())
+            guard.register_group(os.getpid())
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)
             if sys.platform == "linux":
                 _die_with_parent()
@@ -120,7 +122,7 @@ class AutopilotProcess:
                     env=os.environ | self._launch.environment,
                     # Its own session: Ctrl-C reaches only planfly, which ends the program and its children in order.
                     start_new_session=True,
-                    preexec_fn=register_group,
+                    preexec_fn=register_before_start,
                 )
             except OSError as error:
                 raise FlightError(
@@ -151,7 +153,7 @@ class AutopilotProcess:
         )
 
     def end(self, answer_request: Callable[[], bool]) -> None:
-        """Ask the program to end, so that it closes its log, and kill it if it does not end.
+        """Ask the program to end, so that it closes its log; kill it if it does not end within `_GRACE_S`.
 
         answer_request: function that answers one physics request of the program; returns False if there is none.
         """
@@ -184,7 +186,7 @@ class AutopilotProcess:
         return not self._ended
 
     def _is_alive(self) -> bool:
-        """Return True if the program or one of its children runs."""
+        """Return True if the program or one of its children is still running."""
         self._process.poll()
         return self._signal(0)
 

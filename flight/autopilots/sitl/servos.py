@@ -77,7 +77,7 @@ class ServoMap:
     throttle: ServoOutput
 
     def commands(self, pulses: Sequence[int]) -> Commands:
-        """Return the controls for an autopilot's pulses (outputs,), microseconds."""
+        """Return the controls for the pulses of an autopilot's outputs, microseconds, (outputs,)."""
         elevator, aileron, rudder, throttle = self.elevator, self.aileron, self.rudder, self.throttle
         return Commands(
             elevator.value(pulses[elevator.number - 1]),

@@ -101,7 +101,7 @@ def _fill_altitudes_left(
     """Fill `altitude_left` and `reached_cells` for each start, with the better of a left and a right turn."""
     state_array = np.zeros(1, _TURN_STATE)
     state = state_array[0]
-    max_speed = aircraft.slowest + (excess_table.shape[1] - 1) * aircraft.speed_step
+    max_speed = aircraft.first_airspeed + (excess_table.shape[1] - 1) * aircraft.airspeed_step
     for n in range(starts.shape[0]):
         start = starts[n]
         wind = mean_wind_speed(aircraft.wind_speed, aircraft.wind_gradient, aircraft.wind_reference, start.up)

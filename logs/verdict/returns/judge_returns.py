@@ -731,7 +731,7 @@ def is_reachable_start(world: ReturnWorld, row: Record) -> bool:
     east = float(row["velocity_east"]) + wind_speed * math.sin(wind.from_course)
     north = float(row["velocity_north"]) + wind_speed * math.cos(wind.from_course)
     airspeed = math.hypot(east, north, float(row["velocity_up"]))
-    return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.slowest)
+    return abs(float(row["roll"])) <= _MAX_START_BANK_RAD and airspeed >= float(world.aircraft.record.first_airspeed)
 
 
 def distance_to_limit(ret: SimulatedReturn) -> float:

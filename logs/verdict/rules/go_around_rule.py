@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flight.autopilots.arduplane.go_around_point_mass import abort_start, climb_rows, fly_go_arounds
+from flight.autopilots.arduplane.go_around_point_mass import count_climb_rows, fly_go_arounds, make_abort_start
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_OFF_TERRAIN, RETURN_TIMEOUT
 from flight.autopilots.parts import LandingGlide
 from flight.mission.ground_ways import climb_pitch
@@ -347,7 +347,7 @@ def _simulate_go_arounds(
         return []
     start_records: Records = np.concatenate(
         [
-            abort_start(place, landing.course, landing.glide.slope, landing.airspeed, world.aircraft)
+            make_abort_start(place, landing.course, landing.glide.slope, landing.airspeed, world.aircraft)
             for _, place, _ in airborne
         ]
     )
@@ -394,7 +394,7 @@ def _judge_go_around(
     destination: destination of the go-around.
     top_altitude: altitude above which the climb is over, m AMSL.
     """
-    climb_end, end_status = climb_rows(positions, top_altitude), int(result["ended"])
+    climb_end, end_status = count_climb_rows(positions, top_altitude), int(result["ended"])
     go_around = go_around._replace(
         is_lost=end_status == RETURN_TIMEOUT,
         unknown_part_text=_unknown_part_text(end_status, has_climbed=climb_end < len(positions)),

@@ -153,7 +153,7 @@ def test_a_name_of_another_version_is_not_restored() -> None:
 
 def test_a_program_is_flown_in_the_place_of_its_law() -> None:
     kind = program_class_for(Path("arduplane"))
-    flown = kind.flying(ArduPlane(MINE), Path("arduplane"))
+    flown = kind.with_model(ArduPlane(MINE), Path("arduplane"))
     assert flown == ArduPlaneSitl(MINE)
     assert flown.model == ArduPlane(MINE)
     assert kind.name == ArduPlane.name

@@ -17,8 +17,8 @@ def test_who_leaves_in_order_finds_everything_as_it_was(tmp_path: Path) -> None:
     folder, group = tmp_path / "folder", group_of_two(tmp_path)
     folder.mkdir()
     with Guard() as guard:
-        guard.keep_folder(folder)
-        guard.keep_group(group.pid)
+        guard.register_folder(folder)
+        guard.register_group(group.pid)
     assert folder.exists()
     assert group.poll() is None
     os.killpg(group.pid, signal.SIGKILL)
@@ -31,10 +31,10 @@ def test_where_its_owner_is_gone_it_ends_the_group_and_removes_the_folder(tmp_pa
     (folder / "logs" / "1.BIN").write_text("log")
     (tmp_path / "lock").touch()
     guard = Guard()
-    guard.keep_folder(folder)
-    guard.keep_file(tmp_path / "lock")
-    guard.keep_file(tmp_path / "never made")
-    guard.keep_group(group.pid)
+    guard.register_folder(folder)
+    guard.register_file(tmp_path / "lock")
+    guard.register_file(tmp_path / "never made")
+    guard.register_group(group.pid)
     # As the system does for an owner that was killed.
     guard._pipe.close()
     assert group.wait(20.0) == -signal.SIGKILL
@@ -48,5 +48,5 @@ def test_a_guard_that_is_gone_harms_nobody(tmp_path: Path) -> None:
         guard._process.kill()
         guard._process.wait()
         time.sleep(0.01)
-        guard.keep_folder(tmp_path)
+        guard.register_folder(tmp_path)
     assert tmp_path.exists()

@@ -147,12 +147,14 @@ PARAMETERS = ArduPilotParameters.defaults().changed(AIRSPEED_MIN=18.0, AIRSPEED_
 
 @pytest.mark.parametrize(("airspeed", "taken"), [(17.99, False), (18.0, True), (31.0, True), (31.01, False)])
 def test_speeds_within_the_limits_are_taken(airspeed: float, taken: bool) -> None:
-    assert ArduPlane(PARAMETERS).speeds.flown(np.array([airspeed]), 25.0).tolist() == [airspeed if taken else 25.0]
+    assert ArduPlane(PARAMETERS).speeds.flown_airspeeds(np.array([airspeed]), 25.0).tolist() == [
+        airspeed if taken else 25.0
+    ]
 
 
 def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:
     commanded = np.array([17.0, 17.0, 20.0, 35.0, 31.0])
-    assert ArduPlane(PARAMETERS).speeds.flown(commanded, 25.0).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]
+    assert ArduPlane(PARAMETERS).speeds.flown_airspeeds(commanded, 25.0).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]
 
 
 def parameters(**values: float) -> tuple[ArduPilotParameters, tuple[str, ...]]:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane import point_mass as subject
-from flight.autopilots.arduplane.point_mass import PointMass, excess_power, filled_excess, point_mass
+from flight.autopilots.arduplane.point_mass import PointMass, excess_power, fill_excess_power, point_mass
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import airframe
 from world.wind import Wind
 
@@ -19,7 +19,7 @@ def test_a_closed_throttle_without_a_trim_is_that_of_the_nearest_airspeed_and_th
     closed = [[NONE, NONE], [-2.0, NONE], [-3.0, NONE]]
     climbs = [[1.5, 1.0], [NONE, 1.2], [NONE, 0.7]]
     full = [[4.0, NONE], [5.0, 3.0], [6.0, 2.5]]
-    found = filled_excess(np.array([closed, climbs, full]))
+    found = fill_excess_power(np.array([closed, climbs, full]))
     assert found[0].tolist() == [[-2.0, -2.0], [-2.0, -2.0], [-3.0, -3.0]]
     # The others by throttle: halfway between those that are known, or the nearest.
     assert found[1].tolist() == [[1.5, 1.0], [1.5, 1.2], [1.5, 0.7]]
@@ -27,7 +27,7 @@ def test_a_closed_throttle_without_a_trim_is_that_of_the_nearest_airspeed_and_th
 
 
 def test_a_height_without_any_trim_is_that_of_the_nearest() -> None:
-    found = filled_excess(np.array([[[-2.0, NONE], [-3.0, NONE]], [[1.0, NONE], [2.0, NONE]]]))
+    found = fill_excess_power(np.array([[[-2.0, NONE], [-3.0, NONE]], [[1.0, NONE], [2.0, NONE]]]))
     assert found.tolist() == [[[-2.0, -2.0], [-3.0, -3.0]], [[1.0, 1.0], [2.0, 2.0]]]
 
 
@@ -41,7 +41,7 @@ def made(monkeypatch: pytest.MonkeyPatch, slowest_glide: float) -> PointMass:
 
     monkeypatch.setattr(subject, "trim", trim)
     # Not the kept trims of that aircraft, nor these for anyone else.
-    monkeypatch.setattr(subject, "_trimmed", subject._trimmed.__wrapped__)
+    monkeypatch.setattr(subject, "_load_trim_tables", subject._load_trim_tables.__wrapped__)
     monkeypatch.setattr(subject, "read_tables", lambda *_: None)
     monkeypatch.setattr(subject, "write_tables", lambda *_: None)
     one = airframe()
@@ -66,7 +66,7 @@ def test_trims_are_kept_to_the_last_bit_for_the_model_that_they_are_of(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(subject, "user_cache_dir", lambda name: str(tmp_path / name))
-    keep = subject._trimmed.__wrapped__
+    keep = subject._load_trim_tables.__wrapped__
     aircraft = airframe().aircraft
     made = keep(aircraft)
     (file,) = (tmp_path / "planfly").iterdir()
@@ -78,7 +78,7 @@ def test_trims_are_kept_to_the_last_bit_for_the_model_that_they_are_of(
             np.testing.assert_array_equal(one, again)
     # One of another model, or that is damaged, is made anew.
     trims = {"excess": made[1], "alpha": np.zeros(len(made[0]))}
-    monkeypatch.setattr(subject, "_trims", lambda *_: trims)
+    monkeypatch.setattr(subject, "_compute_trim_tables", lambda *_: trims)
     for damaged in (sound.replace('"model_hash": "', '"model_hash": "0'), sound[:99], sound.replace("null", "[1]")):
         file.write_text(damaged, encoding="utf-8")
         assert keep(aircraft)[2:] == (0.0, 0.0)

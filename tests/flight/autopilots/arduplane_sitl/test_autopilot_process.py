@@ -122,7 +122,7 @@ def test_what_a_wrapper_has_started_is_asked_to_end_and_closes_its_log(tmp_path:
 
 def test_a_guard_that_is_gone_keeps_no_program_from_running(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     class Gone(Guard):
-        def keep_folder(self, folder: Path) -> None:
+        def register_folder(self, folder: Path) -> None:
             self._process.kill()
             self._process.wait()
 

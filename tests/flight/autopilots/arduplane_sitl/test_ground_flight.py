@@ -14,7 +14,7 @@ from flight.autopilots.arduplane.ground_law import APPROACHING, FLARING, GROUND_
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.arduplane_sitl.autopilot import ArduPlaneSitl
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
-from flight.autopilots.arduplane_sitl.ground_tick import find_phase
+from flight.autopilots.arduplane_sitl.ground_tick import update_phase
 from flight.autopilots.arduplane_sitl.process import load_user_parameters
 from flight.autopilots.parts import RtlSettings
 from flight.autopilots.sitl.exchange import motion_on_rail
@@ -113,7 +113,7 @@ def phase(stage: int, up: float, *, to_go: float = 300.0, on_last_leg: bool = Fa
     true, ground = np.zeros(1, MOTION)[0], np.zeros(1, GROUND_STATE)[0]
     true.east, true.up, true.velocity_east = -to_go, up, 20.0
     ground.stage, ground.takeoff_end_altitude, ground.flare_height = stage, 60.0, 4.0
-    find_phase(true, ground, on_last_leg)
+    update_phase(true, ground, on_last_leg)
     return int(ground.stage)
 
 

@@ -58,7 +58,7 @@ def test_speeds_beyond_its_limits_are_flown_at_them() -> None:
     made = Px4(
         Px4Parameters.of_text("FW_AIRSPD_MIN 18\nFW_AIRSPD_MAX 31\nFW_AIRSPD_TRIM 25\nFW_R_LIM 40\n", "a.params")
     )
-    assert made.speeds.flown(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
+    assert made.speeds.flown_airspeeds(np.array([10.0, 20.0, 40.0]), 25.0).tolist() == [18.0, 20.0, 31.0]
     assert made.speeds.limits is not None
     assert made.speeds.limits.nearest
     assert made.checks.dialect == "px4"

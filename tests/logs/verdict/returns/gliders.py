@@ -24,7 +24,7 @@ def glider(
     from 26 m/s to 30 m/s, the fastest.
     """
     record: Record = np.zeros(1, POINT_MASS)[0]
-    record.airspeed, record.slowest, record.speed_step, record.height_step = 25.0, AIRSPEED, 2.0, 2000.0
+    record.airspeed, record.first_airspeed, record.airspeed_step, record.altitude_step = 25.0, AIRSPEED, 2.0, 2000.0
     record.wind_speed = wind
     record.wind_east, record.wind_north = math.sin(math.radians(blows_to)), math.cos(math.radians(blows_to))
     excess = np.full((21, 7, 3), -SINK)
