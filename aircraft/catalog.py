@@ -1,4 +1,4 @@
-"""Catalog of aircraft: metadata of each model in SI units, and folders for a user's own aircraft.
+"""Read the metadata of aircraft in SI units, and make folders for a user's own aircraft.
 
 An aircraft is a folder with ``<name>.xml`` (JSBSim) and ``<name>.toml`` (metadata: masses, speeds, limits, energy).
 `find_aircraft` reads an embedded aircraft or a folder, `model_hash` identifies a model's files, and `make_own_folder`
@@ -45,27 +45,27 @@ _FIELD_BY_KEY = {
     "surface_lag_s": ("surface_lag", 1.0),
     "motor_lag_s": ("motor_lag", 1.0),
 }
-# Keys of the energy carried: one of these pairs.
+# Keys of the energy of an aircraft with a battery.
 _BATTERY_KEYS = ("battery_v", "battery_wh")
-# The other pair.
+# Keys of the energy of an aircraft that burns fuel.
 _FUEL_KEYS = ("fuel_kg", "fuel_mj_per_kg")
 
 
 @dataclass(frozen=True, slots=True)
 class Aircraft:
-    """One aircraft model: its JSBSim files and its metadata.
+    """Aircraft model: its JSBSim files and its metadata.
 
     folder: folder of ``<name>.xml`` (JSBSim) and ``<name>.toml``.
     mass: kg.
     wing_area: m^2.
     wing_span: m.
-    airspeed: cruise, m/s; this and the next three are true airspeeds.
-    airspeed_min, airspeed_max: range that guidance may use, m/s.
+    airspeed: cruise airspeed, m/s; all airspeeds are true airspeeds.
+    airspeed_min, airspeed_max: range of airspeeds that guidance may use, m/s.
     stall_speed: minimum airspeed of a level trim at sea level, m/s.
     max_bank: bank limit of planned turns, rad.
     max_pitch: limit of the pitch command in either direction, rad.
     max_elevator, max_aileron, max_rudder: travel in either direction, rad.
-    surface_rate: rad/s.
+    surface_rate: rate limit of the control surfaces, rad/s.
     surface_lag, motor_lag: first-order time constants, s.
     battery_voltage: V; 0 for an aircraft that burns fuel.
     battery_energy: energy of the battery, or heat of the fuel, J.
@@ -103,7 +103,7 @@ class Aircraft:
 
     @property
     def model_folders(self) -> tuple[Path, ...]:
-        """Folders in which files included by the model may be."""
+        """Folders that may contain files that the model includes."""
         if self.model.shipped:
             root = jsbsim_folder()
             return (root / "aircraft" / self.model.shipped, root / "engine", root / "systems")
@@ -117,7 +117,7 @@ class Aircraft:
 
 
 def jsbsim_folder() -> Path:
-    """Return the folder of JSBSim's own models, found without importing JSBSim."""
+    """Return JSBSim's package folder, with its own models; JSBSim is not imported."""
     spec = find_spec("jsbsim")
     return Path(spec.origin if spec and spec.origin else "jsbsim").parent
 
@@ -134,8 +134,7 @@ def aircraft_names() -> tuple[str, ...]:
 def load_aircraft(name: str) -> Aircraft:
     """Return the embedded aircraft with this name.
 
-    Raises FlightError with one line for an unknown name, or for a metadata file with a missing, unknown or invalid
-    entry.
+    Raises FlightError for an unknown name, and for a metadata file with a missing, unknown or invalid entry.
 
     >>> aircraft = load_aircraft("aerosonde")
     >>> aircraft.mass, aircraft.airspeed
@@ -144,7 +143,7 @@ def load_aircraft(name: str) -> Aircraft:
     names = aircraft_names()
     if name not in names:
         suggestion = did_you_mean(name, names)
-        # A folder must be given with a slash.
+        # A folder is only recognized by a slash in its name.
         suggestion = suggestion or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
         allowed = f"known names: {', '.join(names)}; a folder needs a slash"
         message = f"no aircraft called {name!r}{suggestion} ({allowed})"
@@ -166,8 +165,8 @@ def find_aircraft(name: str) -> Aircraft:
 def find_logged_aircraft(name: str, stated_name: str) -> Aircraft:
     """Return the aircraft of a setup or log.
 
-    name: name in the setup or log.
-    stated_name: name or folder in its scenario, which is used if it is a folder with the name `name`.
+    name: name of the aircraft in the setup or log.
+    stated_name: name or folder in the scenario of the setup or log; it is used if it is a folder called `name`.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -210,7 +209,7 @@ def read_aircraft(folder: Path) -> Aircraft:
 
 
 def _toml_advice(folder: Path) -> str:
-    """Return advice for a folder with a JSBSim model and without metadata; "" for another folder."""
+    """Return advice for a folder with a JSBSim model but without metadata; return "" for a folder without a model."""
     models = sorted(file.stem for file in folder.glob("*.xml"))
     if not models:
         return ""
@@ -221,12 +220,12 @@ def _toml_advice(folder: Path) -> str:
 
 
 def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
-    """Return the numeric fields of `Aircraft` in SI units. Raises FlightError, whose message omits the file's name."""
+    """Return the numeric fields of `Aircraft` in SI units. Raises FlightError, whose message does not name the file."""
     energy_keys = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
     allowed = {*_FIELD_BY_KEY, *energy_keys}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
     suggestion = did_you_mean(unknown[0], missing) if unknown else ""
-    # A misspelled key is missing as well; the spelling is the better message.
+    # A misspelled key is missing, too: in this case report the spelling.
     if missing and not suggestion:
         raise FlightError(f"missing {', '.join(missing)}", field=missing[0])
     if unknown:
@@ -246,9 +245,9 @@ def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
 
 
 def model_hash(aircraft: Aircraft) -> str:
-    """Return the SHA-256, as hex, of the names and contents of the model's XML and TOML files.
+    """Return the SHA-256, in hexadecimal, of the names and contents of the model's XML and TOML files.
 
-    The hash changes with any change of the model, and so identifies the model of a cached envelope or an old log. Other
+    The hash changes with any change of the model, so it identifies the model of a cached envelope or an old log. Other
     files in the folder, such as guidance gains, are not included. Raises FlightError for a file that cannot be read.
 
     >>> len(model_hash(load_aircraft("aerosonde")))
@@ -266,7 +265,7 @@ def model_hash(aircraft: Aircraft) -> str:
 
 @cache
 def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> str:
-    # The stamps are only part of the cache key.
+    """Return the hash of `model_hash`.  stamps: times and sizes of the files, which only belong to the cache key."""
     digest = hashlib.sha256()
     for file in files:
         data = read_at_most(file, MAX_MODEL_BYTES, "model")
@@ -290,12 +289,12 @@ _SHIPPED_ENTRY = re.compile(r"^([ \t]*shipped_by_jsbsim\s*=\s*)\S.*\n", re.MULTI
 def make_own_folder(
     folder: Path, source: Aircraft, model: Mapping[str, bytes] | None = None, *, overwrite: bool = False
 ) -> tuple[str, ...]:
-    """Create a folder with the same aircraft under the folder's name, completely or not at all.
+    """Create a folder with a copy of an aircraft, which gets the folder's name; create it completely or not at all.
 
-    model: files to copy of a model that JSBSim ships, by name; None to refer to the model in the metadata.
-    overwrite: True replaces the folder of an aircraft.
+    model: contents of a model's files that JSBSim ships, by name, which are copied; None to only refer to the model.
+    overwrite: True to replace the folder of an aircraft.
 
-    Return the names of the created files, sorted.  Raises FlightError as `check_new_folder` does, and OSError if the
+    Returns the sorted names of the created files.  Raises FlightError as `check_new_folder` does, and OSError if the
     folder cannot be written.
 
     >>> from tempfile import TemporaryDirectory
@@ -325,7 +324,7 @@ def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
 def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     """Return the absolute path of the folder of a new aircraft.
 
-    overwrite: True accepts an existing folder of an aircraft.
+    overwrite: True to accept an existing folder of an aircraft.
 
     Raises FlightError if the folder exists (with `overwrite`: if it is not an aircraft's folder), if its parent does
     not exist, or if its name is not valid for a model.
@@ -347,9 +346,9 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
 
 
 def _files_under_new_name(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the contents of the files of an aircraft and its model, by their paths under a new name.
+    """Return the contents of the files of an aircraft and its model, by their paths in a folder with a new name.
 
-    model: files of the flight model by path; empty if the new aircraft keeps using the shipped model.
+    model: contents of the flight model's files by path; empty if the new aircraft refers to a model that JSBSim ships.
     """
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]

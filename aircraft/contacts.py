@@ -1,4 +1,4 @@
-"""Ground contacts of an aircraft: belly skids or wheels, and points of the structure.
+"""Define ground contacts of an aircraft: belly skids or wheels, and points of the structure.
 
 Most models have no contacts, because a flight in the air requires none. Contacts are added to the model only for a
 flight with take-off or landing, so that a flight in the air loads the unchanged file. A model with contacts keeps them.
@@ -19,7 +19,7 @@ from aircraft.catalog import Aircraft
 from aircraft.envelope import GRAVITY
 from world.arrays import Floats
 
-# Landing gear of an aircraft whose model has no contacts.
+# Landing gear that is added to an aircraft whose model has no contacts.
 Gear = Literal["belly", "wheels"]
 # Metres in each unit of length of a model.
 _METRES_PER_UNIT = {"M": 1.0, "FT": 0.3048, "IN": 0.0254}
@@ -28,12 +28,12 @@ _KILOGRAMS_PER_UNIT = {"KG": 1.0, "LBS": 0.45359237}
 # Minimum depth of the points on which a model without wheels stands, as a ratio to the deepest point.
 _MIN_SKID_DEPTH_RATIO = 0.75
 
-# Positions relative to the centre of gravity, forward, right and down, in spans. Points to the right have a twin to the
-# left, so that belly and wheels have three points each.
+# Positions of belly skids relative to the centre of gravity, forward, right and down, in spans. A point to the right
+# has a twin to the left, so belly and wheels have three points each.
 _BELLY_POINTS = {"belly front": (0.12, 0.025, 0.069), "belly rear": (-0.12, 0.0, 0.069)}
-# Positions of wheels.
+# Positions of wheels, as for belly skids.
 _WHEEL_POINTS = {"nose wheel": (0.20, 0.0, 0.085), "main wheel": (-0.04, 0.10, 0.085)}
-# Positions of other points of the structure.
+# Positions of other points of the structure, as for belly skids.
 _STRUCTURE_POINTS = {"nose": (0.25, 0.0, 0.02), "tail": (-0.35, 0.0, 0.0), "wing tip": (0.0, 0.5, -0.02)}
 # Static compression of skids or wheels under the aircraft's weight, in spans.
 _SAG_SPANS = 0.0062
@@ -47,7 +47,7 @@ _WHEEL_FRICTION = (0.8, 0.5, 0.05)
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """A point that may touch the ground.
+    """Point of an aircraft that may touch the ground.
 
     name: name in the model.
     forward, right, down: position relative to the centre of gravity, m.
@@ -98,7 +98,7 @@ def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """Return a model's XML with default contacts; a model with contacts is unchanged."""
+    """Return a model's XML with default contacts added; return a model that has contacts unchanged."""
     if _model_contacts(model):
         return model
     contacts = default_contacts(aircraft, gear)
@@ -111,7 +111,11 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
 
 
 def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
-    """Return the XML of one contact, in metres aft, right and up from the model's reference point."""
+    """Return the XML of one contact, with its position in meters aft, right and up from the model's reference point.
+
+    contacts: all contacts; those on which the aircraft stands share its weight.
+    centre: centre of gravity in the same coordinates, m, (3,).
+    """
     standing_count = sum(other.is_support for other in contacts)
     stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
     damping = 2.0 * _DAMPING_RATIO * math.sqrt(stiffness * aircraft.mass / standing_count)
@@ -132,7 +136,7 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
 
 
 def _model_contacts(model: bytes) -> tuple[Contact, ...]:
-    """Return the contacts in a model's XML.
+    """Return the contacts in a model's XML, with contacts on which the aircraft stands first.
 
     The aircraft stands on its wheels, or without wheels on its lowest points.
     """
@@ -160,9 +164,9 @@ def _read_contacts(model: bytes) -> list[Contact]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the centre of gravity of the loaded aircraft, (3,) m aft, right, up of the reference point.
+    """Return the centre of gravity of the loaded aircraft: m aft, right and up of the reference point, (3,).
 
-    It includes the empty aircraft, its point masses and the initial contents of its tanks, as JSBSim does.
+    As in JSBSim, the load consists of the empty aircraft, its point masses and the initial contents of its tanks.
     """
     root = ElementTree.fromstring(model)
     cg_elements = [element for element in root.findall("mass_balance/location") if element.get("name") == "CG"]
@@ -183,14 +187,14 @@ def _center_of_gravity(model: bytes) -> Floats:
 
 
 def _read_mass(weight: ElementTree.Element | None) -> float:
-    """Return the mass in a weight element of a model, kg; 0 without one."""
+    """Return the mass in a weight element of a model, kg; 0 if the element is missing."""
     if weight is None:
         return 0.0
     return _KILOGRAMS_PER_UNIT.get(weight.get("unit", "LBS"), 1.0) * float(weight.text or "0")
 
 
 def _read_location(location: ElementTree.Element | None) -> Floats | None:
-    """Return the position in a location element of a model, m, (3,), or None without one."""
+    """Return the position in a location element of a model, m, (3,), or None if the element is missing."""
     if location is None:
         return None
     unit = _METRES_PER_UNIT.get(location.get("unit", "IN"), 1.0)

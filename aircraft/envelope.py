@@ -1,4 +1,4 @@
-"""Performance envelope of an aircraft: steady climb, descent, speed and power by airspeed and altitude."""
+"""Define the performance envelope of an aircraft: steady climb, descent, speed and power by airspeed and altitude."""
 
 import math
 from dataclasses import dataclass, field, replace
@@ -14,7 +14,7 @@ GRAVITY = 9.80665
 UNDECIDED_SIGMAS = 1.645
 # Names of the tables of an `Envelope`.
 TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
-# Names of its power tables.
+# Names of the power tables of an `Envelope`.
 POWERS = ("power_idle", "power_level", "power_full")
 
 
@@ -22,16 +22,16 @@ POWERS = ("power_idle", "power_level", "power_full")
 class Envelope:
     """Limits of steady flight from trims, relative to the air mass.
 
-    aircraft, model_hash: identification of the model.
-    motor_braking: True if a descent may drive the motor.
-    airspeed: (v,) m/s, increasing.
-    amsl: (h,) m, increasing.
-    climb, descent: (v, h) flight-path angles, rad, positive in the direction of their name (a negative climb means that
-        the aircraft cannot hold altitude there); NaN where there is no trim.
-    level_speed_min, level_speed_max: (h,) m/s.
-    max_bank: the aircraft's own limit, rad.
-    power_idle, power_level, power_full: (v, h) electric power, or heat of the fuel per second, at the steepest descent,
-        in level flight and at the steepest climb, W; (0, 0) if unknown.
+    aircraft, model_hash: name and hash of the aircraft's model.
+    motor_braking: True if the propeller may drive the motor in a descent.
+    airspeed: increasing airspeeds of the tables, m/s, (v,).
+    amsl: increasing altitudes of the tables, m AMSL, (h,).
+    climb, descent: steepest flight-path angles, rad, (v, h), positive in the direction of their name (a negative climb
+        means that the aircraft cannot hold its altitude); NaN if there is no trim.
+    level_speed_min, level_speed_max: minimum and maximum airspeed of level flight, m/s, (h,).
+    max_bank: the aircraft's own bank limit, rad.
+    power_idle, power_level, power_full: electric power, or heat of the fuel per second, at the steepest descent, in
+        level flight and at the steepest climb, W, (v, h); shape (0, 0) if unknown.
     volts: battery voltage, V; 0 without a battery.
     source: source of a model with uncertain slopes: "a data sheet"; "" if the slopes are certain.
     climb_sd, descent_sd: standard deviations of the steepest climb and descent, rad.
@@ -72,9 +72,9 @@ class Envelope:
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
         """Return the steepest climb and descent relative to the air, rad, by bilinear interpolation.
 
-        Both are positive. They are NaN at an airspeed outside the table or below the slowest level flight; between that
-        speed and the slowest trim of the table, the values of that trim apply. Altitudes outside the table use its
-        nearest edge.
+        Both are positive. They are NaN at an airspeed outside the table or below the minimum level-flight airspeed;
+        between this airspeed and the slowest trim of the table, the values of the slowest trim apply. For altitudes
+        outside the table, the nearest altitude of the table is used.
         """
         if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
             return math.nan, math.nan
@@ -98,7 +98,7 @@ class Envelope:
         if not (self.climb_sd or self.descent_sd or self.fastest_sd):
             return self
         margins = {name: UNDECIDED_SIGMAS * getattr(self, f"{name}_sd") for name in ("climb", "descent")}
-        # A loss of altitude is unchanged.
+        # A negative climb, which is a loss of altitude, remains unchanged.
         climb, descent = (
             np.where(table > 0.0, np.maximum(0.0, table - margins[name]), table)
             for name, table in (("climb", self.climb), ("descent", self.descent))
@@ -117,7 +117,7 @@ class Envelope:
     def slope_limits(
         self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0
     ) -> tuple[float, float]:
-        """Return the steepest climb and dive over the ground on a leg in this steady wind, rad.
+        """Return the steepest climb and dive over the ground on a leg in a steady wind, rad.
 
         tailwind, crosswind: m/s along and across the leg's course.
 
@@ -155,7 +155,7 @@ class Envelope:
         )
 
     def level_speeds(self, amsl: float) -> tuple[float, float]:
-        """Return the minimum and maximum level-flight speed at an altitude (m), m/s."""
+        """Return the minimum and the maximum airspeed of level flight at an altitude (m AMSL), m/s."""
         return (
             float(np.interp(amsl, self.amsl, self.level_speed_min)),
             float(np.interp(amsl, self.amsl, self.level_speed_max)),
@@ -187,7 +187,7 @@ def turn_radius(speed: float, bank: float) -> float:
 
 
 def _interpolate_bilinearly(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
-    """Return a table (xs, ys) at x and y, with y clipped to its range; NaN for x outside its range.
+    """Interpolate a table over `xs` (rows) and `ys` (columns) at x and y; clip y, and return NaN for x outside `xs`.
 
     Rows before the first row with a value take the values of that row.
     """
@@ -198,7 +198,7 @@ def _interpolate_bilinearly(xs: Floats, ys: Floats, table: Floats, x: float, y: 
 
 
 def _interpolate_rows(ys: Floats, table: Floats, y: float) -> Floats:
-    """Return ``np.interp`` of every row of a table at one point, to the last bit but ten times faster."""
+    """Return ``np.interp`` of every row of a table at one point: the same bits, but ten times faster."""
     k = min(max(0, int(np.searchsorted(ys, y, side="right")) - 1), ys.size - 1)
     if y <= ys[k] or k == ys.size - 1:
         return np.array(table[:, k])

@@ -1,4 +1,4 @@
-"""Read the JSBSim properties of a model's four commands and of its readings."""
+"""Read from a metadata file the JSBSim properties of a model's commands and readings."""
 
 import math
 import re
@@ -12,15 +12,15 @@ from world.files import did_you_mean
 _COMMANDS = ("elevator", "aileron", "rudder", "throttle")
 # Valid name of one of JSBSim's models.
 _MODEL_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-# Readings of a model.
+# Readings of a model: values that planfly reads in each step.
 _READINGS = (*_COMMANDS, "current", "power")
 
 
 @dataclass(frozen=True, slots=True)
 class CommandProperty:
-    """Property of a command, and its change per radian (or full throttle) above and below zero.
+    """Property of a command, and its change per radian (or per full throttle).
 
-    There are two factors because the normalized travel is often unequal.
+    above, below: change for positive and for negative commands; they differ if the travel is unequal.
     """
 
     name: str
@@ -30,9 +30,9 @@ class CommandProperty:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """Property of a reading, and the factor from its unit to SI.
+    """Property of a reading, and the factor from the property's unit to SI.
 
-    An empty name means that the model lacks the quantity, which then reads as zero.
+    An empty name means that the model lacks the quantity; its value is then 0.
     """
 
     name: str
@@ -73,11 +73,11 @@ DEFAULT_MODEL = Model(
 
 
 def read_model(table: object, aircraft: str) -> Model:
-    """Return the model described by a metadata file's ``[model]`` table.
+    """Return the model that a metadata file's ``[model]`` table describes.
 
-    aircraft: name of the aircraft, which is also the name of JSBSim's model unless the table states another.
+    aircraft: name of the aircraft, which is also the name of JSBSim's model unless the table states another name.
 
-    Raises FlightError with one line, which begins with the key, for an unknown, missing or invalid entry.
+    Raises FlightError, whose message begins with the key, for an unknown, missing or invalid entry.
     """
     table = _checked_table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
     commands = _checked_table(table.get("command", {}), "model.command", _COMMANDS)
@@ -107,6 +107,7 @@ def read_model(table: object, aircraft: str) -> Model:
 
 
 def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return a value that must be a table.  Raises FlightError if it is not a table or has an unknown key."""
     if not isinstance(value, dict):
         raise FlightError(f"{key} = {value!r} is not a table", field=key, value=value)
     if unknown := sorted(value.keys() - set(known_keys)):
@@ -116,9 +117,10 @@ def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict
 
 
 def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
-    """Return the name of a model that JSBSim ships, "" for none.
+    """Return the name of the model if JSBSim ships it, otherwise "".
 
-    The name is also a folder's name and must not lead outside JSBSim's folder.
+    The name is also the name of a folder, and must not lead outside JSBSim's folder. Raises FlightError for an invalid
+    name.
     """
     value = table.get("shipped_by_jsbsim", False)
     if isinstance(value, bool):
@@ -130,6 +132,7 @@ def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
 
 
 def _read_flag(table: dict[str, Any], name: str) -> bool:
+    """Return a bool of the ``[model]`` table, by default False.  Raises FlightError for another value."""
     value = table.get(name, False)
     if not isinstance(value, bool):
         raise FlightError(f"model.{name} = {value!r} is not true or false", field=f"model.{name}", value=value)
@@ -137,7 +140,7 @@ def _read_flag(table: dict[str, Any], name: str) -> bool:
 
 
 def _read_entry(value: object, key: str, factor_count: int) -> tuple[Any, ...]:
-    """Return a property and its factors; no factor is zero."""
+    """Return a property and its factors. Raises FlightError for an invalid name, or for a factor of 0."""
     is_valid = isinstance(value, list) and len(value) == 1 + factor_count and isinstance(value[0], str)
     # JSBSim aborts the process on a name with a space in it.
     if is_valid and isinstance(value, list):

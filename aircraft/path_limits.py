@@ -1,4 +1,4 @@
-"""Limits of a path: the tighter of the scenario's limits and the aircraft's envelope.
+"""Compute the limits of a path: the tighter of the scenario's limits and the aircraft's envelope.
 
 These are turn radii, turn lengths and slopes over the ground in wind. The compiled functions are their only definition,
 for the planner's candidates, for certificates and for missions.
@@ -32,12 +32,12 @@ class PerformanceTable(NamedTuple):
 
     airspeed: m/s.
     tan_max_bank: tangent of the bank limit.
-    wind_speed: mean wind (m/s) at `wind_reference_amsl` (m).
+    wind_speed: mean wind speed (m/s) at the altitude `wind_reference_amsl` (m).
     wind_to: direction towards which the wind blows, rad clockwise from north.
-    wind_gradient: increase per metre of altitude, 1/s.
+    wind_gradient: increase of the mean wind speed per meter of altitude, 1/s.
     gust_sigma: standard deviation of the gusts, m/s.
-    amsl: (h,) m, increasing; altitudes of the two tables.
-    climb, descent: (h,) rad, steepest angles relative to the air, positive in the direction of their name.
+    amsl: increasing altitudes of the two tables, m, (h,).
+    climb, descent: steepest angles relative to the air, rad, (h,), positive in the direction of their name.
     equivalent: 1 if `airspeed` is an equivalent airspeed, so that slopes apply to the true airspeed at each altitude; 0
         if it is a true airspeed.
     """
@@ -60,10 +60,10 @@ class Limits:
     """Limits on turns, slopes and clearance.
 
     max_turn, max_climb, max_dive: limits of the scenario, rad; None if only the aircraft's limits apply.
-    min_clearance: m above ground.
+    min_clearance: required height above ground, m.
     envelope: performance of the aircraft in still air.
-    airspeed: m/s.
-    max_bank: rad, the smaller limit of scenario and aircraft.
+    airspeed: cruise airspeed, m/s.
+    max_bank: bank limit, rad: the smaller of the scenario's and the aircraft's limit.
     wind: wind over the whole area.
     tracking: tracking error of the autopilot; None if it follows its path exactly.
     reserve_height: height above ground reserved for downdrafts in addition to the clearance, m.
@@ -91,7 +91,7 @@ class Limits:
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
-        """Return the steepest climb and dive over the ground on a course (rad) at an altitude (m), rad.
+        """Return the steepest climb and dive over the ground on a course (rad) at an altitude (m AMSL), rad.
 
         airspeed: m/s; None for the airspeed of the limits.
 
@@ -109,16 +109,18 @@ class Limits:
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
     def rates(self, amsl: float) -> tuple[float, float]:
-        """Return the maximum climb and sink rates in still air at an altitude, m, and the limits' airspeed, m/s."""
+        """Return the maximum climb and sink rates in still air at an altitude (m AMSL) and at `airspeed`, m/s."""
         table = self.performance()
         speed = float(true_airspeed(table, amsl))
         climb, sink = (speed * math.sin(np.interp(amsl, table.amsl, angles)) for angles in (table.climb, table.descent))
         return climb, sink
 
     def climb_rates(self, waypoints: Floats) -> Floats:
-        """Return the climb rate of each leg of a path (w, 3) at its start and at its end, (legs, 2) m/s.
+        """Return the climb rate of each leg at its start and at its end, m/s, (legs, 2).
 
         The rate is negative in a descent, and NaN if the aircraft cannot hold the leg in the wind.
+
+        waypoints: m, (w, 3).
         """
         legs, table = zip(leg_courses(waypoints), leg_slopes(waypoints), strict=True), self.performance()
         return np.array(
@@ -144,6 +146,7 @@ class Limits:
         return self._tables[airspeed]
 
     def _make_table(self, airspeed: float | None) -> PerformanceTable:
+        """Make the table of `performance`."""
         cruise_airspeed, altitudes, wind = (
             self.airspeed if airspeed is None else airspeed,
             self.envelope.amsl,
@@ -180,10 +183,10 @@ def derate(
     unused_climb: float = 0.0,
     unused_sink: float = 0.0,
 ) -> PerformanceTable:
-    """Return the performance reduced to fractions (0..1) of climb and descent, and by unused rates, m/s.
+    """Return the performance with climb and descent reduced to fractions (0..1), and by rates (m/s) to be left unused.
 
-    A negative angle, a loss of altitude, is unchanged. An angle is at least 0 if the unused rate exceeds the aircraft's
-    rate.
+    The smaller result applies. A negative climb, which is a loss of altitude, is unchanged. An angle does not become
+    negative if the unused rate exceeds the aircraft's rate.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
@@ -193,6 +196,7 @@ def derate(
     airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
 
     def reduce_angles(angles: Floats, fraction: float, unused_rate: float) -> Floats:
+        """Return the reduced angles of one table."""
         reduced = np.where(angles > 0.0, fraction * angles, angles)
         if unused_rate <= 0.0:
             return _read_only(reduced)
@@ -224,10 +228,10 @@ def limit_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) ->
 
 
 def _read_only(values: Floats) -> Floats:
-    # Contiguous and read-only like every table, because another layout would compile the kernels again.
-    out = np.array(values, dtype=np.float64)
-    out.setflags(write=False)
-    return out
+    """Return a contiguous read-only copy: with another layout, numba would compile the kernels again."""
+    copy = np.array(values, dtype=np.float64)
+    copy.setflags(write=False)
+    return copy
 
 
 @inlined
@@ -260,16 +264,16 @@ def downwind_vector(table: PerformanceTable) -> tuple[float, float]:
 def slopes_along(
     table: PerformanceTable, tail_fraction: float, cross_fraction: float, amsl: float
 ) -> tuple[float, float]:
-    """Return the steepest climb and dive over the ground, rad.
+    """Return the steepest climb and dive over the ground on a course, rad; (0, 0) if the course cannot be held.
 
-    tail_fraction, cross_fraction: fractions of the wind along and across the course.
+    tail_fraction, cross_fraction: components of the wind's direction along and across the course (cosine and sine).
     """
     count = table.amsl.size
     wind = wind_speed_at(table, amsl)
     k = 0
     while k + 2 < count and table.amsl[k + 1] <= amsl:
         k += 1
-    # Written out: numba's np.interp of one number costs a microsecond.
+    # Interpolate without np.interp, which takes a microsecond for one number in numba.
     fraction = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
     climb = table.climb[k] + fraction * (table.climb[k + 1] - table.climb[k])
     dive = table.descent[k] + fraction * (table.descent[k + 1] - table.descent[k])
@@ -278,7 +282,7 @@ def slopes_along(
     dive_slope = ground_slope(dive, airspeed, wind * tail_fraction, wind * cross_fraction)
     if math.isnan(climb_slope) or math.isnan(dive_slope):
         return 0.0, 0.0
-    # No leg may descend from an altitude at which the true airspeed exceeds the speed of the fastest level flight.
+    # No leg may descend from an altitude at which the true airspeed exceeds the maximum airspeed of level flight.
     if table.equivalent > 0.0 and climb < 0.0:
         dive_slope = 0.0
     return climb_slope, dive_slope
@@ -303,10 +307,11 @@ def _turn_radius(
     wx: float,
     wy: float,
 ) -> float:
-    """Return the radius of the arc between the unit courses u and v, m.
+    """Return the radius of the arc at the bank limit between the unit courses u and v, m; inf if one cannot be held.
 
-    w: unit vector of `downwind_vector`.
+    ux, uy, vx, vy: east and north components of u and v.
     turn_sign: sign of the turn, 0 for either direction.
+    wx, wy: components of `downwind_vector`.
     """
     wind, airspeed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
@@ -347,7 +352,8 @@ def corner_tangent(
     """Return the tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
 
     The tangent length R tan(theta/2) = R |sin theta| / (1 + cos theta) is 0 without a turn and inf for a U-turn.
-    w: `downwind_vector`.
+
+    wx, wy: components of `downwind_vector`.
     """
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
     if abs(cross) < 1e-9 and dot > 0.0:
@@ -375,12 +381,12 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
 
 @compiled_inline
 def fly_over_run(turn: float) -> float:
-    """Return the distance along the leg after a fly-over turn until the track is back on it, in radii.
+    """Return the distance along the leg after a fly-over turn at which the track is back on this leg, in turn radii.
 
     turn: rad.
 
     The distance is sin turn + 2 sin phi, with the overshoot angle phi given by cos phi = (1 + cos turn)/2. For turns
-    beyond its maximum the maximum is returned, so that the result never decreases with the turn.
+    beyond the turn with the largest distance, the largest distance is returned, so the result never decreases.
     """
     # The maximum of sin turn + 2 sin phi is 2 sqrt 2, at this angle.
     angle = min(turn, math.acos(-1.0 / 3.0))
@@ -390,9 +396,9 @@ def fly_over_run(turn: float) -> float:
 
 @compiled
 def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:
-    """Return the tangent length of the fly-by arc at each waypoint, (w,) m; 0 at the ends.
+    """Return the tangent length of the fly-by arc at each waypoint, m, (w,); 0 at the ends of the path.
 
-    waypoints: (w, 3).
+    waypoints: m, (w, 3).
 
     The length is R tan(theta/2), and inf for a U-turn, which has no tangent point.
     """
@@ -421,13 +427,13 @@ def roll_reversal_length(
     wx: float,
     wy: float,
 ) -> float:
-    """Return the leg length (m) for rolling from a turn into an opposite turn.
-
-    radius_in, radius_out: radii of the two arcs, m.
-
-    u: the leg's unit course. w: `downwind_vector`.
+    """Return the length of leg in which the aircraft rolls from a turn into an opposite turn, m.
 
     The length is 0 if the aircraft cannot make progress along the leg.
+
+    ux, uy: unit vector of the leg's course.
+    radius_in, radius_out: radii of the two arcs, m.
+    wx, wy: components of `downwind_vector`.
     """
     wind = wind_speed_at(table, amsl)
     airspeed = true_airspeed(table, amsl)

@@ -1,6 +1,6 @@
-"""Tracking error of an autopilot: its deviation from its legs, for which plans reserve margins.
+"""Define the tracking error of an autopilot: its deviation from the legs, for which plans reserve margins.
 
-The turn of an autopilot at a corner, and the lag with which its altitude follows a slope, depend on its controllers and
+The path of an autopilot at a corner, and the lag with which its altitude follows a slope, depend on its controllers and
 parameters; the module of each autopilot fills these tables. Compiled functions take the tables as one record.
 """
 
@@ -14,7 +14,7 @@ from world.kernels import Record, compiled, inlined, record_dtype
 
 # Turn angles of the tables, from 0 in equal steps, rad.
 TURNS = np.radians(np.linspace(0.0, 150.0, 11))
-# Ground speeds of the tables, as ratios to the airspeed: from a headwind of 40 % to a tailwind of 80 % of it.
+# Ground speeds of the tables as ratios to the airspeed: from a headwind of 40 % to a tailwind of 80 % of the airspeed.
 SPEED_RATIOS = np.linspace(0.6, 1.8, 4)
 # Shape of the tables.
 _TABLE_SHAPE = (TURNS.size, SPEED_RATIOS.size)
@@ -36,18 +36,19 @@ TRACKING = record_dtype(
 class TrackingError:
     """Deviation of an autopilot from its legs.
 
+    All tables have the shape (t, s), for the turns `TURNS` and the ground speeds `SPEED_RATIOS` x airspeed.
+
     airspeed: equivalent airspeed command, m/s; the true airspeed increases with altitude.
-    acceptance: acceptance radius with the minimum deviation, (t, s) m, at turns `TURNS` and ground speeds
-        `SPEED_RATIOS` x airspeed.
-    excursion: maximum distance from the legs near the corner with that radius, (t, s) m.
+    acceptance: acceptance radius with the smallest deviation, m.
+    excursion: maximum distance from the legs near the corner with that acceptance radius, m.
     before, after: lengths of the legs before and after the corner on which the deviation exceeds the deviation on a
-        straight leg, (t, s) m.
+        straight leg, m.
     across, up: lateral and vertical deviation from a straight leg, m, including navigation error.
     lag: time by which the altitude lags behind a slope, s.
     step: minimum altitude change of a leg that is flown as a slope, m; a smaller change is flown as a step.
     climb_rate, sink_rate: maximum rates of the altitude demand, m/s; inf for no limit.
-    own_climb_share, own_sink_share: fractions (0..1) of the aircraft's steepest climb and descent at which it stays
-        near its altitude in gusts.
+    own_climb_share, own_sink_share: fractions (0..1) of the aircraft's steepest climb and descent up to which the
+        aircraft stays near its demanded altitude in gusts.
     """
 
     airspeed: float
@@ -115,7 +116,11 @@ def density_factor(amsl: float) -> float:
 
 @compiled
 def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: float) -> float:
-    """Interpolate bilinearly in a table (turns, speeds); outside the table use its nearest edge."""
+    """Interpolate a table of shape (turns, speeds) bilinearly; outside the table use the nearest edge.
+
+    turn: rad.
+    ground_speed: m/s, of which the ratio to `airspeed` is looked up.
+    """
     turns, speeds = table.shape
     turn_position = min(max(turn / _TURN_STEP_RAD, 0.0), turns - 1.0)
     speed_position = min(max((ground_speed / airspeed - _FIRST_SPEED_RATIO) / _SPEED_RATIO_STEP, 0.0), speeds - 1.0)
@@ -132,7 +137,7 @@ def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: floa
 
 @inlined
 def corner_deviation(tracking: Record, turn: float, ground_speed: float) -> tuple[float, float, float]:
-    """Return the maximum distance from the legs at a corner, and the affected lengths before and after it, m.
+    """Return the maximum distance from the legs at a corner, and the affected lengths before and after the corner, m.
 
     turn: rad, positive.
     ground_speed: m/s.
@@ -154,8 +159,8 @@ _SPEED_RATIO_STEP = float(SPEED_RATIOS[1] - SPEED_RATIOS[0])
 
 # --- Corridor ---
 
-# Default half-width, m: three times the overshoot of an autopilot at ordinary corners. ArduPlane in
-# SITL overshot corners of up to 25 degrees in 5 m/s of wind by at most 10 m.
+# Default half-width, m: three times the overshoot of an autopilot at ordinary corners. ArduPlane in SITL overshot
+# corners of up to 25 degrees in 5 m/s of wind by at most 10 m.
 MIN_CORRIDOR = 30.0
 # Minimum half-width in acceptance radii. An autopilot that turns one radius before its waypoint cuts a right-angled
 # corner by up to 0.7 radii, and overshoots the next leg by the same distance if it turns late; the rest is for wind.

@@ -1,7 +1,8 @@
-"""Uncertainty of an aircraft: factors of its model with standard deviations, and draws of all of them.
+"""Read and write the uncertainty of an aircraft: factors of its model with standard deviations, and random draws.
 
 Next to the model there is ``uncertainty.toml`` (from a data sheet) or ``posterior.toml`` (from flight logs), and
-``draws.csv`` with one draw per row: the columns are the model's properties, such as ``ident/thrust``.
+``draws.csv``. A draw is a random sample of all uncertain properties, and one row of ``draws.csv``; the columns are the
+model's properties, such as ``ident/thrust``.
 """
 
 import csv
@@ -17,11 +18,11 @@ from world.arrays import Floats
 from world.errors import FlightError, PlanflyError
 from world.files import did_you_mean, read_small_file, read_toml, utf8_text
 
-# Files with uncertainties; the first that exists applies.
+# Files with uncertainties; the first of them that exists is read.
 UNCERTAINTY_FILES = ("posterior.toml", "uncertainty.toml")
 # File of draws.
 DRAWS_FILE = "draws.csv"
-# Number of draws.
+# Number of draws in a file.
 DRAW_COUNT = 512
 # Standard deviation of the logarithm of the power of an aircraft from a data sheet whose file states none: the root
 # mean square error of `benchmarks/real_power.py`.
@@ -92,9 +93,9 @@ class Uncertainty:
 
 
 def read_uncertainty(folder: Path) -> Uncertainty | None:
-    """Read the uncertainty next to the model in an aircraft's folder; return None if there is no file.
+    """Read the uncertainty in an aircraft's folder; return None if the folder has no such file.
 
-    Raises FlightError, with a message of one line, if the file cannot be read or used.
+    Raises FlightError if the file cannot be read or used.
 
     >>> from aircraft.catalog import load_aircraft
     >>> read_uncertainty(load_aircraft("aerosonde").folder) is None
@@ -133,11 +134,11 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
-    """Raise FlightError if a required deviation is missing, which would mean certainty, or a key is unknown."""
+    """Raise FlightError if a required key is missing (the model would then seem certain) or a key is unknown."""
     known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == UNCERTAINTY_FILES[0] else frozenset())
     missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
     suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
-    # A misspelled key is missing as well; the spelling is the better message.
+    # A misspelled key is missing, too: in this case report the spelling.
     if missing and not suggestion:
         raise FlightError(f"{file}: missing {', '.join(missing)}", file=file, field=missing[0])
     if unknown:
@@ -156,6 +157,7 @@ def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, 
 
 
 def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
+    """Read one [[quantity]] table."""
     name = entry.get("property")
     _check_name(name, str(file), "property")
     estimate, sd = (
@@ -165,6 +167,7 @@ def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
 
 
 def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:
+    """Raise `error` for a name that is not a property ``ident/NAME``."""
     # JSBSim aborts the process on a name with a space in it.
     if not isinstance(name, str) or not name.startswith(_PREFIX) or not name.isascii() or len(name.split()) != 1:
         raise error.at(file, key, name, f"expected a property {_PREFIX}NAME", shown=repr(name))
@@ -206,11 +209,11 @@ def uncertainty_text(uncertainty: Uncertainty) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Draws:
-    """Draws of an aircraft's properties.
+    """Draws (random samples) of an aircraft's properties.
 
-    names: (p,) names of the properties.
-    values: (n, p).
-    source: the file.
+    names: names of the p properties.
+    values: one draw per row, (n, p).
+    source: path of the file.
     """
 
     names: tuple[str, ...]
@@ -218,16 +221,16 @@ class Draws:
     source: str = ""
 
     def row(self, seed: int) -> int:
-        """Return the row that a flight with this seed uses."""
+        """Return the number of the draw that a flight with this seed uses."""
         return seed % len(self.values)
 
     def properties(self, seed: int) -> tuple[tuple[str, float], ...]:
-        """Return the properties of a flight with this seed, by name."""
+        """Return the names and values of the properties in the draw that a flight with this seed uses."""
         return tuple(zip(self.names, self.values[self.row(seed)].tolist(), strict=True))
 
 
 def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW_COUNT, seed: int = 1) -> Draws:
-    """Draw each quantity independently: a factor log-normally with the estimate as median, others normally.
+    """Draw each quantity independently: a factor log-normally with its estimate as the median, other values normally.
 
     >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)
     >>> drawn = draw_quantities((one,)).values

@@ -1,9 +1,9 @@
-"""Messages of an ArduPilot dataflash log: the start of each, and its fields as columns.
+"""Find the messages of an ArduPilot dataflash log, and read their fields as columns.
 
-A message is 0xA3, 0x95, its type, and a body whose length and fields the log itself states in messages named FMT_TYPE
-(ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message is valid if the next one, or the
-end of the file, follows immediately.  pymavlink's `DFReader` reports no damage, stopped at message 471 of 4,737 in a
-log with 400 wrong bytes, and takes 6 to 14 times as long.
+A message consists of the bytes 0xA3 and 0x95, the message type, and a body, whose length and fields the log itself
+states in FMT messages (ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message is valid if
+the next message, or the end of the file, follows immediately.  pymavlink's `DFReader` reports no damage, stopped at
+message 471 of 4,737 in a log with 400 wrong bytes, and takes 6 to 14 times as long.
 """
 
 import mmap
@@ -21,16 +21,16 @@ from world.arrays import Bytes, Floats, Ints
 from world.kernels import compiled, copy_into, read_only
 
 # ----------------------------------------------------------------------
-# Bytes of a log without its size in memory: mapped, and released piece by piece.
+# Bytes of a log that is mapped into memory and released piece by piece.
 
-# Bytes that are read before they are released.
+# Size of a piece, bytes.
 PIECE_BYTES = 16 * 2**20
 
 
 class MappedFile:
     """Bytes of a file as a memory-mapped array.
 
-    data: (n,) its bytes.
+    data: bytes of the file, (n,).
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -47,13 +47,13 @@ class MappedFile:
 
     def release_memory(self) -> None:
         """Release the memory of the mapped file; it is read again when needed."""
-        # Windows has no such call, and accounts for mapped pages differently.
+        # Windows does not have this call, and accounts for mapped pages differently.
         if hasattr(self._map, "madvise"):
             self._map.madvise(mmap.MADV_DONTNEED)
 
 
 def piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
-    """Yield the end of each piece of a file of ``size`` bytes, and release the memory after each piece.
+    """Yield the end of each piece of a file of ``size`` bytes, and call `release_memory` after each piece.
 
     >>> list(piece_ends(3, lambda: None))
     [3]
@@ -73,9 +73,9 @@ def piece_ends(size: int, release_memory: Callable[[], None]) -> Iterator[int]:
 HEADER_BYTES = 3
 FMT_TYPE = 128
 _FMT_BYTES = 89
-# Largest number of bytes at the end of a log that are not damage: block-wise storage leaves old bytes in its last page.
+# Largest number of bytes at the end of a log that are not damage: block storage leaves old bytes in its last page.
 MAX_TRAILING_BYTES = 528
-# Format letters: numpy type, and the factor that stored numbers are multiplied by (ArduPilot,
+# Format letters: numpy type, and the factor by which stored numbers are multiplied (ArduPilot,
 # libraries/AP_Logger/LogStructure.h, "Format characters in the format string").
 FIELDS: dict[str, tuple[str, int]] = {
     "a": ("S64", 1),
@@ -103,10 +103,13 @@ FIELDS: dict[str, tuple[str, int]] = {
 
 
 class MessageFormat(NamedTuple):
-    """Content of a FMT_TYPE message, the format of other messages.
+    """Format of the messages of one type, as stated by an FMT message.
 
-    number: number of the message type.  length: length of a message, bytes.  columns: names of the fields.
-    letters: format letters of the fields, keys of `FIELDS`.
+    number: number of the message type.
+    name: name of the messages.
+    length: length of a message, bytes.
+    columns: names of the fields.
+    letters: format letters of the fields, which are keys of `FIELDS`.
     """
 
     number: int
@@ -122,13 +125,13 @@ class MessageFormat(NamedTuple):
 
     @property
     def scales(self) -> dict[str, int]:
-        """Factors of the scaled fields, by name."""
+        """Factors of the scaled fields by name."""
         letters_by_name = zip(self.columns, self.letters, strict=True)
         return {name: FIELDS[letter][1] for name, letter in letters_by_name if FIELDS[letter][1] != 1}
 
 
 def _decode_text(value: bytes) -> str:
-    """Decode text up to its first zero; bytes that are not UTF-8 become escapes."""
+    """Decode a text up to its first zero byte; bytes that are not UTF-8 become escapes."""
     return value.partition(b"\0")[0].decode(errors="backslashreplace")
 
 
@@ -136,9 +139,9 @@ def _decode_text(value: bytes) -> str:
 class Messages:
     """All messages of one name, in the order of the file.
 
-    starts: (n,) byte at which each begins.
-    rows: (n,) of the format's fields, as stored.
-    scales: factors of the scaled fields.
+    starts: byte at which each message begins, (n,).
+    rows: fields of each message as stored, (n,).
+    scales: factors of the scaled fields by name.
     """
 
     starts: Ints
@@ -154,26 +157,26 @@ class Messages:
         return len(self.starts) > 0 and set(names) <= set(self.rows.dtype.names or ())
 
     def column(self, name: str) -> Floats:
-        """Return a field of numbers, in the unit of the format."""
+        """Return the numbers of a field in the format's unit, (n,)."""
         values = self.rows[name].astype(np.float64)
-        # Division gives the number nearest to its decimal digits.
+        # Division, unlike multiplication by 0.01, gives the float nearest to the decimal number.
         return np.asarray(values / self.scales.get(name, 1))
 
     def texts(self, name: str) -> list[str]:
-        """Return a field of text."""
+        """Return the texts of a field."""
         return [_decode_text(value) for value in self.rows[name].tolist()]
 
     def select(self, is_selected: NDArray[np.bool_]) -> "Messages":
-        """Return the selected messages."""
+        """Return the messages that a mask selects."""
         return Messages(self.starts[is_selected], self.rows[is_selected], self.scales)
 
 
 @dataclass(frozen=True, slots=True)
 class Dataflash:
-    """Indexed log.
+    """Index of a dataflash log.
 
     data: bytes of the log.
-    starts: start of each message, by number of the message type.
+    starts: starts of the indexed messages, by number of the message type.
     formats: formats by number of the message type.
     names: names of the messages that the log contains.
     release_memory: called regularly, to release the memory of the mapped log.
@@ -188,7 +191,7 @@ class Dataflash:
     release_memory: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
-        """Return all messages of a name; an empty object if there are none."""
+        """Return all messages of a name; without any, a `Messages` of length 0."""
         for number, message_format in self.formats.items():
             if message_format.name == name and number in self.starts:
                 return _read_messages(self.data, self.starts[number], message_format, self.release_memory)
@@ -198,19 +201,20 @@ class Dataflash:
 def index_dataflash(
     data: Bytes, names: Collection[str], release_memory: Callable[[], None] = lambda: None
 ) -> Dataflash:
-    """Index the messages with these names in the bytes (n,) of a log.
+    """Index the messages of a log that have one of the given names.
 
-    release_memory: called regularly, to release memory.
+    data: bytes of the log, (n,).
+    release_memory: called regularly, to release the memory of the bytes that were read.
 
-    The log is read twice: for the formats, and for the messages of those names, so that the index of a large log is
-    small.
+    The log is read twice, first for the formats and then for the messages with these names, so that the index of a
+    large log is small.
     """
-    only_formats = np.zeros(256, np.bool_)
-    only_formats[FMT_TYPE] = True
-    first = _find_messages(data, only_formats, release_memory)
+    is_format = np.zeros(256, np.bool_)
+    is_format[FMT_TYPE] = True
+    format_messages = _find_messages(data, is_format, release_memory)
     formats: dict[int, MessageFormat] = {}
     unreadable = 0
-    for start in first.starts.tolist():
+    for start in format_messages.starts.tolist():
         message_format = _parse_format(bytes(data[start + HEADER_BYTES : start + _FMT_BYTES]))
         if message_format is None:
             unreadable += 1
@@ -218,21 +222,29 @@ def index_dataflash(
             formats.setdefault(message_format.number, message_format)
     is_requested = np.zeros(256, np.bool_)
     is_requested[[number for number, entry in formats.items() if entry.name in names]] = True
-    messages_found = _find_messages(data, is_requested, release_memory)
-    order = np.argsort(messages_found.kinds, kind="stable")
-    numbers, firsts = np.unique(messages_found.kinds[order], return_index=True)
-    # Without messages numpy returns one empty part.
+    requested_messages = _find_messages(data, is_requested, release_memory)
+    order = np.argsort(requested_messages.kinds, kind="stable")
+    numbers, firsts = np.unique(requested_messages.kinds[order], return_index=True)
+    # Without messages `np.split` returns one empty part.
     starts = {
         int(number): message_starts
-        for number, message_starts in zip(numbers, np.split(messages_found.starts[order], firsts[1:]), strict=False)
+        for number, message_starts in zip(numbers, np.split(requested_messages.starts[order], firsts[1:]), strict=False)
     }
-    held_names = tuple(entry.name for number, entry in formats.items() if messages_found.counts[number])
-    damage = Damage(int(messages_found.places), int(messages_found.size), bool(messages_found.cut), unreadable)
-    return Dataflash(data, starts, formats, held_names, damage, release_memory)
+    present_names = tuple(entry.name for number, entry in formats.items() if requested_messages.counts[number])
+    damage = Damage(
+        int(requested_messages.places), int(requested_messages.size), bool(requested_messages.cut), unreadable
+    )
+    return Dataflash(data, starts, formats, present_names, damage, release_memory)
 
 
 class _FoundMessages(NamedTuple):
-    """Starts and types of the requested messages, the number of messages of each type, and the damage."""
+    """Requested messages of a log, and the damage of the log.
+
+    starts, kinds: start and type of each requested message, (n,).
+    counts: number of messages of each type, (256,).
+    places, size: number of damaged places, and their total size in bytes.
+    cut: True if the last message is cut.
+    """
 
     starts: Ints
     kinds: Bytes
@@ -243,6 +255,12 @@ class _FoundMessages(NamedTuple):
 
 
 def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory: Callable[[], None]) -> _FoundMessages:
+    """Find the messages of the requested types piece by piece, and count damaged places and lost bytes.
+
+    Old bytes after the last message, up to `MAX_TRAILING_BYTES`, are not damage.
+
+    is_requested: mask of the requested message types, (256,).
+    """
     state, lengths, counts = np.zeros(6, np.int64), np.zeros(256, np.int64), np.zeros(256, np.int64)
     state[_IS_READING], lengths[FMT_TYPE] = 1, _FMT_BYTES
     starts, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
@@ -252,16 +270,17 @@ def _find_messages(data: Bytes, is_requested: NDArray[np.bool_], release_memory:
         )
         starts.append(piece[0])
         kinds.append(piece[1])
-    places, size, behind = int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), int(state[_LAST_END])
-    if not state[_IS_READING] and behind and data.size - behind < MAX_TRAILING_BYTES:
-        # The rest of the last page is no damage.
-        places -= 1
-        size -= min(size, data.size - HEADER_BYTES + 1 - behind)
-    return _FoundMessages(np.concatenate(starts), np.concatenate(kinds), counts, places, size, bool(state[_IS_CUT]))
+    damaged_places, lost_bytes, last_end = int(state[_DAMAGED_PLACES]), int(state[_LOST_BYTES]), int(state[_LAST_END])
+    if not state[_IS_READING] and last_end and data.size - last_end < MAX_TRAILING_BYTES:
+        # The walk counted the old bytes after the last message as a damaged place.
+        damaged_places -= 1
+        lost_bytes -= min(lost_bytes, data.size - HEADER_BYTES + 1 - last_end)
+    is_cut = bool(state[_IS_CUT])
+    return _FoundMessages(np.concatenate(starts), np.concatenate(kinds), counts, damaged_places, lost_bytes, is_cut)
 
 
 def _parse_format(body: bytes) -> MessageFormat | None:
-    """Return the format stated by a FMT_TYPE message; None for an invalid one."""
+    """Return the format that the body of an FMT message states; None for an invalid body."""
     if len(body) < _FMT_BYTES - HEADER_BYTES:
         return None
     number, length, *texts = struct.unpack("<BB4s16s64s", body)
@@ -277,6 +296,7 @@ def _parse_format(body: bytes) -> MessageFormat | None:
 def _read_messages(
     data: Bytes, starts: Ints, message_format: MessageFormat, release_memory: Callable[[], None]
 ) -> Messages:
+    """Read the messages of one format that begin at the given bytes; a cut message at the end is left out."""
     starts = starts[starts + message_format.length <= len(data)]
     dtype = message_format.dtype
     rows = np.zeros(0, dtype)
@@ -291,17 +311,18 @@ def _read_messages(
     return Messages(starts, rows, message_format.scales)
 
 
-# Indices into the state of a walk: the next byte,
+# Indices of the state of a walk over messages.
+# Next byte.
 _NEXT_BYTE = 0
-# the number of places where no message begins,
+# Number of damaged places, where no message begins.
 _DAMAGED_PLACES = 1
-# the number of bytes there,
+# Number of bytes in damaged places.
 _LOST_BYTES = 2
-# the end of the last message,
+# End of the last message, bytes.
 _LAST_END = 3
-# 1 while messages follow each other,
+# 1 while messages follow each other, 0 in a damaged place.
 _IS_READING = 4
-# and 1 if the last message is cut.
+# 1 if the last message is cut.
 _IS_CUT = 5
 
 
@@ -317,7 +338,14 @@ def _walk_messages(
     trailing: int,
     is_requested: NDArray[np.bool_],
 ) -> tuple[Ints, Bytes]:
-    """Return starts and types of requested messages before byte `stop`, continuing from and updating `state`."""
+    """Return the starts and types of requested messages up to byte `stop`: continue from `state`, and update it.
+
+    lengths: length of each message type, bytes, (256,), updated by the FMT messages.
+    counts: number of messages of each type, (256,), which is updated.
+    header: length of a message's header, bytes.
+    fmt: message type of FMT messages.
+    trailing: largest number of bytes at the end that need not be a message.
+    """
     starts, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
     count, end = 0, data.size
     places, size, k, behind = state[_DAMAGED_PLACES], state[_LOST_BYTES], state[_NEXT_BYTE], state[_LAST_END]
@@ -327,7 +355,7 @@ def _walk_messages(
         if data[k] == 0xA3 and data[k + 1] == 0x95:
             length = lengths[data[k + 2]]
         after = k + length
-        # Another message has to follow, unless the file ends there.
+        # Another message must follow, unless the file ends.
         follows = after >= end - 1 or (data[after] == 0xA3 and data[after + 1] == 0x95) or end - after < trailing
         if length == 0 or not follows:
             places += reading

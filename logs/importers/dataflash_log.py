@@ -1,7 +1,7 @@
-"""ArduPilot's dataflash logs (`.BIN`): positions, measurements and commands of the vehicle.
+"""Read ArduPilot's dataflash logs (`.BIN`): positions, measurements and commands of the vehicle.
 
-`logs.importers.dataflash_frames` finds the messages; here they become a `RawLog`.  Names of messages and fields follow
-ArduPilot's log documentation, in older releases as documented then.
+`logs.importers.dataflash_frames` finds the messages; this module makes a `RawLog` from them.  Names of messages and
+fields follow ArduPilot's log documentation of the current release and of older releases.
 """
 
 import math
@@ -30,19 +30,22 @@ from logs.importers.raw_log import (
 from world.arrays import Floats
 from world.errors import LogError
 
-# Missions: the messages CMD, and home from ORGN where they hold none.
+# Missions: from the CMD messages, with home from ORGN if the items contain none.
 
 _NUMBERS = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt")
 # Largest item number: 16 bits (ArduPilot's log documentation, CMD).
 _MAX_ITEMS = 65535.0
-# ORGN.Type of home; the other type is the origin of the estimator's map.
+# Value of ORGN.Type for home; the other value is the origin of the estimator's map.
 _HOME = 1
 
 
 def dataflash_missions(commands: Messages, time: Floats, origins: Messages, source: str) -> Iterator[LoggedMission]:
-    """Yield missions in the order of the log: each whole, without repetitions of flown items.
+    """Yield the missions in the order of the log; items that were logged again when flown are merged.
 
-    commands: CMD.  time: (n,) s, of each.  origins: ORGN.  source: name of the log.
+    commands: CMD messages.
+    time: time of each CMD message, s, (n,).
+    origins: ORGN messages.
+    source: name of the log.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
     >>> list(dataflash_missions(none, np.zeros(0), none, "a.BIN"))
@@ -50,31 +53,31 @@ def dataflash_missions(commands: Messages, time: Floats, origins: Messages, sour
     """
     if not commands.has(*_NUMBERS):
         return
-    framed = commands.has("Frame")
+    has_frames = commands.has("Frame")
     table = [commands.column(name).tolist() for name in _NUMBERS]
-    frames = commands.column("Frame").tolist() if framed else [3.0] * len(commands)
+    frames = commands.column("Frame").tolist() if has_frames else [3.0] * len(commands)
     totals = commands.column("CTot").tolist() if commands.has("CTot") else [0.0] * len(commands)
     rows = []
     for row, (stamp, total, frame) in enumerate(zip(time.tolist(), totals, frames, strict=True)):
         number, command, p1, p2, p3, p4, lat, lon, up = (column[row] for column in table)
-        # Garbage that looks like a message, or a hostile log: make nothing for millions of items that do not exist.
+        # Skip garbage that looks like a message, or the items of a hostile log.
         if not (0.0 <= number <= _MAX_ITEMS and math.isfinite(command) and math.isfinite(frame)):
             continue
         # A float32 has seven digits; a mission file has six after the decimal point.
-        place = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
-        item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *place)
+        position = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
+        item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *position)
         rows.append(LoggedItem(stamp, int(total) if 0.0 <= total <= _MAX_ITEMS else 0, item))
-    notes = () if framed else ("the log states no frames: heights are taken as above home",)
+    notes = () if has_frames else ("the log states no frames: heights are taken as above home",)
     for logged in combine_items(rows):
-        readable = logged_mission(logged, source, "CMD")
-        if readable is not None:
-            mission = readable.mission
+        usable_mission = logged_mission(logged, source, "CMD")
+        if usable_mission is not None:
+            mission = usable_mission.mission
             home = mission.home if mission.home is not None else logged_home(origins)
-            yield replace(readable, mission=replace(mission, home=home, warnings=(*mission.warnings, *notes)))
+            yield replace(usable_mission, mission=replace(mission, home=home, warnings=(*mission.warnings, *notes)))
 
 
 def logged_home(origins: Messages) -> Home | None:
-    """Return the last home of the vehicle, from ORGN; None if not logged."""
+    """Return the last home of the vehicle from the ORGN messages; None if not logged or invalid."""
     if not origins.has("Type", "Lat", "Lng", "Alt"):
         return None
     homes = origins.select(origins.column("Type") == _HOME)
@@ -86,7 +89,7 @@ def logged_home(origins: Messages) -> Home | None:
 
 
 FORMAT = "ArduPilot dataflash log"
-# Vehicle by VER.BT, the vehicle that the program was built for.
+# Vehicle by VER.BT, the vehicle for which the program was built.
 _BUILDS: dict[int, VehicleKind] = {
     1: "rover",
     2: "copter",
@@ -113,20 +116,23 @@ _PROGRAMS: dict[str, VehicleKind] = {
 _PROGRAM = re.compile(rf"^({'|'.join(_PROGRAMS)})\b")
 # Time from 1970 to the epoch of GPS, s.
 _GPS_EPOCH_S = 315_964_800.0
-# Leap seconds since then, constant since 2017, s.
+# Leap seconds since the epoch of GPS, s; constant since 2017.
 _LEAP_SECONDS_S = 18.0
 _WEEK_S = 604_800.0
 
 
 def read_dataflash(path: Path) -> RawLog:
-    """Read a log.  Raises LogError for one without positions."""
+    """Read a dataflash log.  Raises LogError for a log without positions."""
     file = MappedFile(path)
     index = index_dataflash(file.data, _READ, file.release_memory)
     return _Reader(index, str(path)).read()
 
 
 def program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, VehicleKind]:
-    """Return program and vehicle, from the texts of MSG, or from VER.
+    """Return the program and the vehicle from the first MSG text that names a program, or else from VER.
+
+    texts: texts of the MSG messages.
+    version: VER messages.
 
     >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
     >>> program_and_vehicle(["ArduCopter V4.5.7"], none), program_and_vehicle([], none)
@@ -142,7 +148,7 @@ def program_and_vehicle(texts: Iterable[str], version: Messages) -> tuple[str, V
 
 
 class _Reader:
-    """Reader of one log, part by part of `RawLog`."""
+    """Reader of one log, with a method for each part of `RawLog`."""
 
     def __init__(self, index: Dataflash, source: str) -> None:
         self._index, self._source = index, source
@@ -150,7 +156,8 @@ class _Reader:
         self._clock = self._clock_shifts()
 
     def read(self) -> RawLog:
-        series = {name: found for name, found in self._series() if found is not None and len(found.time)}
+        """Return the log.  Raises LogError for a log without positions."""
+        series = {name: values for name, values in self._series() if values is not None and len(values.time)}
         program, vehicle = self._program()
         if "position" not in series:
             names = ", ".join(sorted(self._index.names)[:12])
@@ -176,11 +183,11 @@ class _Reader:
         )
 
     def _messages(self, name: str) -> Messages:
-        """Return the messages of a name, of the first instance if there are several."""
+        """Return the messages of a name; of several instances only the first."""
         if name not in self._cache:
             messages = self._index.messages(name)
             for column in ("I", "C", "Inst", "Instance"):
-                # Earlier releases have a mode number or a counter under these names, which are no instances.
+                # In other messages of earlier releases these names are a mode number or a counter.
                 if name in _WITH_INSTANCES and messages.has(column) and messages.rows.dtype[column].kind in "ui":
                     number = messages.rows[column]
                     messages = messages.select(number == number.min())
@@ -188,7 +195,11 @@ class _Reader:
         return self._cache[name]
 
     def _clock_shifts(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
-        """Return the shifts of the log's clock: from which byte on, by how much (s), and when."""
+        """Return the corrections of the log's clock at n messages, and the times of its jumps.
+
+        Returns the byte at which each message starts, the shift from there on, s, (n,) each, and the times of the jumps
+        back, s.
+        """
         times, starts = [], []
         for name in ("POS", "ATT", "GPS", "MODE"):
             messages = self._messages(name)
@@ -198,19 +209,21 @@ class _Reader:
         if not times:
             return np.zeros(0, np.int64), np.zeros(0), ()
         order = np.argsort(np.concatenate(starts), kind="stable")
-        places, raw = np.concatenate(starts)[order], np.concatenate(times)[order]
-        is_finite = np.isfinite(raw)
-        steady = remove_clock_jumps(raw[is_finite])
-        return places[is_finite], steady.time - raw[is_finite], steady.jumps
+        sorted_starts, raw_times = np.concatenate(starts)[order], np.concatenate(times)[order]
+        is_finite = np.isfinite(raw_times)
+        steady = remove_clock_jumps(raw_times[is_finite])
+        return sorted_starts[is_finite], steady.time - raw_times[is_finite], steady.jumps
 
     def _time(self, messages: Messages) -> Floats:
-        places, moved, jumps = self._clock
-        raw = _raw_time(messages)
+        """Return the times of messages on the clock without jumps back, s."""
+        starts, shifts, jumps = self._clock
+        raw_time = _raw_time(messages)
         if not jumps:
-            return raw
-        return np.asarray(raw + moved[np.clip(np.searchsorted(places, messages.starts), 0, len(moved) - 1)])
+            return raw_time
+        return np.asarray(raw_time + shifts[np.clip(np.searchsorted(starts, messages.starts), 0, len(shifts) - 1)])
 
     def _table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
+        """Return columns of a message, times `scale`; None if the log lacks one of them."""
         columns = tuple(columns)
         messages = self._messages(name)
         if not messages.has(*columns) or not (messages.has("TimeUS") or messages.has("TimeMS")):
@@ -219,6 +232,7 @@ class _Reader:
         return LogSeries(name, self._time(messages), values * scale)
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+        """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
         yield "position", self._position()
         yield "velocity", self._velocity()
         yield "attitude", self._first((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE)
@@ -228,6 +242,7 @@ class _Reader:
         yield "throttle", self._throttle()
 
     def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
+        """Return the columns of the first choice of message and columns that has rows, times `scale`; None if none."""
         for name, columns in choices:
             table = self._table(name, columns, scale)
             if table is not None and len(table.time):
@@ -235,19 +250,20 @@ class _Reader:
         return None
 
     def _position(self) -> LogSeries | None:
-        own = self._first((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
-        if own is not None:
-            return own
+        """Return the estimated positions, or else the positions of GPS with a 3-D fix."""
+        estimate = self._first((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
+        if estimate is not None:
+            return estimate
         gps = self._messages("GPS")
         position = self._first((("GPS", ("Lat", "Lng", "Alt")),))
         if position is None or not gps.has("Status"):
             return position
         # Without a 3-D fix there is no altitude.
-        fixed = gps.column("Status") >= 3
-        return LogSeries("GPS", position.time[fixed], position.values[fixed])
+        has_fix = gps.column("Status") >= 3
+        return LogSeries("GPS", position.time[has_fix], position.values[has_fix])
 
     def _velocity(self) -> LogSeries | None:
-        """Return east, north, up."""
+        """Return the ground velocity to east, north and up, m/s, (n, 3), from the estimator or else from GPS."""
         for name in ("XKF1", "NKF1", "EKF1"):
             velocity = self._table(name, ("VE", "VN", "VD"))
             if velocity is not None and len(velocity.time):
@@ -260,17 +276,18 @@ class _Reader:
         return LogSeries("GPS", gps.time, np.stack([speed * np.sin(course), speed * np.cos(course), -down], axis=1))
 
     def _wind(self) -> LogSeries | None:
+        """Return the estimated wind velocity to east and north, m/s, (n, 2); None if it is always 0."""
         wind = self._first([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
         # Without an estimate the wind stays zero.
         return wind if wind is not None and np.any(wind.values) else None
 
     def _airspeed(self) -> LogSeries | None:
-        """Return true airspeed, converted from ArduPilot's equivalent airspeed."""
+        """Return the true airspeed, m/s, (n, 1), converted from ArduPilot's equivalent airspeed; None if unknown."""
         sensor = self._messages("ARSP")
         airspeed = self._table("ARSP", ("Airspeed",))
         if airspeed is not None and sensor.has("U"):
-            used = sensor.column("U") > 0
-            airspeed = LogSeries("ARSP", airspeed.time[used], airspeed.values[used]) if used.any() else None
+            is_used = sensor.column("U") > 0
+            airspeed = LogSeries("ARSP", airspeed.time[is_used], airspeed.values[is_used]) if is_used.any() else None
         if airspeed is None or not len(airspeed.time):
             airspeed = self._first((("CTUN", ("As",)),)) if self._messages("CTUN").has("AsT") else None
         if airspeed is None or not len(airspeed.time) or not np.any(airspeed.values):
@@ -280,31 +297,33 @@ class _Reader:
         )
 
     def _true_by_equivalent(self, time: Floats) -> Floats:
+        """Return the ratio of true to equivalent airspeed at given times, as logged or else by the altitude, (n,)."""
         ratio = self._table("CTUN", ("E2T",))
         if ratio is not None and len(ratio.time) > 1:
             order = np.argsort(ratio.time, kind="stable")
             return np.asarray(np.interp(time, ratio.time[order], ratio.values[order, 0]))
-        place = self._position()
-        if place is None or not len(place.time):
+        position = self._position()
+        if position is None or not len(position.time):
             return np.ones(len(time))
-        order = np.argsort(place.time, kind="stable")
-        up = np.clip(np.interp(time, place.time[order], place.values[order, 2]), -500.0, 20_000.0)
-        return np.array([true_by_equivalent(float(height)) for height in up])
+        order = np.argsort(position.time, kind="stable")
+        altitudes = np.clip(np.interp(time, position.time[order], position.values[order, 2]), -500.0, 20_000.0)
+        return np.array([true_by_equivalent(float(altitude)) for altitude in altitudes])
 
     def _battery(self) -> LogSeries | None:
-        """Return current and used energy."""
+        """Return the battery's current, A, and the energy used, Wh, (n, 2); None if neither was measured."""
         battery = self._table("BAT", ("Curr", "EnrgTot"))
         if battery is None or not len(battery.time):
             battery = self._table("CURR", ("Curr", "EnrgTot"))
         if battery is not None and len(battery.time):
             return battery if np.any(battery.values) else None
         for name in ("BAT", "CURR"):
-            volts = self._table(name, ("Volt", "Curr"))
-            if volts is not None and len(volts.time) and np.any(volts.values[:, 1]):
-                return with_used_energy(volts)
+            battery = self._table(name, ("Volt", "Curr"))
+            if battery is not None and len(battery.time) and np.any(battery.values[:, 1]):
+                return with_used_energy(battery)
         return None
 
     def _throttle(self) -> LogSeries | None:
+        """Return the throttle, 0..1, (n, 1); None if not logged."""
         for column in ("ThO", "ThrOut"):
             throttle = self._table("CTUN", (column,), 0.01)
             if throttle is not None and len(throttle.time):
@@ -312,6 +331,7 @@ class _Reader:
         return None
 
     def _heights(self) -> Iterable[HeightSource]:
+        """Yield the altitudes that the log has in addition to the altitude of the position."""
         position = self._position()
         gps = self._table("GPS", ("Alt",))
         if gps is not None and position is not None and position.source != "GPS":
@@ -325,6 +345,7 @@ class _Reader:
                 yield HeightSource("BARO.Alt (above where it was switched on)", "unstated", baro)
 
     def _modes(self) -> Iterable[ModeChange]:
+        """Yield the mode changes; none for logs with modes by name."""
         messages = self._messages("MODE")
         column = "ModeNum" if messages.has("ModeNum") else "Mode"
         if not messages.has(column) or messages.rows.dtype[column].kind == "S":
@@ -334,11 +355,13 @@ class _Reader:
             yield ModeChange(time, name, automatic)
 
     def _missions(self) -> Iterable[LoggedMission]:
+        """Return the missions in the order of the log."""
         commands = self._messages("CMD")
         time = self._time(commands) if len(commands) else np.zeros(0)
         return dataflash_missions(commands, time, self._messages("ORGN"), self._source)
 
     def _parameters(self) -> dict[str, float]:
+        """Return the last finite value of each parameter."""
         messages = self._messages("PARM")
         if not messages.has("Name", "Value"):
             return {}
@@ -346,14 +369,17 @@ class _Reader:
         return {name: value for name, value in values if name and math.isfinite(value)}
 
     def _events(self) -> Iterable[tuple[float, str]]:
+        """Yield the time (s) and the text of each MSG message."""
         messages = self._messages("MSG")
         if messages.has("Message"):
             yield from zip(self._time(messages).tolist(), messages.texts("Message"), strict=True)
 
     def _program(self) -> tuple[str, VehicleKind]:
+        """Return the program and the vehicle."""
         return program_and_vehicle([text for _, text in self._events()], self._messages("VER"))
 
     def _utc_start(self) -> float:
+        """Return the time 0 of the log's clock, s since 1970, by the first GPS fix; NaN if not logged."""
         messages = self._messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if messages.has(weeks, millis, "TimeUS"):
@@ -396,7 +422,7 @@ _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1
 
 
 def _raw_time(messages: Messages) -> Floats:
-    """Return times of messages as they are written, s; before 2015 they were milliseconds."""
+    """Return the times of messages on the log's own clock, s.  Before 2015 they were logged in milliseconds."""
     if messages.has("TimeUS"):
         return messages.column("TimeUS") * 1e-6
     return messages.column("TimeMS") * 1e-3

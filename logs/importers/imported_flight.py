@@ -1,7 +1,7 @@
 """Choose one flight of a log, and resample all its data at the times of its positions.
 
-A log may hold several flights, each flown along several missions: `make_flight` chooses one.  The chosen flight gives
-the altitudes for a plan that states none, the mean wind, and the track that is judged.
+A log may contain several flights, and each flight may follow several missions: `make_flight` chooses a flight along one
+mission.  From it follow the altitudes for a plan that states none, the mean wind, and the track that is judged.
 """
 
 import math
@@ -24,7 +24,7 @@ from world.frames import GeoOrigin, to_map
 
 # Median ground speed above which the aircraft flies, m/s.
 MIN_FLYING_SPEED_MPS = 6.0
-# Longest time for which an aircraft in flight may be slower, in a headwind, s.
+# Longest time for which an aircraft in flight may be slower because of a headwind, s.
 MAX_SLOW_TIME_S = 60.0
 # Window of the median ground speed, s.
 _MEDIAN_WINDOW_S = 5.0
@@ -36,11 +36,11 @@ MIN_FLIGHT_TIME_S = 20.0
 
 @dataclass(frozen=True, slots=True)
 class FlightPart:
-    """A flight along one mission.
+    """Part of a log: one flight, and the one mission that it followed.
 
     start, end: times of the flight, s.
-    mission: number of the mission in the log, -1 for none.
-    stretches: parts flown along the mission.
+    mission: index of the mission in the log, -1 for none.
+    stretches: periods in which the flight followed the mission.
     """
 
     start: float
@@ -50,12 +50,17 @@ class FlightPart:
 
     @property
     def along_mission(self) -> float:
-        """Time flown along the mission, s."""
+        """Total time for which the flight followed the mission, s."""
         return sum(stretch.end - stretch.start for stretch in self.stretches)
 
 
 def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
-    """Return starts and ends of flights, s: stretches with a ground speed above `MIN_FLYING_SPEED_MPS`.
+    """Return the start and end of each flight, s.
+
+    A flight is a period of at least `MIN_FLIGHT_TIME_S` with a median ground speed above `MIN_FLYING_SPEED_MPS`, except
+    in slower periods of up to `MAX_SLOW_TIME_S`.
+
+    time, lat, lon: times (s) and positions (deg), (n,).
 
     >>> time = np.arange(0.0, 200.0)
     >>> north = np.cumsum(np.where((time > 50.0) & (time < 150.0), 20.0, 0.1))
@@ -67,9 +72,9 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
         return []
     speed = metres_between(lat, lon) / np.maximum(np.diff(time), 1e-3)
     width = max(1, int(_MEDIAN_WINDOW_S / max(1e-3, float(np.median(np.diff(time))))))
-    fast = _running_median(speed, width) > MIN_FLYING_SPEED_MPS
+    is_flying = _running_median(speed, width) > MIN_FLYING_SPEED_MPS
     spans: list[list[float]] = []
-    for k in np.flatnonzero(fast).tolist():
+    for k in np.flatnonzero(is_flying).tolist():
         if spans and time[k] - spans[-1][1] <= MAX_SLOW_TIME_S:
             spans[-1][1] = float(time[k + 1])
         else:
@@ -78,6 +83,7 @@ def find_flight_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[floa
 
 
 def _running_median(values: Floats, width: int) -> Floats:
+    """Return the median of `width` values around each value, (n,); the values at the ends are repeated."""
     if width < 2 or values.size <= width:
         return values
     half = width // 2
@@ -93,43 +99,51 @@ def find_flight_parts(
 ) -> list[FlightPart]:
     """Return one part for each flight and each mission that the flight followed.
 
-    spans: start and end of each flight, from `find_flight_spans`.  last: time of the last row of the log, s.
-    Without modes, the whole flight is taken as flown along the mission.
+    spans: start and end of each flight, from `find_flight_spans`.
+    modes: mode changes in the log; without any, each whole flight is assumed to follow its mission.
+    missions: missions in the log.
+    last: time of the last row of the log, s.
     """
     parts = []
     for start, end in spans:
         stretches = _find_stretches(start, end, modes, last)
-        by_mission: dict[int, list[MissionStretch]] = {}
+        stretches_by_mission: dict[int, list[MissionStretch]] = {}
         for stretch in stretches:
-            by_mission.setdefault(_mission_at(stretch, missions), []).append(stretch)
-        if not by_mission:
-            by_mission[_mission_at(MissionStretch(start, end, "", "log"), missions)] = []
-        parts += [FlightPart(start, end, number, tuple(found)) for number, found in by_mission.items()]
+            stretches_by_mission.setdefault(_mission_at(stretch, missions), []).append(stretch)
+        if not stretches_by_mission:
+            stretches_by_mission[_mission_at(MissionStretch(start, end, "", "log"), missions)] = []
+        parts += [
+            FlightPart(start, end, number, tuple(mission_stretches))
+            for number, mission_stretches in stretches_by_mission.items()
+        ]
     return parts
 
 
 def _find_stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
-    """Return the stretches of a flight in a mode that follows the mission, or the whole flight without modes."""
-    # The log cuts off a flight that continues to its last rows.
-    open_end = last - end < CUT_FLIGHT_TIME_S
+    """Return the periods of a flight in a mode that follows the mission, or the whole flight without modes.
+
+    last: time of the last row of the log, s.
+    """
+    # A flight that continues to the log's last rows is cut off by the log.
+    is_cut_off = last - end < CUT_FLIGHT_TIME_S
     if not modes:
-        return [MissionStretch(start, end, "", "log" if open_end else "landed")]
+        return [MissionStretch(start, end, "", "log" if is_cut_off else "landed")]
     stretches = []
-    ordered = sorted(modes, key=lambda mode: mode.time)
-    for k, mode in enumerate(ordered):
-        mode_end = ordered[k + 1].time if k + 1 < len(ordered) else float("inf")
-        begin, stop = max(start, mode.time), min(end, mode_end)
-        if not mode.automatic or stop <= begin:
+    sorted_modes = sorted(modes, key=lambda mode: mode.time)
+    for k, mode in enumerate(sorted_modes):
+        mode_end = sorted_modes[k + 1].time if k + 1 < len(sorted_modes) else float("inf")
+        stretch_start, stretch_end = max(start, mode.time), min(end, mode_end)
+        if not mode.automatic or stretch_end <= stretch_start:
             continue
         if mode_end <= end:
-            stretches.append(MissionStretch(begin, stop, mode.name, "mode", ordered[k + 1].name))
+            stretches.append(MissionStretch(stretch_start, stretch_end, mode.name, "mode", sorted_modes[k + 1].name))
         else:
-            stretches.append(MissionStretch(begin, stop, mode.name, "log" if open_end else "landed"))
+            stretches.append(MissionStretch(stretch_start, stretch_end, mode.name, "log" if is_cut_off else "landed"))
     return stretches
 
 
 def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
-    """Return the mission active at the start of a stretch, or the first mission within the stretch."""
+    """Return the index of the mission at the start of a stretch, or else of the first mission within it; -1 if none."""
     before = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
     if before:
         return before[-1]
@@ -138,19 +152,19 @@ def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> i
 
 
 def choose_part(parts: Sequence[FlightPart]) -> int:
-    """Return the index of the part that followed its mission for longest; of equal ones, the longest part."""
+    """Return the index of the part that followed its mission for the longest time; of equal parts, the longest."""
     return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
 
 
-# Time shown before and after a flight, s.
+# Time before and after a flight that is kept and shown, s.
 SHOWN_MARGIN_S = 10.0
 # Longest interval between rows over which values are interpolated, s.
 _MAX_INTERPOLATED_STEP_S = 1.0
-# The same limit as a multiple of the usual interval of the series.
+# Longest interval for interpolation as a multiple of the series' usual interval, if that is longer.
 _MAX_INTERPOLATED_STEPS = 2.5
 # Duration at the start of a flight over which altitudes are compared, s.
 _COMPARED_TIME_S = 5.0
-# Vehicles whose logs are refused, with their possessive in the message.
+# Vehicles whose logs are refused, with their possessive for the message.
 _REFUSED: dict[VehicleKind, str] = {
     "copter": "a copter's",
     "rover": "a rover's",
@@ -167,17 +181,19 @@ _MAX_ROWS = 4_000_000
 
 @dataclass(frozen=True, slots=True)
 class LoggedFlight:
-    """One flight of a log.
+    """One flight of a log, with n rows at the times of its positions.
 
     raw: the log.
-    time: (n,) s of the log's clock.  lat, lon: (n,) degrees.  up: (n,) m.
-    columns: (n, k) by the names of `logs.importers.raw_log.COLUMNS`, NaN where the log has no row nearby.
+    time: times on the log's clock, s, (n,).
+    lat, lon: latitude and longitude, deg, (n,).
+    up: altitude, m, (n,).
+    columns: values by the names of `logs.importers.raw_log.COLUMNS`, (n, k); NaN at times without a row nearby.
     holds: names of the quantities that the log contains.
-    stretches: parts flown along the mission.
-    mission: the mission of the flight; None if the log holds none.
+    stretches: periods in which the flight followed the mission.
+    mission: mission of the flight; None if the log contains none.
     heights, gaps, faults: see `flight.simulation.setup.ImportedLog`.
     number, count: number of this flight in the log, from 1, and number of flights.
-    others: for each other flight, its start and the time for which it followed a mission, s.
+    others: start of each other flight, s, and the time for which it followed a mission, s.
     begins_in_flight, ends_in_flight: True if the first or the last row of the log is in the air: the log lacks the rest
         of the flight.
     """
@@ -203,7 +219,7 @@ class LoggedFlight:
 
 
 def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
-    """Return the flight of a log that followed its mission for longest, or the flight of a given number, from 1.
+    """Return the flight of a log that followed its mission for the longest time, or the flight with a number from 1.
 
     Raises LogError for a vehicle other than an aeroplane, a log without a flight, and a number that is not in the log.
 
@@ -231,16 +247,17 @@ def make_flight(raw: RawLog, number: int | None = None) -> LoggedFlight:
         for mode in raw.modes
     ]
     parts = find_flight_parts(spans, modes, raw.missions, last)
-    chosen = choose_part(parts)
+    index = choose_part(parts)
     if number is not None:
         if not 1 <= number <= len(parts):
-            raise LogError.of_argument("flight", number, f"it holds flights 1..{len(parts)}", file=raw.source)
-        chosen = number - 1
-    others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != chosen)
-    return _extract_flight(raw, positions, parts[chosen], chosen + 1, len(parts), others)
+            raise LogError.of_argument("flight", number, f"the log has flights 1..{len(parts)}", file=raw.source)
+        index = number - 1
+    others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != index)
+    return _extract_flight(raw, positions, parts[index], index + 1, len(parts), others)
 
 
 def _reason_without_flight(positions: CleanPositions) -> str:
+    """Describe why a log contains no flight."""
     if positions.time.size < 2:
         unusable_count = positions.faults.unusable
         return f"{positions.time.size} usable positions" + (
@@ -257,12 +274,16 @@ def _extract_flight(
     count: int,
     others: tuple[tuple[float, float], ...],
 ) -> LoggedFlight:
-    keep = (positions.time >= part.start - SHOWN_MARGIN_S) & (positions.time <= part.end + SHOWN_MARGIN_S)
-    time = positions.time[keep]
+    """Return one part of a log as a flight, with its data at the times of its positions.
+
+    number, count, others: as in `LoggedFlight`.
+    """
+    is_kept = (positions.time >= part.start - SHOWN_MARGIN_S) & (positions.time <= part.end + SHOWN_MARGIN_S)
+    time = positions.time[is_kept]
     columns = {
         name: _interpolate_at(raw.series.get(name), name, time, positions) for name in COLUMNS if name != "height"
     }
-    up = positions.up[keep]
+    up = positions.up[is_kept]
     holds: list[Quantity] = [name for name in _OPTIONAL_QUANTITIES if np.isfinite(columns[name]).any()]
     if np.isfinite(up).all():
         holds.append("heights")
@@ -270,8 +291,8 @@ def _extract_flight(
     return LoggedFlight(
         raw=raw,
         time=time,
-        lat=positions.lat[keep],
-        lon=positions.lon[keep],
+        lat=positions.lat[is_kept],
+        lon=positions.lon[is_kept],
         up=up,
         columns=columns,
         holds=tuple(holds),
@@ -290,21 +311,26 @@ def _extract_flight(
 
 
 def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions: CleanPositions) -> Floats:
-    """Interpolate a series at the times of the positions (n,); NaN without rows nearby."""
+    """Return a series interpolated at other times, (n, k); NaN at times without a row nearby.
+
+    name: name of the series in `COLUMNS`.
+    time: times on the clock without jumps, s, (n,).
+    positions: cleaned positions, with the corrections of the log's clock.
+    """
     width = len(COLUMNS[name])
-    out = np.full((time.size, width), math.nan)
+    interpolated = np.full((time.size, width), math.nan)
     if series is None:
-        return out
+        return interpolated
     is_valid = (
         np.isfinite(series.time) & np.isfinite(series.values).all(axis=1) & (np.abs(series.values) < 1e7).all(axis=1)
     )
     series_time = positions.to_steady_clock(series.time[is_valid])
     order = np.argsort(series_time, kind="stable")
     series_time, values = series_time[order], series.values[is_valid][order]
-    fresh = np.concatenate([[True], np.diff(series_time) > 0.0]) if series_time.size else np.zeros(0, bool)
-    series_time, values = series_time[fresh], values[fresh]
+    is_new = np.concatenate([[True], np.diff(series_time) > 0.0]) if series_time.size else np.zeros(0, bool)
+    series_time, values = series_time[is_new], values[is_new]
     if series_time.size < 2:
-        return out
+        return interpolated
     max_gap = max(_MAX_INTERPOLATED_STEP_S, _MAX_INTERPOLATED_STEPS * float(np.median(np.diff(series_time))))
     after = np.clip(np.searchsorted(series_time, time), 1, series_time.size - 1)
     is_covered = (
@@ -312,27 +338,31 @@ def _interpolate_at(series: LogSeries | None, name: str, time: Floats, positions
         & (time >= series_time[0] - max_gap)
         & (time <= series_time[-1] + max_gap)
     )
-    exact = np.isclose(series_time[after], time, atol=1e-9) | np.isclose(series_time[after - 1], time, atol=1e-9)
+    is_exact = np.isclose(series_time[after], time, atol=1e-9) | np.isclose(series_time[after - 1], time, atol=1e-9)
     if name == "attitude":
         values = np.unwrap(values, axis=0)
     for k in range(width):
-        out[:, k] = np.where(is_covered | exact, np.interp(time, series_time, values[:, k]), math.nan)
+        interpolated[:, k] = np.where(is_covered | is_exact, np.interp(time, series_time, values[:, k]), math.nan)
     if name == "attitude":
         # Wrap roll and pitch into -pi..pi, and yaw into 0..2 pi.
-        out[:, :2] = np.remainder(out[:, :2] + math.pi, 2.0 * math.pi) - math.pi
-        out[:, 2] = np.remainder(out[:, 2], 2.0 * math.pi)
-    return out
+        interpolated[:, :2] = np.remainder(interpolated[:, :2] + math.pi, 2.0 * math.pi) - math.pi
+        interpolated[:, 2] = np.remainder(interpolated[:, 2], 2.0 * math.pi)
+    return interpolated
 
 
 def _heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
-    """Return the chosen altitude source, and offsets of the others in the first seconds of the flight."""
+    """Return the source of the positions' altitude, and the offsets of other altitudes, m.
+
+    The offsets are medians over the first seconds after `start`.
+    """
     offsets = []
     for other in raw.heights:
         time = positions.to_steady_clock(other.series.time)
-        first = (time >= start) & (time <= start + _COMPARED_TIME_S) & np.isfinite(other.series.values[:, 0])
-        if first.any() and np.isfinite(positions.up).any():
-            own = np.interp(time[first], positions.time, positions.up)
-            offsets.append(HeightOffset(other.name, float(np.median(other.series.values[first, 0] - own))))
+        is_compared = (time >= start) & (time <= start + _COMPARED_TIME_S) & np.isfinite(other.series.values[:, 0])
+        if is_compared.any() and np.isfinite(positions.up).any():
+            altitudes = np.interp(time[is_compared], positions.time, positions.up)
+            offset = float(np.median(other.series.values[is_compared, 0] - altitudes))
+            offsets.append(HeightOffset(other.name, offset))
     source = raw.series["position"].source
     return Heights(source, raw.datum, tuple(offsets))
 
@@ -342,7 +372,9 @@ def _heights(raw: RawLog, positions: CleanPositions, start: float) -> Heights:
 
 
 def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
-    """Return a mission whose items have the altitude (m) of the nearest row of a flight (n,).
+    """Return a mission in which each item with a position has the altitude of the nearest row of a flight.
+
+    lat, lon, up: positions of the flight, deg and m, (n,).
 
     >>> from flight.mission.items import MissionItem
     >>> task = Mission(None, tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 0.0) for k in (0, 1)))
@@ -373,7 +405,12 @@ _MAX_WIND_MPS = 30.0
 
 @dataclass(frozen=True, slots=True)
 class MeanWind:
-    """Mean wind: speed (m/s), direction it blows from (rad clockwise from north), and its log message."""
+    """Mean wind.
+
+    speed: m/s.
+    from_course: direction from which the wind blows, rad clockwise from north.
+    source: name of the log message with the wind.
+    """
 
     speed: float
     from_course: float
@@ -381,11 +418,10 @@ class MeanWind:
 
 
 def mean_wind(flight: LoggedFlight) -> MeanWind | None:
-    """Return the mean wind over the stretches along the mission, or over the flight.
+    """Return the mean wind while the flight followed its mission, or over the whole flight if it never did.
 
-    Return None if the log holds no wind.
-
-    The first part of the estimate is left out: it starts from zero, and converges in the first turns.
+    The first fifth of the rows is left out, because the estimate starts from zero and converges in the first turns.
+    Return None if the log contains no wind.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight
@@ -393,13 +429,13 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
     MeanWind(speed=3.0, from_course=0.0, source='XKF2')
     """
     wind = flight.columns["wind"]
-    inside = np.zeros(len(flight.time), bool)
+    is_on_mission = np.zeros(len(flight.time), bool)
     for stretch in flight.stretches:
-        inside |= (flight.time >= stretch.start) & (flight.time <= stretch.end)
-    chosen = np.flatnonzero(np.isfinite(wind).all(axis=1) & (inside if inside.any() else True))
-    if not chosen.size:
+        is_on_mission |= (flight.time >= stretch.start) & (flight.time <= stretch.end)
+    rows = np.flatnonzero(np.isfinite(wind).all(axis=1) & (is_on_mission if is_on_mission.any() else True))
+    if not rows.size:
         return None
-    east, north = wind[chosen[len(chosen) // 5 :]].mean(axis=0).tolist()
+    east, north = wind[rows[len(rows) // 5 :]].mean(axis=0).tolist()
     speed = min(_MAX_WIND_MPS, math.hypot(east, north))
     return MeanWind(speed, math.atan2(-east, -north) % (2.0 * math.pi), flight.raw.series["wind"].source)
 
@@ -409,10 +445,10 @@ def mean_wind(flight: LoggedFlight) -> MeanWind | None:
 
 
 def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
-    """Return a track on the map about ``origin``.
+    """Return the flight as a track on the map around ``origin``.
 
-    Velocities missing in the log are computed from positions.  A log without altitudes gets altitude 0, which no rule
-    reads.
+    Velocities that the log lacks are computed from the positions.  A log without altitudes gets the altitude 0, which
+    no rule reads.
 
     >>> from logs.importers.raw_log import example_raw_log
     >>> from logs.importers.imported_flight import make_flight
@@ -424,15 +460,15 @@ def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
     east, north = to_map(origin, flight.lat, flight.lon)
     position = np.column_stack([east, north, np.nan_to_num(flight.up, nan=0.0)])
     velocity = flight.columns["velocity"].copy()
-    missing = ~np.isfinite(velocity).all(axis=1)
-    if missing.any() and count > 1:
-        velocity[missing] = np.gradient(position, flight.time, axis=0)[missing]
+    is_missing = ~np.isfinite(velocity).all(axis=1)
+    if is_missing.any() and count > 1:
+        velocity[is_missing] = np.gradient(position, flight.time, axis=0)[is_missing]
     wind = np.column_stack([flight.columns["wind"], np.where(np.isfinite(flight.columns["wind"][:, 0]), 0.0, math.nan)])
     controls = np.full((count, 4), math.nan)
     controls[:, THROTTLE] = flight.columns["throttle"][:, 0]
     current, energy = flight.columns["battery"].T
     known_energy = energy[np.isfinite(energy)]
-    none = np.full(count, math.nan)
+    unknown = np.full(count, math.nan)
     return Track(
         time=flight.time,
         position=position,
@@ -444,12 +480,12 @@ def make_track(flight: LoggedFlight, origin: GeoOrigin) -> Track:
         controls=controls,
         commands=np.full((count, 4), math.nan),
         wind=wind,
-        load_factor=none,
+        load_factor=unknown,
         current=current,
         energy=energy - known_energy[0] if known_energy.size else energy,
         leg=np.zeros(count, dtype=np.int32),
-        cross_track=none,
-        height_error=none,
-        speed_command=none,
-        clearance=none,
+        cross_track=unknown,
+        height_error=unknown,
+        speed_command=unknown,
+        clearance=unknown,
     )

@@ -1,4 +1,4 @@
-"""Content common to several log formats: missions, and ArduPlane and PX4 flight modes."""
+"""Read content that is common to several log formats: missions, and the flight modes of ArduPlane and PX4."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -9,13 +9,14 @@ from flight.simulation.setup import MissingItems
 from logs.importers.raw_log import LoggedMission
 
 # ----------------------------------------------------------------------
-# Missions from logged items: logged one by one, as whole missions repeatedly, and as items that are flown.
+# Missions from logged items, which may be logged one by one, as whole missions repeatedly, or when they are flown.
 
 
 class LoggedItem(NamedTuple):
-    """Item as logged.
+    """Mission item as logged.
 
-    time: s.  total: number of items of its mission; 0 if not logged.
+    time: time at which the item was logged, s.
+    total: number of items of the mission; 0 if not logged.
     begins_mission: True if the log shows that a new mission begins with this item.
     """
 
@@ -26,9 +27,11 @@ class LoggedItem(NamedTuple):
 
 
 class LoggedItems(NamedTuple):
-    """Items of a mission, by rising number, the time from which they apply (s), and announced number.
+    """Logged items of one mission.
 
-    total: 0 if not logged.
+    time: time from which they apply, s.
+    total: announced number of items; 0 if not logged.
+    items: the items, by increasing number.
     """
 
     time: float
@@ -39,9 +42,9 @@ class LoggedItems(NamedTuple):
 def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItems]:
     """Combine items, in the order of the log, into missions.
 
-    An item 0 begins a new mission, even if later items are lost.  A single item that repeats an item of the mission is
-    the item being flown; one that differs is an edit, which begins a changed mission.  A mission that is logged twice,
-    each time in part, is one mission.
+    An item 0 begins a new mission, even if later items are lost.  A single item that equals an item of the mission is
+    logged because it is flown; a single item that differs is an edit, which begins a changed mission.  A mission that
+    is logged twice, each time in part, is one mission.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> logged = [*(LoggedItem(1.0, 3, item) for item in way), LoggedItem(9.0, 3, way[1])]
@@ -66,28 +69,36 @@ def combine_items(rows: Iterable[LoggedItem]) -> list[LoggedItems]:
         if len(totals) < len(missions):
             totals.append(0)
         totals[-1] = total or totals[-1]
-    out: list[LoggedItems] = []
+    combined: list[LoggedItems] = []
     for (start, items), total in zip(missions, totals, strict=True):
         logged = LoggedItems(start, total, tuple(items[seq] for seq in sorted(items)))
-        if out and _is_same_mission(out[-1], logged):
-            merged = {item.seq: item for item in (*out[-1].items, *logged.items)}
-            out[-1] = LoggedItems(out[-1].time, total or out[-1].total, tuple(merged[seq] for seq in sorted(merged)))
+        if combined and _is_same_mission(combined[-1], logged):
+            previous = combined[-1]
+            merged = {item.seq: item for item in (*previous.items, *logged.items)}
+            combined[-1] = LoggedItems(
+                previous.time, total or previous.total, tuple(merged[seq] for seq in sorted(merged))
+            )
         else:
-            out.append(logged)
-    return out
+            combined.append(logged)
+    return combined
 
 
 def _begins_mission(following: MissionItem | None, items: Mapping[int, MissionItem]) -> bool:
-    """Return True if the item after an item 0 shows a new mission: it is item 1, or unknown, or changed."""
+    """Return True if the item that follows an item 0 shows a new mission.
+
+    It does if it is item 1, or if it is not in the mission or differs from the mission's item.
+
+    items: items of the mission so far, by number.
+    """
     if following is None or following.seq == 0:
         return False
     return following.seq == 1 or following.seq not in items or not _is_same_item(items[following.seq], following)
 
 
 def _is_same_mission(first: LoggedItems, second: LoggedItems) -> bool:
-    """Return True if two missions are the same: all items, or the announced number and common items, are equal.
+    """Return True if two missions are the same: all items are equal, or the announced number and all common items are.
 
-    Home, item 0, is the same in all missions flown from a place, so a common home is no evidence.
+    A common item 0, which is home, is not evidence, because it is the same in all missions flown from a place.
     """
     first_items = {item.seq: item for item in first.items}
     common = [item for item in second.items if item.seq in first_items]
@@ -97,19 +108,22 @@ def _is_same_mission(first: LoggedItems, second: LoggedItems) -> bool:
 
 
 def _is_same_item(first: MissionItem, second: MissionItem) -> bool:
+    """Return True if two items have the same number, command, parameters and position, regardless of their frames."""
     return _content(first) == _content(second)
 
 
 def _content(item: MissionItem) -> tuple[object, ...]:
-    # Compare as text, because an unset number is NaN, which equals nothing.
+    """Return the content by which items are compared; numbers are texts, because an unset number is NaN."""
     return item.seq, item.command, repr((item.params, item.lat_deg, item.lon_deg, item.alt))
 
 
 def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMission | None:
-    """Make the mission of logged items, with item 0 as home; None if fewer than two other items remain.
+    """Make the mission of logged items, with item 0 as home; return None if fewer than two other items remain.
 
     An invalid item is left out with a warning.  If items are missing, the mission is the longest run without a gap.
-    source: name of the log.  origin: messages that hold the items, for people.
+
+    source: name of the log.
+    origin: name of the log messages with the items.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> made = logged_mission(LoggedItems(1.0, 5, tuple(way)), "a.BIN", "CMD").mission
@@ -133,7 +147,7 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
             items.append(item)
     if logged.total and not any(item.seq == 0 for item in logged.items):
         warnings.append(f"item 0, which is home, of {logged.total} is not in the log")
-    # Both mission files keep number 0 for home.
+    # Number 0 is reserved for home in mission files.
     shift = 1 if items and items[0].seq == 0 else 0
     end = max(logged.total - 1, logged.items[-1].seq) + shift
     mission = Mission(home, with_shifted_numbers(items, shift), warnings=tuple(warnings), source=f"{source}: {origin}")
@@ -141,9 +155,10 @@ def logged_mission(logged: LoggedItems, source: str, origin: str) -> LoggedMissi
 
 
 def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
-    """Renumber the items of PX4, which counts from 0, from 1.
+    """Renumber items of PX4, which counts from 0, so that they count from 1.
 
-    A vertical take-off becomes a take-off: PX4 flies to the position of either (docs.px4.io, "Mission Mode (VTOL)").
+    A vertical take-off becomes a take-off, because PX4 flies to the position of both in the same way (docs.px4.io,
+    "Mission Mode (VTOL)").
 
     >>> [(item.seq, item.command) for item in px4_items([MissionItem(0, 84, 0, (0.0,) * 4, 46.0, 8.0, 75.0)])]
     [(1, 22)]
@@ -154,10 +169,12 @@ def px4_items(items: Iterable[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission | None:
-    """Return a mission numbered from 1 if it is whole, or with its longest run of items without a gap.
+    """Return a complete mission unchanged, and an incomplete one with only its longest run of items without a gap.
 
-    total: announced number of items, 0 if not known.  end: largest known number of an item.
-    Return None for a complete mission of fewer than two items; an incomplete mission may be left without any item.
+    total: announced number of items, 0 if unknown.
+    end: largest known number of an item; items are numbered from 1.
+
+    Return None for a complete mission of fewer than two items; an incomplete mission may have no items left.
     """
     numbers = {item.seq for item in logged.mission.items}
     missing = tuple(sorted(set(range(1, end + 1)) - numbers))
@@ -170,7 +187,10 @@ def without_gaps(logged: LoggedMission, total: int, end: int) -> LoggedMission |
 
 
 def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """Return the longest run of successive items, cut before a jump out of the run; the first of equally long runs."""
+    """Return the longest run of consecutively numbered items, cut before a jump out of the run.
+
+    Of equally long runs, the first is returned.
+    """
     runs: list[list[MissionItem]] = [[]]
     for item in items:
         if runs[-1] and item.seq != runs[-1][-1].seq + 1:
@@ -180,11 +200,11 @@ def _longest_run(items: Sequence[MissionItem]) -> Sequence[MissionItem]:
 
 
 def _before_jump_out(run: Sequence[MissionItem]) -> Sequence[MissionItem]:
-    """Return the items of a run before the first jump to an item outside it."""
+    """Return the items of a run before the first jump to an item outside the run."""
     indices = {float(item.seq): k for k, item in enumerate(run)}
     end = len(run)
     jumps = [(indices.get(item.params[0], end), k) for k, item in enumerate(run) if item.command == Command.DO_JUMP]
-    # The farthest targets first: items cut off by one jump may be the targets of the next.
+    # The farthest targets come first, because items that one jump cuts off may be the targets of another jump.
     for target, k in sorted(jumps, reverse=True):
         if target >= end:
             end = min(end, k)
@@ -251,7 +271,7 @@ _PX4_SUB = {2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "LAND", 7: "RT
 
 
 def plane_mode(number: int) -> tuple[str, bool]:
-    """Return ArduPlane's name of a mode, and whether it follows the mission.
+    """Return ArduPlane's name of a flight mode, and True if the mode follows the mission.
 
     >>> plane_mode(10), plane_mode(5)
     (('AUTO', True), ('FBWA', False))
@@ -260,7 +280,7 @@ def plane_mode(number: int) -> tuple[str, bool]:
 
 
 def px4_state(number: int) -> tuple[str, bool]:
-    """Return PX4's name of a navigation state, and whether it follows the mission.
+    """Return PX4's name of a navigation state, and True if the state follows the mission.
 
     >>> px4_state(3), px4_state(5)
     (('MISSION', True), ('RTL', False))
@@ -269,7 +289,7 @@ def px4_state(number: int) -> tuple[str, bool]:
 
 
 def px4_mode(custom_mode: int) -> tuple[str, bool]:
-    """Return PX4's name of the mode in a heartbeat, and whether it follows the mission.
+    """Return PX4's name of the mode in a heartbeat, and True if the mode follows the mission.
 
     >>> px4_mode(4 << 24 | 4 << 16)
     ('MISSION', True)

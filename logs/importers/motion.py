@@ -1,7 +1,7 @@
-"""Motion of an aircraft in a log, unthinned: inertial sensors, servos, attitude, air data, battery.
+"""Define the motion of an aircraft in a log at full rate: inertial sensors, servos, attitude, air data, battery.
 
-`logs.importers.raw_log` holds the vehicle's positions, for a verdict; this module holds the data that identify a model
-of the aircraft.  `logs.importers.motion_log` reads it from logs.
+`logs.importers.raw_log` defines the data for a verdict; this module defines the data for the identification of an
+aircraft's model.  `logs.importers.motion_log` reads them from logs.
 """
 
 from collections.abc import Mapping
@@ -15,13 +15,17 @@ from world.arrays import Floats
 
 # Number of servo outputs of `MotionLog.outputs`.
 OUTPUTS = 14
-# A vehicle that is slower than this stands on the ground, m/s.
+# Ground speed below which a vehicle stands on the ground, m/s.
 _STANDING_SPEED_MPS = 2.0
 
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """Rows of one kind: time (n,) s of the log's clock, rising; values (n, k)."""
+    """Rows of one kind.
+
+    time: increasing times on the log's clock, s, (n,).
+    values: (n, k).
+    """
 
     time: Floats
     values: Floats
@@ -36,21 +40,30 @@ class Samples:
 class MotionLog:
     """Motion in a log, in SI units and radians; data that are not logged have no rows.
 
-    source: the file.  sha256: SHA-256 of its bytes.  program: name of the program.  vehicle: kind of vehicle.
-    inertial: (n, 6) specific force forward, right, down, and p, q, r, of the first inertial sensor.
-    outputs: (n, 14) servo outputs, microseconds, the first in column 0.
-    attitude: (n, 3) roll, pitch, yaw.  velocity: (n, 3) north, east, down.  wind: (n, 2) north, east, as the air moves.
-    airspeed: (n, 1) equivalent, m/s, of a sensor that was in use.  ratio: (n, 1) of true to equivalent airspeed.
-    height: (n, 1) m AMSL.  battery: (n, 2) V and A.
-    modes: time and number of the flight mode.  parameters: by name, the last value of each.
+    source: path of the file.
+    sha256: SHA-256 of the file's bytes.
+    program: name of the program that flew.
+    vehicle: kind of vehicle.
+    inertial: specific force forward, right and down, and the angular rates p, q and r, of the first inertial sensor,
+        (n, 6).
+    outputs: pulses of the servo outputs, us, (n, 14); the first output is in column 0.
+    attitude: roll, pitch and yaw, (n, 3).
+    velocity: ground velocity to north, east and down, (n, 3).
+    wind: wind velocity to north and east, (n, 2).
+    airspeed: equivalent airspeed of a sensor that was in use, (n, 1).
+    ratio: ratio of true to equivalent airspeed, (n, 1).
+    height: altitude, m AMSL, (n, 1).
+    battery: voltage, V, and current, A, (n, 2).
+    modes: time and number of each flight mode.
+    parameters: last value of each parameter, by name.
+    home: latitude and longitude, deg, and altitude, m AMSL, of the vehicle's last home (ORGN) or of its first position
+        on the ground; None if neither is logged.
     program_kind: kind of program that wrote the log.
-    controls: (n, 4) pitch up, roll and yaw to the right as fractions of full travel, and throttle (0..1), of a log that
-        has them instead of pulses.
+    controls: pitch up, roll and yaw to the right as fractions of full travel, and throttle (0..1), (n, 4), in a log
+        that has them instead of pulses.
     angles: True for each of the first three controls that is a deflection, rad, instead of a fraction.
-    elevons: true if the controls are made by elevons.
-    hovering: periods on lifting motors (s) that the log itself names.
-    home: latitude and longitude, degrees, and m AMSL: the last home of the vehicle (ORGN), or its first position on the
-        ground; None if neither is logged.
+    elevons: True if elevons make the controls.
+    hovering: start and end of each period on lifting motors that the log itself names, s.
     """
 
     source: str
@@ -82,9 +95,12 @@ class MotionLog:
 
 
 def first_ground_position(position: Samples, velocity: Samples) -> tuple[float, float, float] | None:
-    """Return the first position at which a vehicle stood still; None for a log that begins in flight.
+    """Return the first position at which a vehicle stood still; None if it never did.
 
-    position: (n, 3) latitude, longitude (degrees) and height (m).  velocity: (n, 3) m/s.
+    position: latitude and longitude (deg) and altitude (m), (n, 3).
+    velocity: ground velocity, m/s, (n, 3).
+
+    Returns latitude, longitude and altitude.
 
     >>> place = Samples(np.array([1.0, 2.0]), np.array([[48.0, 11.0, 520.0], [48.0, 11.001, 540.0]]))
     >>> first_ground_position(place, Samples(np.array([0.0, 3.0]), np.zeros((2, 3))))
@@ -92,21 +108,21 @@ def first_ground_position(position: Samples, velocity: Samples) -> tuple[float, 
     """
     if not len(position.time) or not len(velocity.time):
         return None
-    time, place = position.time, position.values
+    time, coordinates = position.time, position.values
     speed = np.interp(time, velocity.time, np.linalg.norm(velocity.values, axis=1), left=np.inf, right=np.inf)
-    is_valid = (np.abs(place[:, :2]) <= [90.0, 180.0]).all(axis=1) & (place[:, :2] != 0.0).any(axis=1)
-    standing = np.flatnonzero(is_valid & (speed < _STANDING_SPEED_MPS))
-    if not len(standing):
+    is_valid = (np.abs(coordinates[:, :2]) <= [90.0, 180.0]).all(axis=1) & (coordinates[:, :2] != 0.0).any(axis=1)
+    standing_rows = np.flatnonzero(is_valid & (speed < _STANDING_SPEED_MPS))
+    if not len(standing_rows):
         return None
-    lat, lon, height = place[standing[0]].tolist()
+    lat, lon, height = coordinates[standing_rows[0]].tolist()
     return lat, lon, height
 
 
 def sort_samples(time: Floats, values: Floats) -> Samples:
-    """Sort rows by time; leave out repeated times and rows with values that are not finite."""
+    """Return rows sorted by time, without rows of a repeated time or with values that are not finite."""
     is_finite = np.isfinite(time) & np.isfinite(values).all(axis=1)
     time, values = time[is_finite], values[is_finite]
     order = np.argsort(time, kind="stable")
     time, values = time[order], values[order]
-    keep = np.concatenate([[True], np.diff(time) > 0.0]) if len(time) else np.zeros(0, np.bool_)
-    return Samples(time[keep], values[keep])
+    is_new = np.concatenate([[True], np.diff(time) > 0.0]) if len(time) else np.zeros(0, np.bool_)
+    return Samples(time[is_new], values[is_new])

@@ -1,4 +1,4 @@
-"""Formats of flight logs of other programs: detect the format of a file, and find its reader."""
+"""Detect the format of another program's flight log, and read it with the format's reader."""
 
 import re
 from collections.abc import Callable
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 class LogFormat(NamedTuple):
     """Format of a log.
 
-    name: for messages.
-    suffixes: of its files, in lower case.
-    content: regular expression for the first bytes of such a file.
-    reader: module and function, which takes a path, returns a `RawLog` and raises LogError; imported when needed,
-    because each needs another library.
-    extra: the extra that contains the library; "" for none.
+    name: name for messages.
+    suffixes: suffixes of the format's files, in lower case.
+    content: regular expression for the first bytes of a file.
+    reader: module and function of the reader, which takes a path, returns a `RawLog` and raises LogError; it is
+    imported when needed, because each reader needs another library.
+    extra: planfly extra with the reader's library; "" if no extra is needed.
     """
 
     name: str
@@ -35,7 +35,7 @@ class LogFormat(NamedTuple):
     extra: str = ""
 
 
-# All formats; if the first bytes of a file fit several, its suffix decides, and then this order.
+# All formats.  If the first bytes of a file fit several formats, the suffix decides, and then this order.
 FORMATS = (
     LogFormat("PX4 .ulg", (".ulg",), rb"\AULog\x01\x12\x35", "px4_log.read_px4", "px4-logs"),
     LogFormat("ArduPilot .BIN", (".bin",), rb"\xa3\x95", "dataflash_log.read_dataflash"),
@@ -53,9 +53,9 @@ FORMATS = (
     LogFormat(".kml or .kmz", (".kml", ".kmz"), rb"<kml|\APK\x03\x04", "track_files.read_kml"),
 )
 SUFFIXES = tuple(suffix for known in FORMATS for suffix in known.suffixes)
-# Content of a dataflash log as text, which is refused.
+# First bytes of a dataflash log that was converted to text, which is refused.
 _AS_TEXT = rb"\A\s*FMT, ?128,"
-# Suffix of such files.
+# Suffix of a dataflash log as text.
 _TEXT_SUFFIX = ".log"
 # Largest log; a day of a vehicle that logs everything takes less.
 MAX_BYTES = 2 * 2**30
@@ -63,7 +63,7 @@ _HEAD = 512
 
 
 def is_imported_log(path: Path) -> bool:
-    """Return True if a file is a log of another program, by its suffix.
+    """Return True if a file has the suffix of another program's log.
 
     >>> is_imported_log(Path("00000042.BIN")), is_imported_log(Path("flight.mcap"))
     (True, False)
@@ -77,7 +77,7 @@ def _suffix(path: Path) -> str:
 
 
 def open_log(path: Path) -> "RawLog":
-    """Read a log.  Raises LogError, in one line, for other files and for logs without places and times.
+    """Read a log of another program.  Raises LogError for other files, and for logs without positions and times.
 
     >>> open_log(Path("nothing.BIN"))  # doctest: +ELLIPSIS
     Traceback (most recent call last):

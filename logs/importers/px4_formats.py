@@ -1,7 +1,8 @@
-"""Count the fields in the message formats of a PX4 log, before pyulog makes them.
+"""Count the fields in the message formats of a PX4 log, before pyulog creates them.
 
-A format may contain others, and arrays of them (PX4, "ULog File Format", Message Format): forty that contain the next
-one twice are a kilobyte and 2^40 fields.  pyulog makes every field of a topic when the log declares the topic.
+A format may contain other formats, and arrays of them (PX4, "ULog File Format", Message Format): forty formats of which
+each contains the next one twice take a kilobyte and define 2^40 fields.  pyulog creates every field of a topic when the
+log declares the topic.
 """
 
 import re
@@ -9,7 +10,7 @@ from collections.abc import Iterator
 
 from world.errors import LogError
 
-# Greatest number of fields of all topics of a log; PX4 itself has about 30,000.
+# Largest number of fields in all topics of a log; PX4 itself has about 30,000.
 MAX_FIELDS = 300_000
 _FIELD = re.compile(r"(\w+)(?:\[(\d{1,9})\])? ")
 _PLAIN = frozenset(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)) | {
@@ -21,9 +22,9 @@ _PLAIN = frozenset(f"{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16
 
 
 class MessageFormats:
-    """Formats of a log up to the present record, and the number of fields of its topics.
+    """Formats of a log up to the current record, and the number of fields in its topics.
 
-    source: names the log in messages.
+    source: name of the log for messages.
     """
 
     def __init__(self, source: str) -> None:
@@ -33,7 +34,7 @@ class MessageFormats:
         self._total = 0
 
     def add_format(self, text: str) -> None:
-        """Add a format: its name, a colon, and its fields.
+        """Add a format, given as its name, a colon and its fields.
 
         >>> formats = MessageFormats("a.ulg")
         >>> formats.add_format("wind:uint64_t timestamp;float[3] wind;")
@@ -45,26 +46,26 @@ class MessageFormats:
         self._counts.clear()
 
     def add_topic(self, name: str) -> None:
-        """Add a topic of this format.  Raises LogError for more fields than a log may have."""
+        """Add a topic with the format of this name.  Raises LogError if the log then has too many fields."""
         self._total += self.count_fields(name)
         if self._total > MAX_FIELDS:
             reason = f"the formats of its messages have more than {MAX_FIELDS:,} fields"
             raise LogError(f"{self._source}: not a readable PX4 log: {reason}", file=self._source)
 
     def count_fields(self, name: str) -> int:
-        """Return the number of fields of a format, including nested ones; more than `MAX_FIELDS` if recursive."""
+        """Return the number of fields of a format, including nested formats; above `MAX_FIELDS` if it is recursive."""
         return self._count(name, frozenset())
 
-    def _count(self, name: str, within: frozenset[str]) -> int:
-        """Return the number of fields of a format that is nested in the formats ``within``."""
+    def _count(self, name: str, outer_names: frozenset[str]) -> int:
+        """Return the number of fields of a format that is nested in the formats ``outer_names``; 1 for a plain type."""
         if name in _PLAIN or name not in self._formats:
             return 1
-        if name in within:
+        if name in outer_names:
             return MAX_FIELDS + 1
         if name not in self._counts:
-            inside, total = within | {name}, 0
+            names, total = outer_names | {name}, 0
             for kind, number in self._formats[name]:
-                total += number * self._count(kind, inside)
+                total += number * self._count(kind, names)
                 if total > MAX_FIELDS:
                     break
             self._counts[name] = total
@@ -72,7 +73,7 @@ class MessageFormats:
 
 
 def _types(fields: str) -> Iterator[tuple[str, int]]:
-    """Yield type and number of each field; for an array its length."""
+    """Yield the type of each field, and its number of elements: 1, or the length of an array."""
     for field in fields.split(";"):
         if match := _FIELD.match(field):
             yield match[1], int(match[2] or 1)

@@ -1,7 +1,7 @@
-"""PX4's logs (`.ulg`): positions, measurements and commands of the vehicle.
+"""Read PX4's logs (`.ulg`): positions, measurements and commands of the vehicle.
 
-pyulog reads the container; its damage is counted here, because pyulog only reports whether there is any.  Names of
-topics and fields follow PX4's message documentation, in older releases as documented then.
+pyulog reads the container; damage is counted here, because pyulog only reports whether there is any.  Names of topics
+and fields follow PX4's message documentation of the current release and of older releases.
 """
 
 import contextlib
@@ -37,10 +37,10 @@ from world.kernels import compiled, read_only
 FORMAT = "PX4 log"
 # Bytes before the first record.
 _HEADER = 16
-# Letters of all records (PX4, "ULog File Format").
+# Letters of all kinds of records (PX4, "ULog File Format").
 _LETTERS = b"BFIMPQARDLCSO"
-# Topics of the wind, the first with rows is read: of the state estimator, of the airspeed selector (PX4 1.12 and 1.13
-# log only this one), and of releases before 1.12.
+# Topics with the wind, of which the first with rows is read: from the state estimator, from the airspeed selector (the
+# only one in logs of PX4 1.12 and 1.13), and of releases before 1.12.
 WIND_TOPICS = ("wind", "airspeed_wind", "wind_estimate")
 # Current that marks a sample without a measurement, A (battery_status.msg).
 CURRENT_NOT_MEASURED_A = -1.0
@@ -66,21 +66,21 @@ _TOPICS = [
 _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
 _AMSL = 0
 _OVER_HOME = 3
-# Limits of degrees and m beyond which a home is invalid; each is checked again where the mission is placed.
-_PLACE = np.array([90.0, 180.0, 10_000.0])
+# Largest absolute latitude and longitude, deg, and altitude, m, of a valid home.
+_HOME_LIMITS = np.array([90.0, 180.0, 10_000.0])
 # Numbers of items are 16 bits.
 _MAX_ITEMS = 65_535
 
 
 def read_px4(path: Path) -> RawLog:
-    """Read a log.  Raises LogError for one that pyulog cannot read, and one without vehicle_global_position."""
+    """Read a PX4 log.  Raises LogError for a log that pyulog cannot read, and for a log without positions."""
     return open_topics(path, _TOPICS).log()
 
 
 def open_topics(path: Path, names: list[str]) -> "Topics":
-    """Read the named topics of a log.  Raises LogError, in one line, for a file that pyulog cannot read."""
+    """Read the named topics of a log.  Raises LogError for a file that pyulog cannot read."""
     try:
-        # pyulog reports errors on the terminal.
+        # pyulog prints errors on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
             log = ULog(_CountingFile(file, str(path)), names, disable_str_exceptions=True)
     except (AddressSpaceError, LogError):
@@ -93,10 +93,11 @@ def open_topics(path: Path, names: list[str]) -> "Topics":
 
 
 class _CountingFile:
-    """File for pyulog that counts formats, and steps back after a short read only by the bytes that were read.
+    """File for pyulog that checks the formats, and that corrects pyulog's backward seeks after short reads.
 
-    pyulog steps back by the claimed length of a record, and would read the end of a damaged file again and again; it
-    reads a record's three bytes of length and letter, and then its content.
+    pyulog steps back by the stated length of a record even if fewer bytes were read, and would read the end of a
+    damaged file again and again; this file steps back only by the bytes that were read.  pyulog first reads the three
+    bytes of a record's length and letter, and then its content.
     """
 
     def __init__(self, file: BinaryIO, source: str) -> None:
@@ -104,17 +105,19 @@ class _CountingFile:
         self._formats = MessageFormats(source)
 
     def read(self, size: int) -> bytes:
+        """Read bytes, and check the contents of records with formats and topics."""
         data = self._file.read(size)
         self._missing = size - len(data)
         if self._letter == b"F":
             self._formats.add_format(data.decode("utf-8", "replace"))
         elif self._letter == b"A":
-            # After the topic's instance and number.
+            # The name follows the topic's instance and number.
             self._formats.add_topic(data[3:].decode("utf-8", "replace"))
         self._letter = data[2:] if size == 3 and not self._letter else b""
         return data
 
     def seek(self, offset: int, whence: int = 0) -> int:
+        """Change the position; a relative seek is corrected by the bytes that the last read lacked."""
         missing = self._missing if whence == 1 else 0
         self._missing = 0
         return self._file.seek(offset + missing, whence)
@@ -127,7 +130,9 @@ class _CountingFile:
 
 
 def find_damage(data: Bytes, release_memory: Callable[[], None] = lambda: None) -> Damage:
-    """Find the damage of a log (n,) of bytes, whose records follow each other, with length and known letter.
+    """Find the damage of a log: bytes at which no record with a known letter begins, and a cut last record.
+
+    data: bytes of the log, (n,).
 
     >>> find_damage(np.zeros(20, np.uint8)).places
     1
@@ -145,21 +150,25 @@ def _damage_of(path: Path) -> Damage:
     return find_damage(file.data, file.release_memory)
 
 
-# Indices into the state of a walk: the next byte,
+# Indices of the state of a walk over records.
+# Next byte.
 _NEXT_BYTE = 0
-# the number of places where no record begins,
+# Number of damaged places, where no record begins.
 _DAMAGED_PLACES = 1
-# the number of bytes there,
+# Number of bytes in damaged places.
 _LOST_BYTES = 2
-# 1 while records follow each other,
+# 1 while records follow each other, 0 in a damaged place.
 _IS_READING = 3
-# and 1 if the last record is cut.
+# 1 if the last record is cut.
 _IS_CUT = 4
 
 
 @compiled
 def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
-    """Walk over records up to byte ``stop``, continuing from and updating ``state``."""
+    """Walk over the records up to byte ``stop``: continue from ``state``, and update it.
+
+    letters: letters of all kinds of records.
+    """
     is_known_letter = np.zeros(256, np.bool_)
     for letter in letters:
         is_known_letter[letter] = True
@@ -174,7 +183,7 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
         length = data[k] + 256 * data[k + 1]
         after = k + 3 + length
         if is_known_letter[data[k + 2]] and after > data.size:
-            # A cut record: nothing can follow it.
+            # Nothing can follow a cut record.
             cut = 1
             break
         follows = after + 3 > data.size or is_known_letter[data[after + 2]]
@@ -196,11 +205,12 @@ def _walk_records(data: Bytes, stop: int, state: Ints, letters: Bytes) -> None:
 
 
 def _one_line(error: Exception) -> str:
+    """Return the first 120 characters of an error's message in one line, or the name of its type."""
     return " ".join(str(error).split())[:120] or type(error).__name__
 
 
 def _table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]]) -> LogSeries | None:
-    """Return the first choice of fields that one instance of a topic has."""
+    """Return the first choice of fields that one instance of a topic has, as columns; None if it has none."""
     for columns in choices:
         if data and all(column in data for column in columns):
             values = np.stack([np.asarray(data[column], dtype=np.float64) for column in columns], axis=1)
@@ -209,7 +219,7 @@ def _table(topic: str, data: dict[str, Any], choices: Iterable[tuple[str, ...]])
 
 
 class Topics:
-    """Topics of one log: the first instance of each, but all instances of batteries, which are added up."""
+    """Topics of one log: the first instance of each, but all instances of batteries, whose currents are added up."""
 
     def __init__(self, log: ULog, source: str, damage: Damage) -> None:
         self._log, self._source, self._damage = log, source, damage
@@ -220,8 +230,8 @@ class Topics:
         self._data = {name: instances[0] for name, instances in self._instances.items()}
 
     def log(self) -> RawLog:
-        """Return everything that a verdict needs.  Raises LogError for a log without positions."""
-        series = {name: found for name, found in self._series() if found is not None and len(found.time)}
+        """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
+        series = {name: values for name, values in self._series() if values is not None and len(values.time)}
         if "position" not in series:
             raise LogError(f"{self._source}: no vehicle_global_position: nothing says where it flew", file=self._source)
         return RawLog(
@@ -246,12 +256,13 @@ class Topics:
         return self._source
 
     def table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
-        """Return the first choice of fields that a topic has."""
+        """Return the first choice of fields that a topic has, as columns; None if it has none."""
         return _table(topic, self._data.get(topic, {}), choices)
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
-        place = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
-        yield "position", place if place is not None else self._gps()
+        """Yield the name and the values of each series of a `RawLog`; None for a series that the log lacks."""
+        position = self.table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
+        yield "position", position if position is not None else self._gps()
         yield "velocity", self._velocity()
         yield "attitude", self.attitude()
         yield "airspeed", self._airspeed()
@@ -261,6 +272,7 @@ class Topics:
         yield "throttle", self.table("actuator_controls_0", ("control[3]",))
 
     def _gps(self) -> LogSeries | None:
+        """Return the positions of GPS: latitude, longitude (deg) and altitude (m AMSL), (n, 3); None if not logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             position = self.table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
             if position is not None:
@@ -273,6 +285,7 @@ class Topics:
         return None
 
     def _velocity(self) -> LogSeries | None:
+        """Return the ground velocity to east, north and up, m/s, (n, 3); None if not logged."""
         velocity = self.table("vehicle_local_position", ("vy", "vx", "vz"))
         if velocity is None:
             velocity = self.table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
@@ -281,7 +294,7 @@ class Topics:
         return LogSeries(velocity.source, velocity.time, velocity.values * np.array([1.0, 1.0, -1.0]))
 
     def attitude(self) -> LogSeries | None:
-        """Return roll, pitch and yaw (n, 3), rad; None if not logged."""
+        """Return roll, pitch and yaw, rad, (n, 3); None if not logged."""
         quaternions = self.table("vehicle_attitude", ("q[0]", "q[1]", "q[2]", "q[3]"))
         if quaternions is None:
             return self.table("vehicle_attitude", ("roll", "pitch", "yaw"))
@@ -292,6 +305,7 @@ class Topics:
         return LogSeries(quaternions.source, quaternions.time, np.stack([roll, pitch, yaw], axis=1))
 
     def _airspeed(self) -> LogSeries | None:
+        """Return the true airspeed, m/s, (n, 1); None if not logged or always 0."""
         for topic in ("airspeed_validated", "airspeed"):
             airspeed = self.table(topic, ("true_airspeed_m_s",))
             if airspeed is not None:
@@ -303,19 +317,21 @@ class Topics:
     def battery(self) -> LogSeries | None:
         """Return the mean voltage, V, of all connected batteries, and the sum of their currents, A; (n, 2).
 
-        None for a log without batteries, or if the current of a connected battery was not measured.  A measurement of
-        another kind than that for the first battery (`source`), such as by motor controllers, repeats the same current.
+        Return None for a log without batteries, or if the current of a connected battery was not measured.  Only
+        measurements of the same kind (`source`) as for the first battery are used, because another kind, such as by
+        motor controllers, repeats the same current.
         """
-        chosen = []
+        connected_batteries = []
         for data in self._instances.get("battery_status", []):
             status = _table("battery_status", data, (("voltage_v", "current_a"),))
             if status is None or ("connected" in data and not np.any(data["connected"])):
                 continue
             kind = float(data["source"][0]) if "source" in data else 0.0
-            measured = np.isfinite(status.time) & np.isfinite(status.values).all(axis=1)
-            measured &= status.values[:, 1] != CURRENT_NOT_MEASURED_A
-            chosen.append((kind, LogSeries(status.source, status.time[measured], status.values[measured])))
-        batteries = [series for kind, series in chosen if kind == chosen[0][0]]
+            is_measured = np.isfinite(status.time) & np.isfinite(status.values).all(axis=1)
+            is_measured &= status.values[:, 1] != CURRENT_NOT_MEASURED_A
+            battery = LogSeries(status.source, status.time[is_measured], status.values[is_measured])
+            connected_batteries.append((kind, battery))
+        batteries = [series for kind, series in connected_batteries if kind == connected_batteries[0][0]]
         if not batteries or not all((series.values[:, 1] > 0.0).any() for series in batteries):
             return None
         first = batteries[0]
@@ -326,10 +342,12 @@ class Topics:
         return LogSeries(first.source, first.time, np.stack([volts.mean(axis=0), amps.sum(axis=0)], axis=1))
 
     def _battery(self) -> LogSeries | None:
+        """Return the current, A, and the energy used, Wh, (n, 2); None if the current is unknown."""
         battery = self.battery()
         return None if battery is None else with_used_energy(battery)
 
     def _heights(self) -> Iterable[HeightSource]:
+        """Yield the altitudes that the log has in addition to the altitude of the position."""
         gps = self._gps()
         if gps is not None and "vehicle_global_position" in self._data:
             yield HeightSource(f"{gps.source}.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
@@ -338,21 +356,22 @@ class Topics:
             yield HeightSource("vehicle_air_data.baro_alt_meter", "pressure", baro)
 
     def _modes(self) -> Iterable[ModeChange]:
+        """Yield the changes of the navigation state, the first state included."""
         data = self._data.get("vehicle_status", {})
         if "nav_state" not in data:
             return
-        last = -1
+        last_state = -1
         for time, state in zip(data["timestamp"].tolist(), data["nav_state"].tolist(), strict=True):
-            if state != last:
+            if state != last_state:
                 yield ModeChange(time * 1e-6, *px4_state(int(state)))
-                last = state
+                last_state = state
 
     def vehicle(self) -> VehicleKind:
         """Return the kind of vehicle; a VTOL is a plane."""
         data = self._data.get("vehicle_status", {})
         if "vehicle_type" in data:
             kinds = np.asarray(data["vehicle_type"])
-            # A VTOL is a copter at the ends of a flight.
+            # A VTOL is a copter at the beginning and the end of a flight.
             if (kinds == 2).any():
                 return "plane"
             return _TYPES.get(int(kinds[0]), "unknown")
@@ -361,7 +380,7 @@ class Topics:
         return "unknown"
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Yield the one mission, from items as they became current; mission_result identifies the others."""
+        """Yield the mission of the items that became current, if any; mission_result states the number of all items."""
         items = self._items()
         stamps = self._data.get("navigator_mission_item", {}).get("timestamp", [0.0])
         total = self._mission_length(float(stamps[-1]) if items else math.inf)
@@ -370,59 +389,57 @@ class Topics:
         flown_items = px4_items([items[seq] for seq in sorted(items)])
         mission = Mission(self.home(), flown_items, source=f"{self._source}: mission items")
         logged = LoggedMission(float(stamps[0]) * 1e-6, mission, "navigator_mission_item")
-        without_missing = without_gaps(logged, total, max([total, *(item.seq for item in flown_items[-1:])]))
-        if without_missing is not None:
-            yield without_missing
+        gapless_mission = without_gaps(logged, total, max([total, *(item.seq for item in flown_items[-1:])]))
+        if gapless_mission is not None:
+            yield gapless_mission
 
     def _items(self) -> dict[int, MissionItem]:
-        """Return the items by number, from 0; items that were never current are not in the log."""
+        """Return the valid items by their number from 0; items that were never current are not in the log."""
         data = self._data.get("navigator_mission_item", {})
         columns = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
         items: dict[int, MissionItem] = {}
         if not all(name in data for name in columns):
             return items
         count = len(data["timestamp"])
-        relative = data.get("altitude_is_relative", np.zeros(count))
+        is_relative = data.get("altitude_is_relative", np.zeros(count))
         radius = data.get("acceptance_radius", np.zeros(count))
         for k in range(count):
             number, command, lat, lon, up = (float(data[name][k]) for name in columns)
-            # Check before conversion: garbage may be too large for any degrees.
-            placed = abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)
-            if not (placed and 0.0 <= number < _MAX_ITEMS and math.isfinite(command)):
+            # Check before the conversion to int, because garbage may be too large.
+            has_position = abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)
+            if not (has_position and 0.0 <= number < _MAX_ITEMS and math.isfinite(command)):
                 continue
-            frame = _OVER_HOME if relative[k] else _AMSL
+            frame = _OVER_HOME if is_relative[k] else _AMSL
             params = (0.0, float(radius[k]), 0.0, 0.0)
-            place = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
-            item = MissionItem(int(number), int(command), frame, params, *place)
+            position = (round_to_grid(lat), round_to_grid(lon), round(up, 6))
+            item = MissionItem(int(number), int(command), frame, params, *position)
             if item_problem(item) is None:
                 items.setdefault(item.seq, item)
         return items
 
     def _mission_length(self, stamp: float) -> int:
-        """Return the number of items of the mission at a time (us of the log's clock); 0 if not logged."""
+        """Return the number of items of the mission at a time (on the log's clock, us); 0 if not logged."""
         data = self._data.get("mission_result", {})
         if "seq_total" not in data:
             return 0
-        before = np.flatnonzero(np.asarray(data["timestamp"], dtype=np.float64) <= stamp)
-        total = float(data["seq_total"][before[-1] if before.size else 0])
+        rows_before = np.flatnonzero(np.asarray(data["timestamp"], dtype=np.float64) <= stamp)
+        total = float(data["seq_total"][rows_before[-1] if rows_before.size else 0])
         return int(total) if 0.0 <= total <= _MAX_ITEMS else 0
 
     def home(self) -> Home | None:
-        """Return the last home; None if not logged."""
+        """Return the last valid home; None if not logged."""
         positions = self.table("home_position", ("lat", "lon", "alt"))
         if positions is None:
             return None
-        placed = positions.values[
-            np.isfinite(positions.values).all(axis=1) & (np.abs(positions.values) < _PLACE).all(axis=1)
+        homes = positions.values[
+            np.isfinite(positions.values).all(axis=1) & (np.abs(positions.values) < _HOME_LIMITS).all(axis=1)
         ]
         return (
-            Home(round_to_grid(placed[-1, 0]), round_to_grid(placed[-1, 1]), float(placed[-1, 2]))
-            if len(placed)
-            else None
+            Home(round_to_grid(homes[-1, 0]), round_to_grid(homes[-1, 1]), float(homes[-1, 2])) if len(homes) else None
         )
 
     def parameters(self) -> dict[str, float]:
-        """Return the parameters by name, with the last value of changed ones, without values that are no numbers."""
+        """Return the last value of each parameter by name, without values that are not finite numbers."""
         values = dict(self._log.initial_parameters)
         values |= {name: value for _, name, value in self._log.changed_parameters}
         # A damaged parameter may be a text.
@@ -430,7 +447,7 @@ class Topics:
         return {name: value for name, value in numbers.items() if math.isfinite(value)}
 
     def program(self) -> str:
-        """Return name and release of the program."""
+        """Return the name and the release of the program."""
         info = self._log.msg_info_dict
         name, release = str(info.get("sys_name", "PX4")), info.get("ver_sw_release")
         if isinstance(release, int):
@@ -438,6 +455,7 @@ class Topics:
         return name
 
     def _utc_start(self) -> float:
+        """Return the time 0 of the log's clock, s since 1970, by the first GPS time; NaN if not logged."""
         for topic in ("vehicle_gps_position", "sensor_gps"):
             data = self._data.get(topic, {})
             if "time_utc_usec" in data:

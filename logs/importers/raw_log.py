@@ -1,4 +1,4 @@
-"""Content of an imported log in SI units, common to all programs."""
+"""Define the content of an imported log in SI units, common to the logs of all programs."""
 
 import math
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ COLUMNS = {
     "throttle": ("share",),
     "height": ("up",),
 }
-# Longest time for which a sample of the current counts, s.
+# Longest time for which one sample of the current is used, s.
 _MAX_SAMPLE_TIME_S = 10.0
 
 
@@ -34,10 +34,10 @@ _MAX_SAMPLE_TIME_S = 10.0
 class LogSeries:
     """Rows of one kind in the order of the file.
 
-    source: name of the logged message, for people: "POS", "vehicle_global_position".
-    time: (n,) s on the log's clock, as written.
-    values: (n, k), a column for each name of `COLUMNS`: degrees for latitude and longitude, rad for attitude, m, m/s,
-    A and Wh for the rest.
+    source: name of the logged message, such as "POS" or "vehicle_global_position".
+    time: times on the log's clock, as in the file, s, (n,).
+    values: one column for each name in `COLUMNS`, (n, k): deg for latitude and longitude, rad for attitude, and m, m/s,
+    A and Wh for other quantities.
     """
 
     source: str
@@ -46,7 +46,9 @@ class LogSeries:
 
 
 def with_used_energy(battery: LogSeries) -> LogSeries:
-    """Return current, A, and used energy, Wh, (n, 2) from voltage, V, and current (n, 2).
+    """Return the current, A, and the energy used, Wh, (n, 2), computed from the battery's voltage and current.
+
+    battery: voltage, V, and current, A, (n, 2).
 
     >>> battery = LogSeries("BAT", np.array([0.0, 1.0, 2.0]), np.array([[36.0, 0.0], [36.0, 100.0], [36.0, 100.0]]))
     >>> with_used_energy(battery).values.tolist()
@@ -60,9 +62,11 @@ def with_used_energy(battery: LogSeries) -> LogSeries:
 
 @dataclass(frozen=True, slots=True)
 class HeightSource:
-    """One of several altitudes in a log.
+    """Altitudes from one of several sources in a log.
 
-    datum: vertical datum of the altitudes.  series: one column, m.
+    name: name of the source.
+    datum: vertical datum of the altitudes.
+    series: altitudes, m, (n, 1).
     """
 
     name: str
@@ -72,7 +76,11 @@ class HeightSource:
 
 @dataclass(frozen=True, slots=True)
 class ModeChange:
-    """Start of a flight mode.  time: s.  automatic: True if the vehicle follows its mission in this mode."""
+    """Start of a flight mode.
+
+    time: s.
+    automatic: True if the vehicle follows its mission in this mode.
+    """
 
     time: float
     name: str
@@ -81,12 +89,13 @@ class ModeChange:
 
 @dataclass(frozen=True, slots=True)
 class LoggedMission:
-    """Mission as the vehicle had it from a time (s) on.
+    """Mission that the vehicle had from a time on.
 
-    origin: messages that hold it, for people: "CMD", "MISSION_ITEM_INT", "declared task".
-    with_heights: True if its items state altitudes.
-    missing: items that the log does not hold; None for a complete mission.  The mission is then the longest run of
-    items without a gap, and may have fewer than two.
+    time: s.
+    origin: name of the log messages with the mission, such as "CMD", "MISSION_ITEM_INT" or "declared task".
+    with_heights: True if the items state altitudes.
+    missing: items that the log lacks; None for a complete mission.  An incomplete mission is the longest run of items
+    without a gap, and may have fewer than two items.
     """
 
     time: float
@@ -98,23 +107,24 @@ class LoggedMission:
 
 @dataclass(frozen=True, slots=True)
 class RawLog:
-    """Log as given by its reader; nothing is sorted or cleaned yet.
+    """Log as its reader returns it; nothing is sorted or cleaned yet.
 
-    format: name of the format, for people: "ArduPilot dataflash log".
+    source: path of the log.
+    format: name of the format, such as "ArduPilot dataflash log".
     program: name of the program in the log, "" if not logged.
     vehicle: kind of vehicle.
-    series: by the names of `COLUMNS` except "height"; a missing name is not in the log.
+    series: series by the names of `COLUMNS` except "height"; a name that is missing is not in the log.
     heights: altitudes other than the altitude of the position, for comparison.
     datum: vertical datum of the position's altitude.
-    modes: in order of the file; empty if not logged.
-    missions: in order of the file.
-    parameters: by name, the last value of each.
+    modes: mode changes in the order of the file; empty if not logged.
+    missions: missions in the order of the file.
+    parameters: last value of each parameter, by name.
     events: time (s) and text of the vehicle's messages.
-    clock: "boot" for seconds since the vehicle was switched on, "start" since the first row.
-    utc_start: s since 1970 at time 0 of the log's clock; NaN if not known.
+    clock: "boot" if the time counts from when the vehicle was switched on, "start" if it counts from the first row.
+    utc_start: time 0 of the log's clock, s since 1970; NaN if unknown.
     clock_jumps: times at which the log's clock went back permanently, s.
-    damage: parts that could not be read.
-    sha256: of the bytes of all files of a log that has several; "" for a log of one file.
+    damage: parts of the file that could not be read.
+    sha256: SHA-256 of the bytes of all files of a log with several files; "" for a log of one file.
     """
 
     source: str
@@ -136,7 +146,7 @@ class RawLog:
 
 
 # ----------------------------------------------------------------------
-# Synthetic log of a short flight, for examples and tests: along two legs at a right angle, in AUTO.
+# Synthetic log of a short flight in AUTO along two legs at a right angle, for examples and tests.
 
 # Airspeed of the example, m/s.
 EXAMPLE_SPEED_MPS = 25.0
@@ -153,21 +163,24 @@ EXAMPLE_TAIL_S = 2.0
 
 
 def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALTITUDE_M) -> RawLog:
-    """Make a log of a flight 1 km north and 1 km east of a place (degrees, m AMSL), with a sharp corner.
+    """Make a log of a flight that leads 1 km north and then 1 km east, with a sharp corner.
+
+    lat, lon, up: start of the flight, deg and m AMSL.
 
     >>> log = example_raw_log()
     >>> log.program, log.modes[0].name, len(log.missions[0].mission.items)
     ('ArduPlane V4.5.0', 'AUTO', 3)
     """
     time = np.arange(0.0, EXAMPLE_LEAD_S + 2.0 * EXAMPLE_LEG_M / EXAMPLE_SPEED_MPS + EXAMPLE_TAIL_S, EXAMPLE_STEP_S)
-    run = EXAMPLE_SPEED_MPS * (time - EXAMPLE_LEAD_S)
-    north, east = np.minimum(run, EXAMPLE_LEG_M), np.maximum(run - EXAMPLE_LEG_M, 0.0)
+    distance_run = EXAMPLE_SPEED_MPS * (time - EXAMPLE_LEAD_S)
+    north, east = np.minimum(distance_run, EXAMPLE_LEG_M), np.maximum(distance_run - EXAMPLE_LEG_M, 0.0)
     lats, lons = to_geo(GeoOrigin(lat, lon), east, north)
-    course = np.where(run < EXAMPLE_LEG_M, 0.0, 0.5 * math.pi)
-    level, boot = np.zeros(time.size), time + 20.0
+    course = np.where(distance_run < EXAMPLE_LEG_M, 0.0, 0.5 * math.pi)
+    zeros, boot_time = np.zeros(time.size), time + 20.0
 
     def series(name: str, *columns: np.ndarray) -> LogSeries:
-        return LogSeries(name, boot, np.column_stack(columns))
+        """Return a series of columns at all times of the flight."""
+        return LogSeries(name, boot_time, np.column_stack(columns))
 
     ends = [
         to_geo(GeoOrigin(lat, lon), *place)
@@ -193,11 +206,11 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
         vehicle="plane",
         series={
             "position": series("POS", lats, lons, height),
-            "velocity": series("XKF1", EXAMPLE_SPEED_MPS * np.sin(course), EXAMPLE_SPEED_MPS * np.cos(course), level),
-            "attitude": series("ATT", level, level + 0.05, course),
-            "airspeed": series("ARSP", level + EXAMPLE_SPEED_MPS),
-            "wind": series("XKF2", level, level - 3.0),
-            "throttle": series("CTUN", level + 0.6),
+            "velocity": series("XKF1", EXAMPLE_SPEED_MPS * np.sin(course), EXAMPLE_SPEED_MPS * np.cos(course), zeros),
+            "attitude": series("ATT", zeros, zeros + 0.05, course),
+            "airspeed": series("ARSP", zeros + EXAMPLE_SPEED_MPS),
+            "wind": series("XKF2", zeros, zeros - 3.0),
+            "throttle": series("CTUN", zeros + 0.6),
         },
         heights=(HeightSource("GPS.Alt", "amsl", series("GPS", height + 0.5)),),
         datum="amsl",

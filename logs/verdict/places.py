@@ -1,4 +1,4 @@
-"""Define places of findings, changes of a plan, and the three levels of a verdict, as data."""
+"""Define the places of findings, changes of a plan, and the three levels of a verdict, as data."""
 
 from dataclasses import dataclass, field
 from typing import Literal
@@ -14,11 +14,14 @@ from world.json_schema import DocumentConfig
 # and "inclusion" are zones of airspace.
 PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"]
 
-# Quantity of a change.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", the largest
-# "turn".  By a step: "height" or "descent" (higher, lower) of a leg, or of the path at a zone; "inset" of the path from
-# the area's edges, "distance" from a missile, "north", "east", "south" or "west" at a zone, "duration" of the flight.
-# By a factor: the "battery" or the "tank".  Not of a plan, but of the knowledge about the aircraft: the duration of a
-# flight at "full throttle" or with "no throttle" that measures its ability, and a "stated climb" that it has to have.
+# Quantity of a change.
+# - Changes to another value: "length" or "rise" of a leg (a negative rise is a descent), "airspeed", largest "turn".
+# - Changes by a step: "height" (higher) or "descent" (lower) of a leg or of the path at a zone; "inset" of the path
+#   from the area's edges; "distance" from a missile; "north", "east", "south" or "west" of the path at a zone;
+#   "duration" of the flight.
+# - Changes by a factor: "battery" or "tank".
+# - Knowledge about the aircraft instead of changes of the plan: duration of a flight at "full throttle" or with "no
+#   throttle" that measures its ability, and a "stated climb" that the user should state.
 Quantity = Literal[
     "length",
     "rise",
@@ -43,16 +46,16 @@ Quantity = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Place(DocumentConfig):
-    """Place that was judged."""
+    """Place of a finding."""
 
-    # Two places are the same without regard to their item or number: the index is enough, and older logs have neither.
+    # Places are compared without `to_item` and `number`: the index is enough, and older logs have neither.
 
     kind: PlaceKind
     """flight, mission, plan, leg, waypoint, missile, radar, exclusion or inclusion."""
     index: int | None = None
     """Index of the leg, waypoint, threat or zone, from 0; a fence's zones follow the scenario's. Null for the whole."""
     item: int | None = None
-    """Mission item from which a waypoint comes, or which a check names."""
+    """Mission item of a waypoint, or the item that a check names."""
     name: str = ""
     """Name of a threat or a zone in the scenario; empty for none."""
     to_item: int | None = field(default=None, compare=False)
@@ -73,12 +76,12 @@ class Change(DocumentConfig):
     what: Quantity
     place: Place
     current: float | None
-    """The value now; null where wanted is a step or a factor, or the value now does not matter."""
+    """Current value; null if wanted is a step or a factor, or if the current value does not matter."""
     wanted: float
-    """The value that passes, the step (higher, further, shorter: positive), or the factor."""
+    """Value that passes, or the step (positive for higher, further and shorter), or the factor."""
     unit: str
     most: float | None = None
-    """The upper end of a range that passes, of which wanted is the lower end."""
+    """Upper end of a range of passing values, of which wanted is the lower end."""
 
 
 # Changes to make together.  A finding has alternative suggestions, any of which would make it pass.
@@ -87,12 +90,12 @@ Suggestion = tuple[Change, ...]
 
 @dataclass(frozen=True, slots=True)
 class Disagreement(DocumentConfig):
-    """Rule at a place where another level and the verdict judge differently."""
+    """Rule and place that another level and the verdict judge differently."""
 
     rule: str
     place: Place
     level: str
-    """The other level."""
+    """Name of the other level."""
     there: bool
     """True if the place passes at the other level."""
     here: bool
@@ -102,9 +105,10 @@ class Disagreement(DocumentConfig):
 # ----------------------------------------------------------------------
 # The three levels of a verdict, as data: geometry, airframe, autopilot.
 #
-# geometry: whether the path stays within the envelope, without a flight.  airframe: whether this aircraft can follow it
-# at all, with planfly's guidance and exact navigation.  autopilot: whether it passes with the autopilot that will fly,
-# its parameters and its navigation error.  The verdict is the answer of the last level that was judged.
+# - geometry: the path stays within the envelope, judged without a flight.
+# - airframe: this aircraft can follow the path at all, with planfly's guidance and exact navigation.
+# - autopilot: the flight passes with the autopilot that will fly, its parameters and its navigation error.
+# The verdict is the answer of the last level that was judged.
 
 LevelName = Literal["geometry", "airframe", "autopilot"]
 
@@ -139,13 +143,13 @@ class AirframeAnswer(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class DecidingParameter(DocumentConfig):
-    """Autopilot parameter that decides: the flight passes with another value of only this parameter.
+    """Autopilot parameter that decides the verdict: the flight passes if only this parameter is changed.
 
-    name: the autopilot's own name.
+    name: name of the parameter.
     current: value as flown, in ``unit``.
     passing: nearest value with which a flight passed, in ``unit``.
     rule, place: rule and place of the finding that failed first with the current value.
-    off: error at that place, m: above (negative: below) for a height, to the side for the corridor; None if unknown.
+    off: error at that place, m: positive above for a height error, to the side for the corridor; None if unknown.
     """
 
     name: str
@@ -159,7 +163,7 @@ class DecidingParameter(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class TriedSuggestions(DocumentConfig):
-    """Suggestions of a failed finding with which a trial passed."""
+    """Suggestions for a failed finding that passed a trial."""
 
     rule: str
     place: Place
@@ -168,11 +172,11 @@ class TriedSuggestions(DocumentConfig):
 
 @dataclass(frozen=True, slots=True)
 class ReferenceFlights(DocumentConfig):
-    """Results of reference flights for the judged flight; they are stored, not flown again to judge a log.
+    """Results of reference flights for the judged flight; they are stored in its log, because they are not flown again.
 
-    airframe: None if it was not flown.
-    deciding: None if no parameter decides, or none was looked for.
-    tried: suggestions that passed their trials; None if none was tried.
+    airframe: result of the airframe's reference flight; None if it was not flown.
+    deciding: parameter that decides; None if no parameter decides, or if none was searched.
+    tried: suggestions that passed their trials; None if no suggestion was tried.
     """
 
     airframe: AirframeAnswer | None = None

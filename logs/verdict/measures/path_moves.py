@@ -1,7 +1,7 @@
-"""Represent a path as moves, which are straight pieces and arcs whose altitude is a parabola over the run.
+"""Represent a path as moves: straight segments and arcs whose altitude is a parabola over the horizontal distance.
 
-The moves of a planned path are its exact pieces, not their chords; the moves of a flown track are the straight
-lines from row to row.  Code that judges moves judges both.
+The moves of a planned path are its exact segments and arcs; the moves of a flown track are the straight lines from row
+to row.  The same code judges both.
 """
 
 import math
@@ -38,18 +38,18 @@ MOVE = record_dtype(
 
 @inner
 def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
-    """Return east, north and up (m) at a fraction of a move."""
+    """Return the position at a fraction of a move: east, north and up, m."""
     distance = fraction * move.length
-    ahead, lateral_offset = distance, 0.0
+    forward_offset, lateral_offset = distance, 0.0
     if move.curvature != 0.0:
         course_change = move.curvature * distance
-        ahead, lateral_offset = (
+        forward_offset, lateral_offset = (
             math.sin(course_change) / move.curvature,
             (1.0 - math.cos(course_change)) / move.curvature,
         )
     return (
-        move.east + ahead * move.course_east + lateral_offset * move.course_north,
-        move.north + ahead * move.course_north - lateral_offset * move.course_east,
+        move.east + forward_offset * move.course_east + lateral_offset * move.course_north,
+        move.north + forward_offset * move.course_north - lateral_offset * move.course_east,
         move.up + (move.climb + move.bend * fraction) * fraction,
     )
 
@@ -57,9 +57,9 @@ def move_point(move: Record, fraction: float) -> tuple[float, float, float]:
 def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | None = None) -> Records:
     """Return the moves of a route's fly-by path, flown at each leg's ground speed.
 
-    Without a ground speed the airspeed is used.
+    On a leg without a ground speed, the airspeed is used.
 
-    first, last: range of legs to return, all by default.
+    first, last: first and last leg to return; by default all legs.
     """
     speeds = np.where(np.isfinite(requirements.ground_speed), requirements.ground_speed, requirements.route.airspeed)
     moves = path_moves(requirements.setup.path, speeds, first, requirements.legs - 1 if last is None else last)
@@ -67,9 +67,9 @@ def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | N
 
 
 def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:
-    """Return the moves of a fly-by path's pieces on some legs; times start at 0 at the first move.
+    """Return the moves of a fly-by path on some legs; the first move starts at time 0.
 
-    speeds: speed at which each leg is flown, m/s, (legs,).
+    speeds: ground speed on each leg, m/s, (legs,).
     """
     nodes = path.nodes
     breaks = np.concatenate([nodes["distance"] - nodes["half_length"], nodes["distance"] + nodes["half_length"]])
@@ -83,11 +83,11 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
         cuts = np.unique(np.concatenate([[start], inner, changes, [end]]))
         for first, last in pairwise(cuts.tolist()):
             middle, half_length = 0.5 * (first + last), 0.5 * (last - first)
-            # Evaluated at the piece's midpoint: at its ends another parabola, or another leg, may begin.
-            height, slope, bend = profile_at(nodes, middle)
+            # Evaluate the profile at the midpoint, because another parabola or leg may begin at an end.
+            altitude, slope, bend = profile_at(nodes, middle)
             east, north = arc_point(piece, first - start)
             course = piece.course + piece.curvature * (first - start)
-            up = height - slope * half_length + 0.5 * bend * half_length * half_length
+            up = altitude - slope * half_length + 0.5 * bend * half_length * half_length
             leg = int(piece.leg) + int(middle > piece.leg_change)
             length, duration = last - first, (last - first) / speeds[leg]
             climb, move_bend = (slope - bend * half_length) * length, 0.5 * bend * length * length
@@ -114,8 +114,9 @@ def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -
 def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) -> Records:
     """Return the moves of a flown track, one from each row to the next.
 
-    first, last: range of legs, all by default.  Rows before the first leg belong to the first leg, and rows after the
-    last leg to the last.
+    first, last: first and last leg to return; by default all legs.
+
+    Rows before the route's first leg belong to the first leg, and rows after its last leg to the last leg.
     """
     legs = len(aligned.rows) - 1
     last = legs - 1 if last is None else last
@@ -127,7 +128,10 @@ def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) 
 
 
 def straight_moves(points: Floats, time: Floats) -> Records:
-    """Return the moves from each point to the next, all on leg 0.  points: (n, 3) m.  time: (n,) s.
+    """Return the n - 1 straight moves between n points, all on leg 0.
+
+    points: m, (n, 3).
+    time: times of the points, s, (n,).
 
     >>> moves = straight_moves(np.array([[0.0, 0.0, 50.0], [30.0, 40.0, 60.0]]), np.array([0.0, 2.0]))
     >>> float(moves[0].length), float(moves[0].course_east), float(moves[0].climb), float(moves[0].lasts)
@@ -146,7 +150,7 @@ def straight_moves(points: Floats, time: Floats) -> Records:
 
 
 # ----------------------------------------------------------------------
-# Blocks of consecutive moves, compiled: if a block stays clear of a zone, its moves need not be checked.
+# Blocks of consecutive moves, compiled: the moves of a block that stays clear of a zone need not be checked.
 
 
 # Bounding box of a block on the map, its minimum and maximum altitude, and the steepest ground below it, m per m.
@@ -159,7 +163,10 @@ BLOCK_MOVES = 64
 def move_blocks(
     moves: Records, heights: Heights, to_pixel: PolyMapRecord, spacing: float, reads_ground: bool
 ) -> Records:
-    """Group moves into blocks of dtype `BLOCK`, (b,); read the ground only if a zone limit is given above ground."""
+    """Group moves into blocks, (b,) of dtype `BLOCK`.
+
+    reads_ground: True to compute the steepest ground below each block, for zones with a limit above ground.
+    """
     blocks = np.zeros((moves.shape[0] + BLOCK_MOVES - 1) // BLOCK_MOVES, BLOCK)
     for b in range(blocks.shape[0]):
         block = blocks[b]
@@ -181,7 +188,7 @@ def move_blocks(
 
 @inner
 def _steepest_ground(block: Record, heights: Heights, to_pixel: PolyMapRecord, spacing: float) -> float:
-    """Return the steepest slope that the bilinear ground can have under a block, m per m, ignoring NaN."""
+    """Return an upper bound on the slope of the bilinearly interpolated ground below a block, m per m; ignore NaN."""
     rows, cols = heights.shape
     west, south = polymap(to_pixel, block.west, block.south)
     east, north = polymap(to_pixel, block.east, block.north)
@@ -198,8 +205,8 @@ def _steepest_ground(block: Record, heights: Heights, to_pixel: PolyMapRecord, s
             col_step = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
             row_step = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
             step_square = col_step * col_step + row_step * row_step
-            # A comparison with NaN is false.
+            # A comparison with NaN is False.
             if step_square > max_step_square:
                 max_step_square = step_square
-    # The slight increase allows for the rounding of single precision.
+    # The factor allows for the rounding of single precision.
     return math.sqrt(max_step_square) / spacing * (1.0 + 1e-6)

@@ -1,7 +1,7 @@
-"""Sweep along a whole path, compiled: height above ground, and time and exposure inside spheres.
+"""Measure a whole path, compiled: height above ground, and time and exposure inside spheres.
 
-A path is points (n, 3) m with a time (s) each: the rows of a flown track, or the waypoints of a route with the times at
-which they would be passed.  The same code judges both, exactly on each straight segment.
+A path consists of n points (m, (n, 3)) with a time (s) each: the rows of a flown track, or the points of a planned path
+with the times at which they would be passed.  The results are exact on each straight segment.
 """
 
 import math
@@ -19,14 +19,16 @@ from world.terrain import Terrain, segment_clearance
 
 # Number of segments that share one bounding box.
 _BLOCK_SEGMENTS = 256
-# Number of segments joined to one if their block is at least `SPHERE_FAR_DIAGONALS` from a sphere's center.
+# Number of segments that are joined to one if their block is far (`SPHERE_FAR_DIAGONALS`) from a sphere's center.
 _JOINED_SEGMENTS = 16
 
 
 def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return the minimum height above ground on each segment, m, and its fraction of the segment, (n - 1,) each.
+    """Return each segment's minimum height above ground, m, and its position as a fraction of the segment, (n - 1,).
 
     Both are NaN if a segment leaves the raster or its data.
+
+    points: ends of the segments, m, (n, 3).
     """
     clearance, fraction = _segment_clearances(read_only(heights), to_pixel, read_only(np.ascontiguousarray(points)))
     return clearance, fraction
@@ -34,7 +36,7 @@ def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) ->
 
 @compiled
 def _segment_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
-    """Return the minimum height above ground on each segment, m, and its fraction of the segment."""
+    """Return each segment's minimum height above ground, m, and its fraction of the segment; see `path_clearance`."""
     count = max(0, points.shape[0] - 1)
     clearance, fraction = np.empty(count), np.empty(count)
     for k in range(count):
@@ -43,13 +45,13 @@ def _segment_clearances(heights: Heights, to_pixel: PolyMapRecord, points: Float
 
 
 class SphereVisits(NamedTuple):
-    """Visits of a path to m spheres, (m,) each.
+    """Visits of a path to m spheres; each field has shape (m,).
 
-    time_inside: s.
-    exposure: integral of (scale/d)^4 over the time inside, s.
-    closest: minimum distance to the center, m; inf for a sphere of radius 0.
-    closest_time: s.
-    entry_time: s, of the first entry; NaN if the path never enters.
+    time_inside: total time inside, s.
+    exposure: integral of (scale/d)^4 over the time inside, s, with the distance d from the center.
+    closest: minimum distance from the center, m; inf for a sphere of radius 0.
+    closest_time: time of the minimum distance, s.
+    entry_time: time of the first entry, s; NaN if the path never enters.
     """
 
     time_inside: Floats
@@ -60,7 +62,11 @@ class SphereVisits(NamedTuple):
 
 
 class _Boxes(NamedTuple):
-    """Minimum and maximum corner of each block of segments, m, (blocks, 3), and its diagonal, m, (blocks,)."""
+    """Bounding boxes of blocks of segments.
+
+    low, high: minimum and maximum corner, m, (blocks, 3).
+    diagonal: m, (blocks,).
+    """
 
     low: Floats
     high: Floats
@@ -70,7 +76,9 @@ class _Boxes(NamedTuple):
 def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
     """Measure the visits of a path to m spheres; a radius of 0 means that there is no sphere.
 
-    points: (n, 3) m.  time: (n,) s.  centres: (m, 3) m.  radii, scales: (m,) m.
+    points, time: points of the path, m, (n, 3), and their times, s, (n,).
+    centres: centers of the spheres, m, (m, 3).
+    radii, scales: radii of the spheres, and lengths that scale the exposure, m, (m,).
 
     >>> line, time = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]), np.array([0.0, 10.0])
     >>> visits = path_spheres(line, time, np.array([[50.0, 30.0, 0.0]]), np.array([50.0]), np.array([10.0]))
@@ -83,7 +91,7 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
 
 @compiled
 def _sphere_visits(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
-    """Measure the visits of a path to all spheres, block by block; see `path_spheres`."""
+    """Measure the visits of a path to all spheres block by block; see `path_spheres`."""
     boxes = _block_boxes(points)
     count = centres.shape[0]
     visits = SphereVisits(
@@ -143,7 +151,7 @@ def _block_boxes(points: Floats) -> _Boxes:
 
 @inner
 def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:
-    """Return the minimum and the maximum distance of a block's bounding box from a point."""
+    """Return the minimum and the maximum distance of a block's bounding box from a point, m."""
     min_square = 0.0
     max_square = 0.0
     for axis in range(3):
@@ -157,15 +165,15 @@ def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, fl
 
 @inner
 def _update_closest(points: Floats, time: Floats, block: int, centre: Floats, m: int, visits: SphereVisits) -> None:
-    """Update the minimum distance to sphere m and its time in `visits` with one block."""
+    """Update the minimum distance from sphere `m` and the time of this minimum in `visits` with one block."""
     for k in range(block * _BLOCK_SEGMENTS, min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)):
         length_square = 0.0
-        along = 0.0
+        projection = 0.0
         for axis in range(3):
             step = points[k + 1, axis] - points[k, axis]
             length_square += step * step
-            along += step * (centre[axis] - points[k, axis])
-        fraction = min(1.0, max(0.0, along / length_square)) if length_square > 0.0 else 0.0
+            projection += step * (centre[axis] - points[k, axis])
+        fraction = min(1.0, max(0.0, projection / length_square)) if length_square > 0.0 else 0.0
         distance, _, _ = sphere_window(points[k], points[k + 1], centre, 0.0)
         if distance < visits.closest[m]:
             visits.closest[m] = distance
@@ -184,7 +192,10 @@ def _add_stay(
     m: int,
     visits: SphereVisits,
 ) -> None:
-    """Add one block's time and exposure inside sphere m to `visits`."""
+    """Add one block's time and exposure inside sphere `m` to `visits`.
+
+    step: number of segments that are joined to one.
+    """
     last = min(points.shape[0] - 1, (block + 1) * _BLOCK_SEGMENTS)
     k = block * _BLOCK_SEGMENTS
     while k < last:
@@ -201,16 +212,17 @@ def _add_stay(
 
 
 # ----------------------------------------------------------------------
-# The encounters of a flown track: the ground under each of its segments, and the spheres it passes through.
-#
-# The formulas come from the `world` package; here they are only run along a track, exactly per segment, at any rate.
+# Ground below each segment of a flown track, and spheres that the track passes through, by the formulas of `world`.
 
 
 @dataclass(frozen=True, slots=True)
 class Passage:
     """One stay inside a sphere.
 
-    start, end: s.  closest: minimum distance from the center, m.  whole: True if the track left the sphere again.
+    start, end: times of entry and exit, s.
+    closest: minimum distance from the center, m.
+    closest_time: start time of the segment with the minimum distance, s.
+    whole: True if the track left the sphere again.
     """
 
     start: float
@@ -221,17 +233,20 @@ class Passage:
 
 
 def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floats]:
-    """Return the minimum height above ground on each segment of a track, m, and its fraction of the segment.
+    """Return each track segment's minimum height above ground, m, and its fraction of the segment, (t - 1,) each.
 
-    position: (t, 3).  Returns (t - 1,) twice; NaN if the segment leaves the terrain's data or is not a number.
+    The height is NaN if the segment leaves the terrain data or has an implausible end.
+
+    position: m, (t, 3).
     """
     return _plausible_clearances(terrain.heights, terrain.to_pixel.record, read_only(np.ascontiguousarray(position)))
 
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
-    """Return the stays of a track inside a sphere, in order.
+    """Return the stays of a track inside a sphere, in order of time; a point on the surface is inside.
 
-    time: (t,) s.  position: (t, 3).  centre: (3,).  A point on the surface is inside.
+    time, position: times, s, (t,), and positions, m, (t, 3), of the track.
+    centre: center of the sphere, m, (3,).
     """
     if not radius > 0.0 or len(position) < 2:
         return []
@@ -259,7 +274,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
 
 @inner
 def _is_plausible(position: Floats, k: int) -> bool:
-    """Return True if row k is a position that an aircraft can have: finite, and at most 10,000 km from the origin."""
+    """Return True if the position in row `k` is plausible: finite, and at most 10,000 km from the origin."""
     limit = MAX_PLAUSIBLE_POSITION_M
     return abs(position[k, 0]) <= limit and abs(position[k, 1]) <= limit and abs(position[k, 2]) <= limit
 
@@ -268,7 +283,7 @@ def _is_plausible(position: Floats, k: int) -> bool:
 def _plausible_clearances(
     heights: Heights, to_pixel: PolyMapRecord, position: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return the clearances as `_segment_clearances`, but NaN at rows that are not plausible."""
+    """Return clearances as `_segment_clearances` does, but NaN for segments with an implausible end."""
     count = max(0, position.shape[0] - 1)
     clearance = np.full(count, math.nan)
     fraction = np.zeros(count)
@@ -282,7 +297,10 @@ def _plausible_clearances(
 def _sphere_windows(
     position: Floats, centre: Floats, radius: float
 ) -> tuple[Floats, Floats, Floats]:  # pragma: no cover
-    """Return each segment's distance from a center, m, and the fractions at which it enters and leaves the sphere."""
+    """Return each segment's minimum distance from a center, m, and the fractions where it enters and leaves a sphere.
+
+    For a segment with an implausible end, the distance is inf and the fractions are 0.
+    """
     count = position.shape[0] - 1
     closest = np.full(count, math.inf)
     entry = np.zeros(count)

@@ -1,8 +1,8 @@
-"""Match a track to its route by only its positions, to find its progress and the rows along each leg.
+"""Match a track to its route by positions alone, to find the progress of the flight and the rows along each leg.
 
-A route that returns to its start, or repeats a lap, is near many of its waypoints at once.  The whole track is
-therefore matched to the whole route: both only go forward, and the track may end anywhere on the route.  Data that
-guidance recorded about itself is not read.
+A route that returns to its start, or repeats a lap, passes the same place several times.  The whole track is therefore
+matched to the whole route: both only go forward, and the track may end anywhere on the route.  Data that guidance
+recorded about itself are not read.
 """
 
 import math
@@ -19,20 +19,20 @@ from world.kernels import compiled, read_only
 
 Numbers = NDArray[np.int64]
 
-# Distance between neighbouring samples of route and track, m; larger if the table would exceed `_MAX_CELLS`.
+# Distance between neighbouring samples of route and track, m; larger if the table of costs would exceed `_MAX_CELLS`.
 _SAMPLE_SPACING_M = 20.0
-# Largest number of cells of the table.
+# Largest number of cells of the table of costs.
 _MAX_CELLS = 16_000_000
 # The row nearest to a waypoint may lie this far before or after the rows along its two legs, m of track.
 _WINDOW_MARGIN_M = 300.0
 # Cost of a part of the route to which no part of the track is matched, as a fraction of its squared distance.
 _SKIP_FRACTION = 0.1
-# Distance that is squared and added to that cost, m.
+# Distance whose square is added to the cost of a skipped part of the route, m.
 _SKIP_DISTANCE_M = 15.0
-# Cost of a late start, m per sample: a flight that may begin anywhere on the route begins at the earliest of equally
-# near places.
+# Distance whose square is the cost of each route sample before the start, m: a flight that may begin anywhere on the
+# route then begins at the earliest of equally near samples.
 _LATE_START_M = 1.0
-# A loiter is flown within this of its drawn circle, m; the number of laps does not matter here.
+# Largest distance of a flown loiter from its drawn circle, m; the number of laps does not matter here.
 _LOITER_MARGIN_M = 60.0
 
 
@@ -40,10 +40,11 @@ _LOITER_MARGIN_M = 60.0
 class RouteProgress:
     """Progress of a track along a route of w waypoints.
 
-    first, last: (w,) rows between which each waypoint may have been passed; first > last for a waypoint that the flight
-        did not set out for.
-    target: waypoint to which the flight was flying when it ended, or at which it was.
-    remaining_distance: distance along the route from the track's end to each waypoint, (w,), m; negative behind it.
+    first, last: rows between which each waypoint may have been passed, (w,); first > last for a waypoint to which the
+        aircraft never flew.
+    target: waypoint to which the aircraft was flying, or at which it was, when the flight ended.
+    remaining_distance: distance along the route from the track's end to each waypoint, m, (w,); negative for waypoints
+        before the track's end.
     """
 
     first: Numbers
@@ -56,22 +57,23 @@ class RouteProgress:
 class _Samples:
     """Sampled positions along a route, in flying order.
 
-    positions: (m, 2) m.  radii: (m,) m within which each place is reached; 0 on a line, the radius of a loiter.
-    along: (m,) m from the route's start.
-    sample_of_waypoint: (w,) number of each waypoint's sample; the corners of a loiter share one.
+    positions: m, (m, 2).
+    radii: radius within which each sample is reached, m, (m,); 0 on a leg, the reach of the circle for a loiter.
+    distances: distance from the route's start, m, (m,).
+    sample_of_waypoint: number of each waypoint's sample, (w,); the corners of a loiter share one sample.
     """
 
     positions: Floats
     radii: Floats
-    along: Floats
+    distances: Floats
     sample_of_waypoint: Numbers
 
 
 def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RouteProgress:
     """Match a track to a route.
 
-    position: (t, 3) m, usable rows, at least two.
-    anywhere: True if the track may begin anywhere on the route, like a part of an imported log; otherwise it begins at
+    position: positions in at least two usable rows, m, (t, 3).
+    anywhere: True if the track may begin anywhere on the route, like a part of an imported log; False if it begins at
         the route's start.
 
     >>> from logs.recording.example_log import example_log
@@ -106,7 +108,7 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
         earlier_samples = samples.sample_of_waypoint[samples.sample_of_waypoint < sample]
         later_samples = samples.sample_of_waypoint[samples.sample_of_waypoint > sample]
         first_sample = int(earlier_samples[-1]) if earlier_samples.size else 0
-        last_sample = min(final_sample, int(later_samples[0]) if later_samples.size else len(samples.along) - 1)
+        last_sample = min(final_sample, int(later_samples[0]) if later_samples.size else len(samples.distances) - 1)
         matched_samples = np.flatnonzero(ends[first_sample : last_sample + 1, 0] >= 0) + first_sample
         if matched_samples.size:
             first[i] = np.searchsorted(distance_run, distance_run[begin_rows[matched_samples[0]]] - _WINDOW_MARGIN_M)
@@ -116,13 +118,14 @@ def route_progress(route: Route, position: Floats, *, anywhere: bool) -> RoutePr
                 )
                 - 1
             )
-    return RouteProgress(first, last, target, samples.along[samples.sample_of_waypoint] - samples.along[final_sample])
+    remaining_distance = samples.distances[samples.sample_of_waypoint] - samples.distances[final_sample]
+    return RouteProgress(first, last, target, remaining_distance)
 
 
 def _sample_route(route: Route, spacing: float) -> _Samples:
-    """Sample the legs of a route; a loiter is one sample, however many laps it has."""
+    """Sample the legs of a route about every `spacing` (m); a loiter is one sample, however many laps it has."""
     points = route.waypoints[:, :2]
-    positions, radii, along = [points[0]], [0.0], [0.0]
+    positions, radii, distances = [points[0]], [0.0], [0.0]
     sample_of_waypoint = np.zeros(len(points), dtype=np.int64)
     for i in range(1, len(points)):
         start, end = points[i - 1], points[i]
@@ -134,18 +137,21 @@ def _sample_route(route: Route, spacing: float) -> _Samples:
         for k in range(1, count + 1):
             positions.append(start + (end - start) * (k / count))
             radii.append(0.0)
-            along.append(along[-1] + length / count)
+            distances.append(distances[-1] + length / count)
         sample_of_waypoint[i] = len(positions) - 1
         if route.arcs[i] > 0.0:
             corners = [
                 k for k in range(i, len(points)) if route.stops[k] == route.stops[i] and route.arcs[i : k + 1].all()
             ]
             positions[-1], radii[-1] = _loiter_center(route, points[corners], float(route.arcs[i]), i)
-    return _Samples(np.array(positions), np.array(radii), np.array(along), sample_of_waypoint)
+    return _Samples(np.array(positions), np.array(radii), np.array(distances), sample_of_waypoint)
 
 
 def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> tuple[Floats, float]:
-    """Return the center of a loiter's corners, and the radius within which the loiter is flown, m."""
+    """Return the center of a loiter's corners, m, (2,), and the radius around it within which the loiter is flown, m.
+
+    first: waypoint of the loiter's first corner.
+    """
     center = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     reach_radius = float(np.hypot(*(corners - center).T).max()) + _LOITER_MARGIN_M
     if 0 <= route.rtl_start < first < route.rtl_end:
@@ -155,11 +161,15 @@ def _loiter_center(route: Route, corners: Floats, radius: float, first: int) -> 
 
 @compiled
 def _match_rows(track: Floats, samples: Floats, radii: Floats, capture: float, anywhere: bool) -> Numbers:
-    """Match a track (n, 2) to route samples (m, 2), both only forward, with the minimum sum of costs.
+    """Match a track to route samples, both only forward, with the minimum sum of costs.
 
-    The cost of a row is min(distance, capture)^2; a skipped sample costs `_SKIP_FRACTION` of that, and
-    `_SKIP_DISTANCE_M`^2.  Return the first and the last row at each sample, (m, 2); -1 for samples before the track's
-    start and after its end.  Of equal ends take the earliest.
+    The cost of a row is min(distance, capture)^2; the cost of a skipped sample is `_SKIP_FRACTION` of this cost plus
+    `_SKIP_DISTANCE_M`^2.  Of equally good ends the earliest is taken.
+
+    track: positions, m, (n, 2).
+    samples, radii: route samples, m, (m, 2), and the radii within which they are reached, m, (m,).
+
+    Returns the first and the last row at each sample, (m, 2); -1 for samples before the track's start or after its end.
     """
     rows, count = track.shape[0], samples.shape[0]
     moves = np.zeros((rows, count), dtype=np.uint8)

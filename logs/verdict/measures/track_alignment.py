@@ -1,8 +1,8 @@
-"""Align a track with a route: its usable rows, and the rows of each leg.
+"""Align a track with a route: find the usable rows, and the rows of each leg.
 
-This is the flown side of every finding.  Only time, position, velocity, attitude, airspeed, throttle, wind, current and
-energy are read.  The columns that guidance records about itself (leg, cross-track, height error, clearance) are not: a
-verdict must not depend on them.
+All findings on a flight use this alignment.  Only time, position, velocity, attitude, airspeed, throttle, wind, current
+and energy are read.  The columns that guidance records about itself (leg, cross-track, height error, clearance) are not
+read, because a verdict must not depend on them.
 """
 
 import math
@@ -37,7 +37,8 @@ from world.kernels import compiled, read_only
 RowNumbers = NDArray[np.int64]
 
 
-# A waypoint was not passed if the route from the track's end to it is longer than its arrival distance and this, m.
+# A waypoint was not passed if the route from the track's end to the waypoint is longer than the waypoint's arrival
+# radius plus this margin, m.
 _MISSED_MARGIN_M = 50.0
 # Largest number of cells in the assignment of rows to waypoints; the track is thinned to stay within it.
 _CELLS = 40_000_000
@@ -45,21 +46,21 @@ _CELLS = 40_000_000
 
 @dataclass(frozen=True, slots=True)
 class AlignedTrack:
-    """Track aligned with a route of w waypoints; t usable rows.
+    """Track of t usable rows, aligned with a route of w waypoints.
 
     track: the usable rows.
-    bad_rows: number of rows with non-finite or implausible numbers or a time not later than the row before.
-    first_bad: time of the first bad row, s; NaN if there are none.
-    rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
-        did not reach.
-    apex_distance: (w,) distance of that row from the apex, m.
-    passed: (w,) bool, the flight passed the waypoint.
-    course: (t,) rad over the ground, unwrapped.
-    distance_run: (t,) m along the ground track.
-    clearance, clearance_fraction: (t - 1,) minimum height above ground between a row and the next, m, and the fraction
-        of the segment at which it occurs; NaN outside the terrain data, and without terrain.
-    lift_gain: (t,) airspeed gained from rising air, m/s.
-    tick: usual time between rows, s.
+    bad_rows: number of rows with non-finite or implausible numbers, or with a time not later than the row before.
+    first_bad: time of the first bad row, s; NaN if there is none.
+    rows: row nearest to each waypoint's apex, (w,), never decreasing; the last row for a waypoint that the flight did
+        not reach.
+    apex_distance: distance of that row from the apex, m, (w,).
+    passed: True for each waypoint that the flight passed, (w,).
+    course: course over the ground, unwrapped, rad, (t,).
+    distance_run: distance along the ground track, m, (t,).
+    clearance, clearance_fraction: minimum height above ground between a row and the next, m, and the fraction of the
+        segment at which it occurs, (t - 1,); the height is NaN outside the terrain data and without terrain.
+    lift_gain: airspeed gained from rising air, m/s, (t,).
+    tick: median time between rows, s.
     """
 
     track: Track
@@ -80,7 +81,7 @@ class AlignedTrack:
         return slice(int(self.rows[leg]), int(self.rows[leg + 1]) + 1)
 
     def leg_ends(self) -> tuple[float, ...]:
-        """Return the end time of each leg but the last, s; inf if its waypoint was not reached."""
+        """Return the end time of each leg except the last, s; inf for a leg whose end was not reached."""
         ends = np.where(self.passed, self.track.time[self.rows], math.inf)[1:-1]
         return tuple(ends.tolist())
 
@@ -89,7 +90,7 @@ class AlignedTrack:
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
 
     def leg_at(self, row: int) -> int:
-        """Return the leg of a row; the last row belongs to the leg before it."""
+        """Return the leg on which a row was flown; the last row belongs to the leg of the row before it."""
         return int(np.searchsorted(self.rows[1:-1], min(row, len(self.track) - 2), side="right"))
 
     def position_text(self, row: int, fraction: float = 0.0) -> str:
@@ -98,11 +99,11 @@ class AlignedTrack:
         east, north = (position[row] + fraction * (position[min(row + 1, len(position) - 1)] - position[row]))[:2]
         return f"east {east:.0f} m, north {north:.0f} m"
 
-    def rows_around(self, first: int, last: int, seconds: float) -> slice:
-        """Return rows first..last and the rows within ``seconds`` of them."""
+    def rows_around(self, first: int, last: int, margin: float) -> slice:
+        """Return the rows from `first` to `last`, and the rows up to a time `margin` (s) before and after them."""
         time = self.track.time
-        start = int(np.searchsorted(time, time[first] - seconds))
-        return slice(start, int(np.searchsorted(time, time[last] + seconds, side="right")))
+        start = int(np.searchsorted(time, time[first] - margin))
+        return slice(start, int(np.searchsorted(time, time[last] + margin, side="right")))
 
 
 def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack | None:
@@ -123,7 +124,8 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
     progress = _advance_target_to_arrival(requirements, usable_track, progress, arrival_radius)
     rows, distance = _find_passage_rows(usable_track, apexes, progress)
     distances = np.hypot(*(usable_track.position[rows, :2] - requirements.points[:, :2]).T)
-    # The flight is past a waypoint that it passed, or at the waypoint where it ended; it did not pass one far ahead.
+    # A waypoint was passed if the track goes on after its nearest row, or ends within its arrival radius; but a
+    # waypoint that is far ahead along the route was not passed.
     is_far_ahead = progress.remaining_distance > arrival_radius + _MISSED_MARGIN_M
     is_far_ahead[-1] = False
     passed = ((rows < last_row) & ~is_far_ahead) | (distances <= arrival_radius)
@@ -154,7 +156,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
 
 
 def _arrival_radii(requirements: RouteRequirements) -> Floats:
-    """Return the radius within which a track that ends has arrived at each waypoint, m, (w,)."""
+    """Return the radius around each waypoint within which a track that ends has arrived at the waypoint, m, (w,)."""
     route, follows_path = requirements.setup.route, requirements.setup.autopilot.turns.follows_path
     offsets = requirements.fly_by_offset if follows_path else np.zeros(len(route.waypoints))
     radii = [
@@ -163,15 +165,15 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
     ]
     first_return = route.rtl_start
     if first_return >= 0:
-        # A return ends anywhere on its loiter, which is not where the loiter is drawn, nor where the drawn loiter ends.
+        # A return may end anywhere on its loiter, and the flown loiter may differ from the drawn one.
         end_return, loiter = route.rtl_end, route.rtl_loiter
         loiter_radius = 0.0 if loiter is None else abs(loiter.radius) * true_by_equivalent(loiter.up) ** 2
-        anywhere = max(RTL_ARRIVAL_RADIUS_M, (1.0 + RTL_ARRIVAL_LOITER_RADII) * loiter_radius)
+        return_radius = max(RTL_ARRIVAL_RADIUS_M, (1.0 + RTL_ARRIVAL_LOITER_RADII) * loiter_radius)
         radii[first_return + 1 : end_return] = [
-            max(anywhere, radius) for radius in radii[first_return + 1 : end_return]
+            max(return_radius, radius) for radius in radii[first_return + 1 : end_return]
         ]
     if requirements.setup.autopilot.loiters.steers_to_center:
-        # A mission that ends on a loiter about a center ends anywhere on it, as wide as it is flown.
+        # A mission that ends on a loiter may end anywhere on the loiter, which may be flown wider than drawn.
         k, item = route.arcs.size - 1, route.items[-1]
         while k > 0 and route.items[k] == item and route.arcs[k - 1]:
             radii[k] = max(radii[k], RTL_ARRIVAL_RADIUS_M)
@@ -182,9 +184,9 @@ def _arrival_radii(requirements: RouteRequirements) -> Floats:
 def _advance_target_to_arrival(
     requirements: RouteRequirements, track: Track, progress: RouteProgress, arrival_radius: Floats
 ) -> RouteProgress:
-    """Advance the target past every waypoint whose arrival radius the track has entered for good.
+    """Return the progress with its target advanced past each waypoint that the track has reached for good.
 
-    A flight inside that radius already flies towards the next waypoint, from the row where it entered.
+    Once inside a waypoint's arrival radius, without leaving it again, the aircraft already flies to the next waypoint.
     """
     points, final_row, target = requirements.points, len(track) - 1, progress.target
     first_row, last_row = progress.first.copy(), progress.last.copy()
@@ -203,10 +205,10 @@ def _advance_target_to_arrival(
 def _advance_last_leg(
     requirements: RouteRequirements, track: Track, rows: RowNumbers, passed: NDArray[np.bool_], arrival_radius: Floats
 ) -> None:
-    """Move the start of the track's last leg to where the track entered the arrival radius of its first waypoint.
+    """Move the start of the track's last leg in ``rows`` to the row at which the track entered the arrival radius.
 
-    ``rows`` changes only if the track ends inside that radius, before the waypoint: the autopilot is then already on
-    the next leg.
+    ``rows`` changes only if the track ends inside the arrival radius of the last passed waypoint, before the waypoint:
+    the autopilot is then already on the next leg.
     """
     last_passed = int(np.flatnonzero(passed)[-1]) if passed.any() else 0
     if (
@@ -223,7 +225,10 @@ def _advance_last_leg(
 
 
 def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
-    """Return the distances of positions (n, 3) along a leg from its start, and to the right of its line, m."""
+    """Return the distances of positions along a leg from its start, and to the right of the leg's line, m, (n,) each.
+
+    position: m, (n, 3).
+    """
     east, north = position[:, 0] - requirements.points[leg, 0], position[:, 1] - requirements.points[leg, 1]
     ux, uy = math.sin(requirements.courses[leg]), math.cos(requirements.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
@@ -232,7 +237,10 @@ def along_across(requirements: RouteRequirements, leg: int, position: Floats) ->
 def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
     """Return each track segment's minimum horizontal distance from a target, m, and its fraction of the segment.
 
-    position: (n, 3).  target: (2,) or (3,).  Returns (n - 1,) twice.
+    Both have shape (n - 1,).
+
+    position: m, (n, 3).
+    target: m, (2,) or (3,).
     """
     start = position[:-1, :2]
     step = position[1:, :2] - start
@@ -244,10 +252,10 @@ def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
 
 
 def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
-    """Return a mask of the rows with finite, plausible numbers, each later than the usable rows before it.
+    """Return a mask of the rows with finite, plausible numbers and a time later than all usable rows before.
 
-    is_own: True for planfly's own flights, which have all numbers in every row.  Only the positions and velocities of
-    an imported log are checked here; each rule checks the other data that it needs.
+    is_own: True for planfly's own flights, which have all numbers in every row.  Of an imported log only positions and
+        velocities are checked here, because each rule checks the other data that it needs.
     """
     is_usable = np.isfinite(track.time)
     plausible_bounds: tuple[tuple[str, float], ...] = (
@@ -264,7 +272,7 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
             ("wind", MAX_PLAUSIBLE_VALUE),
         )
     for name, bound in plausible_bounds:
-        # A NaN is not within any bound.
+        # The comparison is False for NaN.
         is_usable &= (np.abs(getattr(track, name)) <= bound).all(axis=1)
     time = np.where(is_usable, track.time, -math.inf)
     latest_before = np.concatenate([[-math.inf], np.maximum.accumulate(time)[:-1]]) if time.size else time
@@ -272,9 +280,9 @@ def _usable_rows(track: Track, *, is_own: bool) -> NDArray[np.bool_]:
 
 
 def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) -> tuple[RowNumbers, Floats]:
-    """Find the row at which each waypoint was passed, and its distance, m.
+    """Return the row at which each waypoint was passed, and the row's distance from the waypoint's apex, m, (w,) each.
 
-    Minimize the sum of squared distances, with the rows in order of time.  Only rows along each waypoint's legs are
+    The rows minimize the sum of squared distances, and never decrease.  Only rows along each waypoint's legs are
     considered.
     """
     position, count, last_row = track.position, len(apexes), len(track) - 1
@@ -284,7 +292,8 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
     chords, is_missed = _match_chords(read_only(position), apexes, first, last, step, CAPTURE_RADIUS_M)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
-    # Missed waypoints lie between their neighbours; waypoints after the last one that was met lie at the end.
+    # The row of a missed waypoint lies between those of its neighbours; waypoints after the last captured one get the
+    # last row.
     captured_waypoints = np.flatnonzero(~is_missed)
     last_captured = int(captured_waypoints[-1]) if captured_waypoints.size else -1
     previous_row = 0
@@ -312,7 +321,7 @@ def _find_passage_rows(track: Track, apexes: Floats, progress: RouteProgress) ->
 def lifted_speed(time: Floats, airspeed: Singles, vertical_wind: Singles) -> Floats:
     """Return the airspeed that an aircraft on a fixed path gains from rising air, m/s, (t,).
 
-    The gain fades with the time constant `SPEED_MEMORY_S`.
+    The gain decays with the time constant `SPEED_MEMORY_S`.
     """
     speed = np.zeros(time.size)
     for k in range(1, time.size):
@@ -328,10 +337,12 @@ def lifted_speed(time: Floats, airspeed: Singles, vertical_wind: Singles) -> Flo
 def _match_chords(
     position: Floats, marks: Floats, first: RowNumbers, last: RowNumbers, step: int, capture: float
 ) -> tuple[RowNumbers, NDArray[np.bool_]]:
-    """Find the chord (of ``step`` rows) of each mark, in time order.
+    """Assign each mark to a chord of the track (``step`` rows long), with the chords in order of time.
 
-    Minimize the sum of min(distance, capture)^2 by dynamic programming; of equal assignments take the earliest.  Also
-    return a mask of the marks that no row of their chord captures; only chords first..last can capture a mark.
+    The assignment minimizes the sum of min(distance, capture)^2 by dynamic programming; of equally good assignments the
+    earliest is taken.  Only chords from `first` to `last` can capture a mark.
+
+    Returns the chord of each mark, and a mask of the marks that no row of their chord captures.
     """
     last_row = position.shape[0] - 1
     chords = -(-last_row // step)
@@ -343,16 +354,18 @@ def _match_chords(
         for j in range(chords):
             start_row, end_row = j * step, min(last_row, (j + 1) * step)
             length_square = 0.0
-            along = 0.0
+            projection = 0.0
             offset_square = 0.0
             for k in range(3):
                 chord_step = position[end_row, k] - position[start_row, k]
                 offset = marks[i, k] - position[start_row, k]
                 length_square += chord_step * chord_step
-                along += chord_step * offset
+                projection += chord_step * offset
                 offset_square += offset * offset
-            fraction = min(1.0, max(0.0, along / length_square)) if length_square > 0.0 else 0.0
-            distance_square = max(0.0, offset_square - 2.0 * fraction * along + fraction * fraction * length_square)
+            fraction = min(1.0, max(0.0, projection / length_square)) if length_square > 0.0 else 0.0
+            distance_square = max(
+                0.0, offset_square - 2.0 * fraction * projection + fraction * fraction * length_square
+            )
             if not first[i] <= j <= last[i]:
                 distance_square = math.inf
             total = cost[j] + min(distance_square, capture * capture)
@@ -378,9 +391,9 @@ def _match_chords(
 
 
 # ----------------------------------------------------------------------
-# The leg on which each row of a track was flown, as a verdict aligned it.
+# Leg on which each row of a track was flown, by the alignment of the verdict.
 #
-# The legs recorded by guidance are ignored, so that a report's tables and a replay cannot differ from the verdict.
+# The legs that guidance recorded are ignored, so that a report's tables and a replay cannot differ from the verdict.
 
 _IGNORED_COLUMNS = ("velocity", "attitude", "airspeed", "controls", "wind", "current", "energy")
 
@@ -388,8 +401,8 @@ _IGNORED_COLUMNS = ("velocity", "attitude", "airspeed", "controls", "wind", "cur
 def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
     """Return the end time of each leg except the last, s, for a track without a verdict.
 
-    The time is inf if the leg's last waypoint was not reached.  Only time and position are used.  Return () for a track
-    with fewer than two usable rows.
+    The time is inf for a leg whose end was not reached.  Only time and position are used.  Return () for a track with
+    fewer than two usable rows.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -402,9 +415,10 @@ def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
 
 
 def with_legs(track: Track, leg_ends: Sequence[float]) -> Track:
-    """Return the track with its ``leg`` column computed again from the increasing end times of the legs, s.
+    """Return the track with its ``leg`` column computed again from the end times of the legs.
 
-    leg_ends: from a `logs.verdict.verdict.Verdict` or from `find_leg_ends`.  If empty, all rows are on leg 0.
+    leg_ends: increasing end times, s, from a `logs.verdict.verdict.Verdict` or from `find_leg_ends`; if empty, all rows
+        are on leg 0.
     """
     ends = np.array(leg_ends, dtype=np.float64)
     return replace(track, leg=np.searchsorted(ends, track.time, side="right").astype(np.int32))

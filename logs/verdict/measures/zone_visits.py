@@ -1,9 +1,9 @@
 """Find where a path violates airspace zones, compiled: depth, duration, entry and exit.
 
-The distance of a place beyond a zone's limit changes no faster along a path than the path itself moves, or than its
-height above ground changes.  A path is bisected until each part is certain to be on one side of the limit, and no part
-can contain a place deeper than the deepest known one.  Nothing between two samples is missed, on arcs and over terrain
-as on straight lines.
+The depth of a violation changes no faster along a path than the position or the height above ground.  A path is
+therefore bisected until each part is certain to be on one side of the limit, and no part can contain a point deeper
+than the deepest known point.  Nothing between two samples is missed, neither on straight lines nor on arcs, nor over
+terrain.
 
 shapely's distance and intersection take 170 times as long (1,000 zones, 36,000 rows: 7.7 s, here 0.05 s), give the
 depth of only the rows (0.5 m off), and support neither arcs, heights above ground nor times.
@@ -21,7 +21,7 @@ from world.kernels import Record, Records, compiled, inlined, inner, read_only, 
 from world.terrain import Terrain, ground_height
 
 # ----------------------------------------------------------------------
-# Parts of a move near a zone, compiled: how far beyond the zone's limit they can be between their ends.
+# Parts of a move near a zone, compiled: bounds of the depth of a violation between the ends of a part.
 
 
 # A part of a move.  first, last: fractions of the move at its ends.  east, north: position of its start, m.
@@ -47,9 +47,9 @@ PART = record_dtype(
 def distances_outside_zone(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> tuple[float, float, int]:
-    """Return a position's distances outside zone z's outline and altitude band, m, and its nearest edge.
+    """Return a position's distances outside the outline and the altitude band of zone `z`, m, and the nearest edge.
 
-    A distance is negative inside, and NaN for a band above ground if the terrain there is unknown.
+    A distance is negative inside; the distance from a band above ground is NaN if the terrain there is unknown.
     """
     zone = records.zones[z]
     outline_distance, edge = nearest_edge(records, z, east, north)
@@ -61,13 +61,14 @@ def distances_outside_zone(
 
 @inlined
 def beyond_limit(exclusion: bool, outline_distance: float, band_distance: float) -> float:
-    """Return a position's distance beyond a zone's limit, m; negative if it complies.
+    """Return the depth of a violation at a position, m; negative if the position complies.
 
-    This is the shortest level or vertical move to the limit, or NaN if it depends on unknown ground.
+    The depth is the shortest horizontal or vertical distance to the zone's limit, or NaN if it depends on unknown
+    ground.
     outline_distance, band_distance: from `distances_outside_zone`.
     """
     if band_distance != band_distance:
-        # Outside the zone's shape the place is outside the zone whatever the ground.
+        # Outside the zone's outline a position is outside the zone for any ground.
         if outline_distance <= 0.0:
             return math.nan
         band_distance = outline_distance
@@ -97,10 +98,13 @@ def copy_move_part(source: Record, target: Record) -> None:
 def depth_bounds(
     exclusion: bool, part: Record, length: float, height_change: float, max_distance: float
 ) -> tuple[float, float]:
-    """Return lower and upper bounds of the distance beyond a zone's limit within a part, m.
+    """Return lower and upper bounds of the depth of a violation along one part of a move, m.
 
-    length: length of the part, m.  height_change: largest change of its height relative to the zone's band, m.
-    max_distance: upper bound of its distance beyond the zone's outline, m.
+    The depth is the distance into an exclusion zone, or out of an inclusion zone; it is negative for a compliant point.
+
+    length: length of the part, m.
+    height_change: largest change of the part's height relative to the zone's altitude band, m.
+    max_distance: upper bound of the depth relative to the zone's outline alone, m.
     """
     sign = -1.0 if exclusion else 1.0
     outline_sum, band_sum = (
@@ -109,8 +113,7 @@ def depth_bounds(
     )
     outline_min, outline_max = 0.5 * (outline_sum - length), min(max_distance, 0.5 * (outline_sum + length))
     if band_sum != band_sum:
-        # Over unknown ground at one end only the outline can decide: it can show that the part is not inside an
-        # exclusion.
+        # If the ground is unknown at one end, only the outline can show that the part is not inside an exclusion.
         return (-math.inf, outline_max) if exclusion else (outline_min, math.inf)
     band_min, band_max = 0.5 * (band_sum - height_change), 0.5 * (band_sum + height_change)
     if exclusion:
@@ -120,11 +123,11 @@ def depth_bounds(
 
 @inner
 def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record, length: float) -> float:
-    """Return an upper bound (m) on how far part of a move is inside exclusion z, or outside inclusion z.
+    """Return an upper bound on the depth of a part of a move in a violation of zone `z`'s outline, m.
 
-    It is inf if the part turns by more than a radian.  The bound uses the edges nearest to the part's ends: on a
-    straight line, the distance from an edge, or from the centre of a circle, is greatest at an end.  An arc of less
-    than a radian deviates from its chord by at most curvature x length^2 / 8.
+    The bound is inf if the part turns by more than a radian.  It uses the edges nearest to the part's ends: on a
+    straight line, the distance from an edge, or from the centre of a circle, is largest at an end.  An arc of less than
+    a radian deviates from its chord by at most curvature x length^2 / 8.
     """
     zone = records.zones[z]
     chord_deviation: float = 0.125 * abs(move.curvature) * length * length
@@ -153,11 +156,11 @@ def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record
     return float(zone.radius - math.sqrt(offset_e * offset_e + offset_n * offset_n) + chord_deviation)
 
 
-# How a path meets one zone.  depth: greatest distance beyond the zone's limit, m, negative if the path complies.  It is
-# exact if it is above 0, and for the zone that is nearest to being violated; for all others it is an upper bound.
-# at_time, at_east, at_north, at_up, at_leg: where that is.  entries: number of violations.  beyond: s in total.  entry
-# and exit: start of the first violation and end of the last.  unknown: True if some of the path is above unknown ground
-# and the zone has a limit above ground.
+# Visit of a path to one zone.  depth: largest depth of a violation, m, negative if the path complies.  It is exact if
+# it is positive, and for the zone that is nearest to being violated; for all others it is an upper bound.  at_time,
+# at_east, at_north, at_up, at_leg: time, position and leg of the largest depth.  entries: number of violations.
+# beyond: total duration of the violations, s.  entry and exit: start of the first violation and end of the last.
+# unknown: True if a part of the path is above unknown ground and the zone has a limit above ground.
 VISIT = record_dtype(
     "depth",
     "at_time",
@@ -179,27 +182,28 @@ VISIT = record_dtype(
     ("exit_leg", np.int64),
     ("unknown", np.bool_),
 )
-# Precision of depths beyond a zone's limit, m: half of the rounding of a waypoint.  A numerical precision: the verdict
-# tolerates `logs.verdict.tolerances.ROUNDING_M`.
+# Numerical precision of depths, m: half of the rounding of a waypoint, `logs.verdict.tolerances.ROUNDING_M`, which is
+# the tolerance of the verdict.
 DEPTH_PRECISION = 0.01
-# Precision of the places where a path enters and leaves, m.
+# Precision of the positions at which a path enters and leaves a zone, m.
 EDGE_PRECISION = 1e-3
-# Largest number of parts held at a time.  Bisecting a path of 1,000 km down to `EDGE_PRECISION` takes 34, and there is
-# one for the whole move and one to swap two parts.
+# Largest number of parts in memory.  Bisecting a path of 1,000 km down to `EDGE_PRECISION` takes 34; one more is needed
+# for the whole move, and one to swap two parts.
 _MAX_PARTS = 64
-# Two violations that are no further apart than this are one, s.
+# Largest pause between two violations that are counted as one, s.
 _MERGE_TIME_S = 1e-6
 
 
 def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) -> Records:
-    """Return the visit of a path to each of z zones, with dtype `VISIT`, (z,).
+    """Return the visits of a path to z zones, (z,) of dtype `VISIT`.
 
-    moves: (m,) of `logs.verdict.measures.path_moves.MOVE`.  terrain: None if unknown.
+    moves: the path, (m,) of dtype `logs.verdict.measures.path_moves.MOVE`.
+    terrain: None if unknown.
     """
     heights, to_pixel, spacing = read_only(np.full((2, 2), np.nan, dtype=np.float32)), np.zeros(1, POLYMAP)[0], 1.0
     if terrain is not None:
         heights, to_pixel, spacing = terrain.heights, terrain.to_pixel.record, terrain.spacing
-    # Arrays from compiled code have the fields, but not numpy's records with the fields as attributes.
+    # Arrays from compiled code are not numpy record arrays, whose fields are attributes.
     return _visit_zones(moves, records, heights, to_pixel, spacing).view(VISIT)
 
 
@@ -207,7 +211,7 @@ def path_zones(moves: Records, records: ZoneRecords, terrain: Terrain | None) ->
 def _visit_zones(
     moves: Records, records: ZoneRecords, heights: Heights, to_pixel: PolyMapRecord, spacing: float
 ) -> Records:
-    """Fill the visit of a path to each zone, the nearest zone first."""
+    """Return the visits of a path to all zones, computed for the nearest zone first."""
     count = records.zones.shape[0]
     visits = np.zeros(count, VISIT)
     above_ground = False
@@ -227,7 +231,7 @@ def _visit_zones(
                 )
     parts = np.zeros(_MAX_PARTS, PART)
     known_depth = -math.inf
-    # The nearest zone first: its depth is a bound that shows that the others are further away.
+    # The depth for the nearest zone is a bound that shows that other zones are further away.
     for z in np.argsort(distances, kind="mergesort"):
         if -distances[z] < known_depth:
             visits[z].depth = -distances[z]
@@ -249,12 +253,12 @@ def _fill_visit(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Fill `visit` with the visit of a path to zone z.
+    """Fill `visit` with the visit of a path to zone `z`.
 
     known_depth: depth below which the result need not be exact, m.
 
-    Work in three rounds: check only the moves' ends; find the deepest place, which is near the deepest end; and, if the
-    zone is violated, find the times.
+    The work has three rounds: round 0 checks only the moves' ends; round 1 finds the deepest point, which is near the
+    deepest end; and, if the zone is violated, round 2 finds the times.
     """
     zone = records.zones[z]
     above_ground = zone.floor_above_ground or zone.ceiling_above_ground
@@ -279,7 +283,7 @@ def _fill_visit(
             max_depth = beyond_limit(zone.exclusion, outline_distance, band_distance) + max(
                 half_diagonal, half_height + ground_slope * half_diagonal
             )
-            # The ground may be unknown near a center point whose ground is known: look for it.
+            # The ground may be unknown near a center point with known ground, so such a block is not skipped.
             if max_depth <= (0.0 if round_number == 2 else max(known_depth, visit.depth)) and not (
                 above_ground and outline_distance < half_diagonal
             ):
@@ -305,7 +309,11 @@ def _add_block(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Add consecutive moves to a visit.  round_number: round of `_fill_visit`, 0 to 2."""
+    """Update a visit with a block of consecutive moves.
+
+    round_number: 0 updates the depth from the moves' ends; 1 and 2 bisect the moves (see `_fill_visit`).
+    parts: scratch records, which are overwritten.
+    """
     part = parts[0]
     part.end_east, part.end_north, up = move_point(moves[0], 0.0)
     part.end_outline_distance, part.end_band_distance, part.end_edge = distances_outside_zone(
@@ -340,14 +348,15 @@ def _bisect_move(
     parts: Records,
     visit: Record,
 ) -> None:
-    """Bisect a move, the first of the parts, until each part is certain, and add the parts to a visit.
+    """Bisect a move until each part is certain, and update a visit with the parts.
 
-    in_order: if True, bisect until each part is on one side of the limit, and add the parts in order of time; otherwise
-    bisect until no part can be deeper than the known depth.  The first part's end is left unchanged, because the next
-    move begins there.
+    in_order: True to bisect until each part is on one side of the limit, and add the parts in order of time; False to
+        bisect until no part can be deeper than the known depth.
+    parts: scratch records; `parts[0]` is the whole move, and its end remains unchanged, because the next move begins at
+        this end.
     """
     exclusion = records.zones[z].exclusion
-    # The largest change of the height in a band over the whole move.
+    # Largest change of the height relative to the altitude band over the whole move.
     climb = max(abs(move.climb), abs(move.climb + 2.0 * move.bend)) + ground_slope * move.length
     copy_move_part(parts[0], parts[1])
     top = 1
@@ -360,7 +369,7 @@ def _bisect_move(
         is_certain = max_depth <= target_depth or (in_order and min_depth > 0.0) or max(span, change) <= EDGE_PRECISION
         is_certain = is_certain or _is_unknown(exclusion, part)
         if not is_certain:
-            # Bound again with the nearest edges, which takes longer.
+            # A closer bound with the nearest edges takes longer.
             max_distance = max_violation_bound(records, z, move, part, span)
             min_depth, max_depth = depth_bounds(exclusion, part, span, change, max_distance)
             is_certain = max_depth <= target_depth
@@ -383,7 +392,7 @@ def _bisect_move(
         if not in_order and beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance) > beyond_limit(
             exclusion, earlier.outline_distance, earlier.band_distance
         ):
-            # Put the half that may be deeper on top: its result may make the other half unnecessary.
+            # Put the half that may be deeper on top: its depth may make the other half irrelevant.
             copy_move_part(part, parts[_MAX_PARTS - 1])
             copy_move_part(earlier, part)
             copy_move_part(parts[_MAX_PARTS - 1], earlier)
@@ -392,7 +401,7 @@ def _bisect_move(
 
 @inner
 def _is_unknown(exclusion: bool, part: Record) -> bool:
-    """Return True if both ends depend on unknown ground: the whole part between them is then unknown."""
+    """Return True if the depths at both ends depend on unknown ground, so that the whole part is unknown."""
     start_depth, end_depth = (
         beyond_limit(exclusion, part.outline_distance, part.band_distance),
         beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance),
@@ -402,7 +411,7 @@ def _is_unknown(exclusion: bool, part: Record) -> bool:
 
 @inner
 def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
-    """Update the deepest point of a visit with a part's ends, and note unknown ground."""
+    """Update the deepest point of a visit, and its flag for unknown ground, with the ends of a part."""
     for end in range(2):
         depth = beyond_limit(exclusion, part.outline_distance, part.band_distance)
         if end:
@@ -416,7 +425,7 @@ def _update_depth(move: Record, part: Record, exclusion: bool, visit: Record) ->
 
 @inner
 def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:
-    """Add a part of a move that violates, complies, or crosses the limit once, to a visit."""
+    """Add the violation in a part of a move to a visit.  The part crosses the zone's limit at most once."""
     start_depth, end_depth = (
         beyond_limit(exclusion, part.outline_distance, part.band_distance),
         beyond_limit(exclusion, part.end_outline_distance, part.end_band_distance),

@@ -1,12 +1,13 @@
-"""Compute the altitude from which an aircraft can glide to a place, for every cell of a map.
+"""Compute for every cell of a map the minimum altitude from which an aircraft can glide to a destination.
 
-The shortest paths over terrain are searched backwards.  One search begins at the places to be reached and runs
-against the direction of flight.  A cell's label is the minimum altitude from which the glide gets there: the label of
-the next cell plus the height lost on the step to it, and no less than the ground with its margin, there and between
-them.  So the labels include the terrain, and one search serves every second of a flight.  A step costs its length
-times sink rate over ground speed on its course in the wind at that altitude, which is exact for each step.  Labels
-only grow in the backward direction: cells are settled by altitude, in bands no higher than the cheapest step (E. W.
-Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm 360", 1969).
+The shortest paths over terrain are searched backwards.  One search begins at the destinations and runs against the
+direction of flight.  The label of a cell is the minimum altitude from which a glide reaches a destination: the label of
+the next cell plus the height lost on the step to the next cell, and no less than the ground plus the margin, in the
+cell and between both cells.  So the labels include the terrain, and one search serves every second of a flight.  A step
+costs its length times sink rate over ground speed on its course in the wind at that altitude, which is exact for each
+step.  Labels only grow in the backward direction: cells are settled by altitude, in bands no higher than the cheapest
+step (E. W. Dijkstra, "A Note on Two Problems in Connexion with Graphs", 1959; bands: R. B. Dial, "Algorithm 360",
+1969).
 
 A step goes to one of 32 cells, in directions 7 to 14 degrees apart.  On a plane the labels equal the altitudes for the
 straight path, or exceed them: by 1.0 % at the most in still air, and by 1.8 % in 10 m/s for an aircraft that glides at
@@ -30,32 +31,34 @@ from world.kernels import Record, Records, compiled, inlined, inner, record_dtyp
 from world.terrain import Terrain
 from world.wind import mean_wind_speed
 
-# Rows and columns of cells (c, 2).
+# Row and column of each of c cells, (c, 2).
 Cells = NDArray[np.int64]
 
 # ----------------------------------------------------------------------
-# The map: cells with their minimum altitudes.
+# The map: cells with their ground, minimum altitude and kill spheres.
 
 # Largest number of cells of a map.
 MAX_CELLS = 700_000
 # Smallest side of a cell, m.
 _MIN_CELL_M = 20.0
-# Largest side of a cell, m: a larger cell has the altitude of its highest ground even if most of it is valley.
+# Largest side of a cell, m: a larger cell would have the altitude of its highest ground even if most of it is a valley.
 _MAX_CELL_M = 240.0
-# Largest side of a cell, pixels of the elevation file, if that is more.
+# Largest side of a cell as a number of pixels of the elevation file, if this is longer.
 _MAX_CELL_PIXELS = 8
-# Margin of the map around the places and the flight, m.
+# Margin of the map around the destinations and the flight, m.
 MAP_MARGIN_M = 3000.0
 
 
 @dataclass(frozen=True, slots=True)
 class GlideMap:
-    """Square cells in rows to the north and columns to the east.
+    """Map of square cells, with n rows from south to north and e columns from west to east.
 
-    west, south: m, center of the first cell.  cell: its side, m.
-    ground: (n, e) ground altitude at the centers, m, NaN if unknown.
-    floor: (n, e) minimum altitude in a cell: its highest ground plus the margin, m; NaN if unknown.
-    sphere_bottoms, sphere_tops: (n, e) altitudes between which a cell lies in kill spheres, m; inf and -inf if in none.
+    west, south: center of the first cell, m.
+    cell: side of a cell, m.
+    ground: ground altitude at the cells' centers, m, (n, e); NaN if unknown.
+    floor: minimum altitude in each cell, which is its highest ground plus the margin, m, (n, e); NaN if unknown.
+    sphere_bottoms, sphere_tops: altitudes between which each cell lies in kill spheres, m, (n, e); inf and -inf if the
+        cell lies in none.
     """
 
     west: float
@@ -67,22 +70,23 @@ class GlideMap:
     sphere_tops: Floats
 
     def cell_at(self, east: float, north: float) -> tuple[int, int]:
-        """Return row and column of the cell that contains a position."""
+        """Return the row and the column of the cell that contains a position (m), which may lie off the map."""
         row, column = round((north - self.south) / self.cell), round((east - self.west) / self.cell)
         return row, column
 
     def cell_center(self, row: int, column: int) -> tuple[float, float]:
-        """Return east and north of a cell's center, m."""
+        """Return the center of a cell: east and north, m."""
         return self.west + column * self.cell, self.south + row * self.cell
 
 
 def glide_map(
     terrain: Terrain, positions: Floats, margin: float, spheres: Floats, radii: Floats, map_margin: float = MAP_MARGIN_M
 ) -> GlideMap | None:
-    """Make the map around positions (p, 2), m; return None if its cells would be too coarse for its extent.
+    """Make the map around positions; return None if the map is so large that its cells would be too coarse.
 
+    positions: east and north, m, (p, 2).
     margin: height above ground that a glide keeps, m.
-    spheres, radii: centers (m, 3) and radii (m,) of kill spheres, m.
+    spheres, radii: centers, m, (m, 3), and radii, m, (m,), of kill spheres.
     map_margin: margin of the map around the positions, m.
 
     >>> from world.terrain import make_flat_terrain
@@ -109,7 +113,7 @@ def glide_map(
 
 
 def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
-    """Widen the altitude ranges in which the cells of ``grid`` lie in a kill sphere.
+    """Widen the altitude ranges in which cells of ``grid`` lie in kill spheres by one sphere.
 
     Each cell is checked at its point nearest to the sphere's center.
     """
@@ -130,16 +134,16 @@ def _add_sphere(grid: GlideMap, center: Floats, radius: float) -> None:
     tops[is_inside] = np.maximum(tops, center[2] + half_heights)[is_inside]
 
 
-# Side of the square that a landing place needs, m.
+# Side of the square of flat ground that a landing needs, m.
 LANDING_SQUARE_M = 150.0
-# Largest gradient of the plane that fits the square best, m per m.
+# Largest gradient of the plane that fits the ground of the square best, m per m.
 MAX_LANDING_GRADIENT = 0.05
 # Largest root-mean-square deviation of the square's ground from that plane, m.
 MAX_LANDING_ROUGHNESS_M = 1.5
 
 
 def landable_cells(grid: GlideMap) -> Flags:
-    """Return a mask of the cells outside kill spheres with flat ground around them, (n, e).
+    """Return a mask of the cells outside kill spheres that have flat ground around them, (n, e).
 
     The ground comes from the elevation file, which has no trees, houses or water.
     """
@@ -147,7 +151,7 @@ def landable_cells(grid: GlideMap) -> Flags:
     offsets = np.arange(-half_count, half_count + 1)
     count = offsets.size**2
     ground = grid.ground
-    # Heights relative to a mean, so that their squares keep their digits.
+    # Heights relative to their mean, so that the sums of their squares lose no digits.
     relative_heights = ground - (np.nanmean(ground) if np.isfinite(ground).any() else 0.0)
     unit_weights = np.ones(offsets.size)
     height_sums, squared_height_sums = (
@@ -167,7 +171,7 @@ def landable_cells(grid: GlideMap) -> Flags:
 
 
 def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) -> Floats:
-    """Return weighted sums (n, e) over the square around each cell; NaN if the square leaves the map."""
+    """Return the weighted sum over the square around each cell, (n, e); NaN if the square leaves the map."""
     sums = values
     for axis, weights in ((0, row_weights), (1, column_weights)):
         half_count = weights.size // 2
@@ -181,7 +185,7 @@ def _square_sums(values: Floats, row_weights: Floats, column_weights: Floats) ->
 
 
 def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: float) -> None:
-    """Clear the mask ``is_flat``, (n, e), in exclusion zones that reach down to a height above ground, m."""
+    """Set the mask ``is_flat``, (n, e), to False in exclusion zones that reach down to a height above ground, m."""
     for z in np.flatnonzero(zones.zones["exclusion"]):
         _exclude_zone(is_flat, grid.ground, zones, int(z), grid.west, grid.south, grid.cell, height)
 
@@ -190,7 +194,7 @@ def exclude_zones(grid: GlideMap, is_flat: Flags, zones: ZoneRecords, height: fl
 def _exclude_zone(
     is_flat: Flags, ground: Floats, zones: ZoneRecords, z: int, west: float, south: float, cell: float, height: float
 ) -> None:
-    """Clear the mask in one exclusion zone that reaches down to a height above ground, m."""
+    """Set the mask to False in exclusion zone `z` where the zone reaches down to a height above ground, m."""
     zone = zones.zones[z]
     rows, columns = is_flat.shape
     for i in range(
@@ -219,7 +223,7 @@ _CROSSED_CELL = record_dtype(("east", np.int64), ("north", np.int64), "fraction"
 
 
 def steps() -> tuple[Records, Records]:
-    """Return the 32 steps, (32,) of `STEP`, and the cells between the ends of each step.
+    """Return the 32 steps, (32,) of dtype `STEP`, and the cells that they cross, of dtype `_CROSSED_CELL`.
 
     >>> made, between = steps()
     >>> len(made), len({round(float(one.course), 6) for one in made})
@@ -236,7 +240,7 @@ def steps() -> tuple[Records, Records]:
         fraction_by_cell: dict[tuple[int, int], float] = {}
         for k in range(1, 64):
             fraction = k / 64.0
-            # From the end backwards; corners, which are touched and not crossed, are assigned to either side.
+            # From the end backwards; a cell that is only touched at a corner may be included or not.
             cell = (-round(fraction * east), -round(fraction * north))
             fraction_by_cell.setdefault(cell, fraction)
         ends = ((0, 0), (-east, -north))
@@ -251,10 +255,10 @@ def steps() -> tuple[Records, Records]:
 
 
 class GlideSlopes(NamedTuple):
-    """Height lost per metre over the ground, by course and altitude.
+    """Height lost per meter over the ground, by course and altitude.
 
-    first_altitude, altitude_step: first altitude, and altitude step, m.
-    table: (c, h) m per m, for the courses of `steps`; inf if no progress is made.
+    first_altitude, altitude_step: first altitude and altitude step of the table, m.
+    table: slopes for the courses of `steps` and for h altitudes, m per m, (c, h); inf if no progress is made.
     """
 
     first_altitude: float
@@ -269,7 +273,7 @@ _MIN_GROUND_SPEED_MPS = 1.0
 
 
 def glide_slopes(aircraft: PointMass, airspeed: float, min_altitude: float, max_altitude: float) -> GlideSlopes:
-    """Return the slopes between two altitudes (m AMSL) at an equivalent airspeed, m/s."""
+    """Return the glide slopes between two altitudes (m AMSL) at an equivalent airspeed (m/s)."""
     courses = np.array(steps()[0]["course"])
     slopes = np.empty((courses.size, max(2, math.ceil((max_altitude - min_altitude) / _ALTITUDE_STEP_M) + 1)))
     _fill_slopes(aircraft.record, aircraft.excess, airspeed, courses, min_altitude, slopes)
@@ -280,7 +284,7 @@ def glide_slopes(aircraft: PointMass, airspeed: float, min_altitude: float, max_
 def _fill_slopes(
     aircraft: Record, excess: Floats, airspeed: float, courses: Floats, min_altitude: float, slopes: Floats
 ) -> None:
-    """Fill the table of glide slopes by course and altitude."""
+    """Fill the table `slopes`, (c, h), with glide slopes by course and altitude."""
     for h in range(slopes.shape[1]):
         altitude = min_altitude + h * _ALTITUDE_STEP_M
         true_airspeed = airspeed * true_by_equivalent(altitude)
@@ -301,12 +305,12 @@ def _fill_slopes(
 
 @dataclass(frozen=True, slots=True)
 class GlideAltitudes:
-    """Result of the search for one set of places.
+    """Result of the backward search from one set of destinations.
 
     grid: the map.
-    min_altitude: (n, e) minimum altitude from which a glide reaches one of them, m AMSL; inf if none.
-    destination: (n, e) cell of the place that is reached, numbered through all rows; -1 if none.
-    next_step: (n, e) the next step of the glide, an index of `steps`; -1 at the place itself.
+    min_altitude: minimum altitude from which a glide reaches a destination, m AMSL, (n, e); inf if none is reached.
+    destination: cell of the destination that is reached, numbered through all rows, (n, e); -1 if none is reached.
+    next_step: index in `steps` of the next step of the glide, (n, e); -1 at the destination itself.
     """
 
     grid: GlideMap
@@ -316,9 +320,11 @@ class GlideAltitudes:
 
 
 def search_glide_altitudes(grid: GlideMap, cells: Cells, slopes: GlideSlopes, max_altitude: float) -> GlideAltitudes:
-    """Search backwards from cells up to ``max_altitude``, m AMSL; higher labels are not computed.
+    """Search backwards from the cells of destinations, up to ``max_altitude`` (m AMSL).
 
-    Cells off the map, and cells with unknown ground, reach nothing.
+    Cells off the map and cells with unknown ground are no destinations.
+
+    cells: rows and columns of the destinations, (c, 2).
     """
     min_altitude: Floats = np.full_like(grid.floor, math.inf)
     destination: Codes = np.full(min_altitude.shape, -1, dtype=np.int32)
@@ -385,7 +391,9 @@ def _settle_cells(
 ) -> None:
     """Fill `min_altitude`, `destination` and `next_step` by settling cells in order of altitude, band after band.
 
-    band_heads: (b,) the first cell of each band, -1 for none.  links: (cells, 2) a cell's neighbours in its band.
+    band: height of a band, m.
+    band_heads: first cell of each band, (b,); -1 for an empty band.
+    links: previous and next cell of each cell in its band, (cells, 2); -1 for none.
     """
     rows, columns = min_altitude.shape
     flat_altitudes = min_altitude.ravel()
@@ -422,7 +430,7 @@ def _settle_cells(
 
 @inlined
 def _slope_at(slopes: Floats, step_index: int, position: float) -> float:
-    """Return the slope of a step at a fractional index among the altitudes."""
+    """Return the slope of a step at a fractional index of the table's altitudes, by linear interpolation."""
     index = int(position)
     return slopes[step_index, index] + (position - index) * (slopes[step_index, index + 1] - slopes[step_index, index])
 
@@ -439,7 +447,14 @@ def _step_start_altitude(
     end_altitude: float,
     altitude_loss: float,
 ) -> float:
-    """Return the minimum start altitude with which a step into a cell clears all cells between, m, or NaN."""
+    """Return the minimum altitude at the start of a step from which it clears all crossed cells, m AMSL.
+
+    The result is NaN if the ground is unknown.
+
+    row, column: cell in which the step ends.
+    end_altitude: altitude at the end of the step, m AMSL.
+    altitude_loss: height lost in the step, m.
+    """
     start_altitude = end_altitude + altitude_loss
     for k in range(step.first, step.last):
         cell = crossed_cells[k]
@@ -449,7 +464,7 @@ def _step_start_altitude(
         altitude = _raise_above_spheres(
             max(start_altitude - altitude_lost, floor[i, j]), sphere_bottoms[i, j], sphere_tops[i, j]
         )
-        # NaN, for unknown ground, fails the comparison.
+        # The comparison is False for NaN, which means unknown ground.
         if not floor[i, j] <= altitude:
             return math.nan
         start_altitude = altitude + altitude_lost
@@ -462,7 +477,7 @@ def _step_start_altitude(
 
 @inner
 def _raise_above_spheres(altitude: float, bottom: float, top: float) -> float:
-    """Return an altitude, or the top of the spheres if they contain the altitude, m."""
+    """Return an altitude, m, or the top of the kill spheres if the altitude lies inside them."""
     return top if bottom < altitude < top else altitude
 
 

@@ -1,10 +1,10 @@
-"""Compute the places to which a flying aircraft can glide.
+"""Compute the destinations to which a flying aircraft can glide.
 
-The aircraft flies on for a moment, turns to the path to the place, and glides.  The path comes from a backward search
-(`logs.verdict.returns.glide_map`) that ignores turns.  So the turn is flown first, to either side, in the mean wind:
-at the bank that the autopilot commands and the airspeed allows, at the higher speed and sink that the load factor of
-that bank causes.  Neither the altitude that the excess speed over the glide speed would give back nor the altitude
-needed to reach the speed of the turn is included.
+The aircraft flies on for a moment, turns to the path to the destination, and glides.  The path comes from a backward
+search (`logs.verdict.returns.glide_map`) that ignores turns.  Therefore the turn is simulated first, to either side, in
+the mean wind: at the bank that the autopilot commands and the airspeed allows, with the higher speed and sink rate that
+the load factor of this bank causes.  Neither the altitude that the excess speed over the glide speed would give back
+nor the altitude needed to reach the speed of the turn is included.
 """
 
 import math
@@ -25,19 +25,19 @@ from world.geometry import wrap
 from world.kernels import Record, Records, compiled, inner, record_dtype
 from world.wind import mean_wind_speed
 
-# Step in which a turn is checked, rad.
+# Course step of a simulated turn, rad.
 _TURN_STEP_RAD = math.radians(10.0)
 # Largest number of steps of a turn.
 _MAX_TURN_STEPS = 40
-# Number of steps along the path ahead after which its course is measured.
+# Number of steps along the path ahead over which the course of the path is measured.
 _LOOKAHEAD_STEPS = 6
 # State of the aircraft in a turn: position, m, and course, rad.
 _TURN_STATE = record_dtype("east", "north", "up", "course")
-# The glider and the map's grid, for compiled code: equivalent airspeed, m/s, bank, rad, and the grid, m.
+# Glide and grid of the map for compiled code: equivalent airspeed, m/s; bank, rad; south-western cell and cell side, m.
 _GLIDER = record_dtype("airspeed", "bank", "west", "south", "cell")
 
 
-def glide_altitudes_left(
+def remaining_glide_altitudes(
     starts: Records,
     glide_altitudes: GlideAltitudes,
     aircraft: PointMass,
@@ -45,13 +45,15 @@ def glide_altitudes_left(
     airspeed: float,
     bank: float,
 ) -> tuple[Floats, Codes]:
-    """Return the altitude left on arrival at the best place from each start, m, (n,), and that place's cell.
+    """Return the altitude left on arrival at the best destination of each start, m, (n,), and the destination's cell.
 
-    starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.  airspeed: equivalent airspeed of the
-    glide, m/s.  bank: bank of the turn, rad; limited to the bank that the airspeed allows.
+    starts: (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
+    glide_altitudes: result of the backward search from the destinations.
+    airspeed: equivalent airspeed of the glide, m/s.
+    bank: bank of the turn, rad; limited to the bank that the airspeed allows.
 
-    The altitude is negative if the place is out of reach, and -inf if no path leads there.  The place is a cell of the
-    map, numbered through all rows, as in `logs.verdict.returns.glide_map.GlideAltitudes`.
+    The altitude is negative if the destination is out of reach, and -inf if no path leads to one.  The cell is numbered
+    through all rows of the map, as in `logs.verdict.returns.glide_map.GlideAltitudes`; -1 without a path.
     """
     altitude_left, reached_cells = np.full(len(starts), -math.inf), np.full(len(starts), -1, dtype=np.int32)
     grid = glide_altitudes.grid
@@ -77,7 +79,7 @@ def glide_altitudes_left(
 
 
 def cell_position(grid: GlideMap, cell: int) -> tuple[float, float, float]:
-    """Return east, north and ground altitude of a cell that is numbered through all rows, m."""
+    """Return the center of a cell, as east, north and ground altitude, m.  cell: number through all rows of the map."""
     row, column = divmod(cell, grid.floor.shape[1])
     return (*grid.cell_center(row, column), float(grid.ground[row, column]))
 
@@ -118,7 +120,7 @@ def _fill_altitudes_left(
             excess_table, 0.0, turn_speed, start.up, aircraft
         )
         step_duration = _TURN_STEP_RAD * turn_speed / (GRAVITY * tan_bank)
-        # Height loss to the center of a neighbouring cell, whatever the course.
+        # Upper bound of the height lost per meter to the center of a neighbouring cell, on any course.
         sink = -excess_power(excess_table, 0.0, min_speed, start.up, aircraft)
         center_slope = sink / max(1.0, 0.95 * min_speed - wind)
         for turn_sign in (-1.0, 1.0):
@@ -141,8 +143,7 @@ def _fill_altitudes_left(
                     if cell_altitude_left > -math.inf
                     else previous_turn
                 )
-                # The path ahead changes during a turn, so that one step may overshoot its course by more than that
-                # step.
+                # The path ahead changes during a turn, so one step may overshoot the path's course by more than a step.
                 has_passed = (
                     0.0 < previous_turn <= 2.0 * _TURN_STEP_RAD and -2.0 * _TURN_STEP_RAD <= remaining_turn < 0.0
                 )
@@ -158,14 +159,14 @@ def _fill_altitudes_left(
                 state.north += step_duration * ground_north
                 state.up -= step_duration * turn_sink
                 yaw += turn_sign * _TURN_STEP_RAD
-    # Compiled code frees an array after its last use, and the use of one of its records does not keep it alive.
+    # Compiled code frees an array after its last use, and a use of one of its records does not keep it alive.
     if state_array.size != 1:
         altitude_left[:] = math.nan
 
 
 @inner
 def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glider: Record) -> bool:
-    """Return True if the aircraft is on the map, above the ground's margin, and outside every kill sphere."""
+    """Return True if the aircraft is on the map, above the cell's minimum altitude, and outside every kill sphere."""
     i, j = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
     if not (0 <= i < floor.shape[0] and 0 <= j < floor.shape[1]) or not state.up >= floor[i, j]:
         return False
@@ -182,9 +183,11 @@ def _is_clear(state: Record, floor: Floats, spheres: Floats, radii: Floats, glid
 
 @inner
 def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record) -> tuple[float, int, int]:
-    """Return altitude left, row and column of the best cell among the aircraft's cell and its neighbours.
+    """Return the altitude left, the row and the column of the best cell: the aircraft's cell or one of its neighbours.
 
-    A cell's center may lie in a sphere even if the aircraft does not.  slope: height lost per metre to a center.
+    Neighbours are included because a cell's center may lie in a sphere even if the aircraft does not.
+
+    slope: height lost per meter on the way to a cell's center.
     """
     row, column = round((state.north - glider.south) / glider.cell), round((state.east - glider.west) / glider.cell)
     best_altitude_left, best_row, best_column = -math.inf, row, column
@@ -202,7 +205,13 @@ def _best_cell(state: Record, min_altitude: Floats, slope: float, glider: Record
 def _remaining_turn(
     state: Record, i: int, j: int, turn_sign: float, next_step: Codes, step_records: Records, glider: Record
 ) -> float:
-    """Return the turn that remains to the path's course at a cell, rad; negative if overshot, 0 at its end."""
+    """Return the turn that remains to the course of the path at a cell, rad.
+
+    It is negative if the course was overshot, and 0 at the end of the path.
+
+    i, j: row and column of the cell.
+    turn_sign: 1 for a turn to the right, -1 to the left.
+    """
     for _ in range(_LOOKAHEAD_STEPS):
         step_index = next_step[i, j]
         if step_index < 0:

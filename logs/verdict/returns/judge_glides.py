@@ -29,7 +29,7 @@ from logs.verdict.returns.glide_map import (
     landable_cells,
     search_glide_altitudes,
 )
-from logs.verdict.returns.glide_reach import cell_position, glide_altitudes_left
+from logs.verdict.returns.glide_reach import cell_position, remaining_glide_altitudes
 from logs.verdict.returns.judge_returns import ReturnWorld
 from logs.verdict.returns.return_starts import ReturnStarts
 from world.arrays import Flags, Floats
@@ -241,7 +241,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
         Returns for each start the altitude left (m) and the cell that is reached, and the map of minimum altitudes, m.
         """
         glide_altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
-        altitudes_left, reached_cells = glide_altitudes_left(
+        altitudes_left, reached_cells = remaining_glide_altitudes(
             rows, glide_altitudes, world.aircraft, environment, airspeed, bank
         )
         return altitudes_left, reached_cells, glide_altitudes.min_altitude

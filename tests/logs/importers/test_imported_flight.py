@@ -158,7 +158,7 @@ def test_what_is_not_there_is_not_held() -> None:
 
 def test_a_flight_is_taken_by_its_number() -> None:
     assert make_flight(example_raw_log(), 1).number == 1
-    with pytest.raises(LogError, match=r"flight 2: it holds flights 1\.\.1"):
+    with pytest.raises(LogError, match=r"flight 2: the log has flights 1\.\.1"):
         make_flight(example_raw_log(), 2)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_START, ReturnEnvironment
 from logs.verdict.returns.glide_map import glide_map, glide_slopes, search_glide_altitudes
-from logs.verdict.returns.glide_reach import cell_position, glide_altitudes_left
+from logs.verdict.returns.glide_reach import cell_position, remaining_glide_altitudes
 from tests.flight.autopilots.arduplane.kept_flights import FOLDER, HOME, WIND, jacksboro
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import aerosonde
 from tests.logs.verdict.returns.gliders import (
@@ -63,7 +63,7 @@ def left_of(
     start["velocity_east"] = speed * math.sin(math.radians(course)) + wind * math.sin(to)
     start["velocity_north"] = speed * math.cos(math.radians(course)) + wind * math.cos(to)
     around = ReturnEnvironment(terrain.heights, terrain.to_pixel.record, spheres, radii, True)
-    left, reached = glide_altitudes_left(start, needs, aircraft, around, AIRSPEED, bank)
+    left, reached = remaining_glide_altitudes(start, needs, aircraft, around, AIRSPEED, bank)
     return float(left[0]), cell_position(made, int(reached[0])) if reached[0] >= 0 else (math.nan,) * 3
 
 
@@ -216,7 +216,7 @@ def test_home_is_in_reach_from_where_arduplane_glided_to_it() -> None:
     slopes = glide_slopes(aircraft, AIRSPEED, float(np.nanmin(made.ground)), top)
     needs = search_glide_altitudes(made, np.array([made.cell_at(*HOME[:2])]), slopes, top)
     around = ReturnEnvironment(terrain.heights, terrain.to_pixel.record, NO_SPHERES, NO_RADII, True)
-    left, _ = glide_altitudes_left(starts, needs, aircraft, around, AIRSPEED, BANK)
+    left, _ = remaining_glide_altitudes(starts, needs, aircraft, around, AIRSPEED, BANK)
     assert (left >= 0.0).tolist() == [row["reaches_home"] == "1" for row in rows]
     # ArduPlane dives onto its slope, and comes over home lower than the best glide would, or as high.
     assert all(0.0 <= one < 300.0 for one in left[left >= 0.0])
