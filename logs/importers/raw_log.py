@@ -182,21 +182,12 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = EXAMPLE_ALT
         """Return a series of columns at all times of the flight."""
         return LogSeries(name, boot_time, np.column_stack(columns))
 
-    ends = [
-        to_geo(GeoOrigin(lat, lon), *place)
-        for place in ((0.0, 0.0), (0.0, EXAMPLE_LEG_M), (EXAMPLE_LEG_M, EXAMPLE_LEG_M))
-    ]
+    waypoints = ((0.0, 0.0), (0.0, EXAMPLE_LEG_M), (EXAMPLE_LEG_M, EXAMPLE_LEG_M))
+    geo_waypoints = [to_geo(GeoOrigin(lat, lon), *waypoint) for waypoint in waypoints]
+    command, frame = int(Command.NAV_WAYPOINT), int(Frame.GLOBAL)
     items = tuple(
-        MissionItem(
-            number,
-            int(Command.NAV_WAYPOINT),
-            int(Frame.GLOBAL),
-            (0.0,) * 4,
-            round_to_grid(float(y)),
-            round_to_grid(float(x)),
-            up,
-        )
-        for number, (y, x) in enumerate(ends, 1)
+        MissionItem(number, command, frame, (0.0,) * 4, round_to_grid(float(y)), round_to_grid(float(x)), up)
+        for number, (y, x) in enumerate(geo_waypoints, 1)
     )
     home, height = Home(items[0].lat_deg, items[0].lon_deg, up - 100.0), np.full(time.size, up)
     return RawLog(

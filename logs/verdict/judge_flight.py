@@ -53,21 +53,10 @@ def judge_flight(
     reference: results of reference flights.
     requirements: the setup's route requirements if already known.
 
-    >>> from aircraft.catalog import find_aircraft
-    >>> from flight.dynamics.envelope_tables import load_envelope
-    >>> from flight.mission.items import Mission, MissionItem
-    >>> from flight.mission.route import make_route
-    >>> from flight.simulation.setup import make_limits
-    >>> from flight.simulation.simulate import Flight, fly_to_end
-    >>> from world.scenario import load_scenario
-    >>> scenario, aerosonde = load_scenario("tight"), find_aircraft("aerosonde")
-    >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.01 * k, 75.0) for k in range(2)]
-    >>> mission, limits = Mission(None, tuple(way)), make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
-    >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
-    >>> setup = FlightSetup(scenario, mission, route, limits, "aerosonde", 888.0, seed=1)
-    >>> flown = fly_to_end(Flight(setup, aerosonde))
-    >>> judge_flight(setup, flown.track, flown.ended).headline
-    'flyable'
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> judge_flight(log.setup, log.track, "completed").headline
+    'not flyable: threat Alfa (missile) (13.3 s inside its range)'
     """
     if setup.source is not None:
         return judge_imported_flight(setup, track, log_complete=log_complete)

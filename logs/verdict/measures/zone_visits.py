@@ -352,8 +352,7 @@ def _bisect_move(
 
     in_order: True to bisect until each part is on one side of the limit, and add the parts in order of time; False to
         bisect until no part can be deeper than the known depth.
-    parts: scratch records; `parts[0]` is the whole move, and its end remains unchanged, because the next move begins at
-        this end.
+    parts: scratch records; `parts[0]` is the whole move, whose end must not change, because the next move begins there.
     """
     exclusion = records.zones[z].exclusion
     # Largest change of the height relative to the altitude band over the whole move.

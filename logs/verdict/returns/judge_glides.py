@@ -218,14 +218,13 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     parameters = world.parameters
     sites, airspeed = _glide_sites(world), float(parameters.airspeed_min)
     burns_fuel = world.setup.envelope.volts <= 0.0
-    terrain, environment = world.scenario.terrain, world.environment
-    if terrain is None:
-        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="terrain")
-    if not world.aircraft.glides:
-        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="trim")
-    if not len(starts):
-        return Glides((), sites, airspeed, fuel=burns_fuel)
+    terrain, environment, aircraft = world.scenario.terrain, world.environment, world.aircraft
+    if terrain is None or not aircraft.glides:
+        not_judged = "terrain" if terrain is None else "trim"
+        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged=not_judged)
     rows = starts.rows
+    if not len(rows):
+        return Glides((), sites, airspeed, fuel=burns_fuel)
     positions = np.concatenate([np.stack([rows["east"], rows["north"]], axis=1), [site[2:] for site in sites]])
     grid = glide_map(terrain, positions, MARGIN, environment.spheres, environment.radii)
     if grid is None:
@@ -233,18 +232,13 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     own_returns = _simulate_engine_out_returns(world, starts)
     bank, max_altitude = float(parameters.roll_limit), float(rows["up"].max())
     min_ground_altitude = float(np.nanmin(grid.ground)) if np.isfinite(grid.ground).any() else 0.0
-    slopes = glide_slopes(world.aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
+    slopes = glide_slopes(aircraft, airspeed, min_ground_altitude, max(max_altitude, min_ground_altitude + 1.0))
 
     def search_glides_to(cells: Cells) -> tuple[Floats, NDArray[np.int32], Floats]:
-        """Search the glides to destination cells.
-
-        Returns for each start the altitude left (m) and the cell that is reached, and the map of minimum altitudes, m.
-        """
-        glide_altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
-        altitudes_left, reached_cells = remaining_glide_altitudes(
-            rows, glide_altitudes, world.aircraft, environment, airspeed, bank
-        )
-        return altitudes_left, reached_cells, glide_altitudes.min_altitude
+        """Return the altitude left (m) and the reached cell of each start, and the map of minimum altitudes (m)."""
+        altitudes = search_glide_altitudes(grid, cells, slopes, max_altitude)
+        lefts, reached_cells = remaining_glide_altitudes(rows, altitudes, aircraft, environment, airspeed, bank)
+        return lefts, reached_cells, altitudes.min_altitude
 
     # One search for home, and one for all other sites, which finds the best of them for each start.
     site_cells = np.array([grid.cell_at(site.east, site.north) for site in sites])

@@ -103,8 +103,7 @@ def climbout_findings(
 ) -> list[Finding]:
     """Judge the climb from home to the first waypoint.
 
-    Return [] if that waypoint is over home, if the mission has no home, if there is no terrain, if the aircraft takes
-    off vertically, or if the take-off was flown.
+    Return [] without a home or terrain, if that waypoint is over home, or for a take-off that is vertical or flown.
     """
     home, terrain = requirements.setup.mission.home, requirements.setup.scenario.terrain
     if not has_ground_paths(requirements) or home is None or terrain is None:
@@ -382,15 +381,9 @@ def approach_findings(
     waypoint, leg = landing[0], landing[0] - 1
     place, item_text = requirements.waypoint(waypoint), _item_text(requirements.waypoint(waypoint))
     glide_start, landing_point = requirements.points[leg], requirements.points[waypoint]
-    length, course, point_altitude = (
-        float(requirements.runs[leg]),
-        float(requirements.courses[leg]),
-        setup.route.landing_ground,
-    )
-    start_altitude, ground_altitude = (
-        float(glide_start[2]),
-        float(terrain.height(float(landing_point[0]), float(landing_point[1]))),
-    )
+    length, course = float(requirements.runs[leg]), float(requirements.courses[leg])
+    start_altitude, point_altitude = float(glide_start[2]), setup.route.landing_ground
+    ground_altitude = float(terrain.height(float(landing_point[0]), float(landing_point[1])))
     if math.isnan(point_altitude) or math.isnan(ground_altitude) or length < MIN_LEG_LENGTH_M:
         reason = "the terrain height at the landing point is unknown"
         return [_unjudged_finding("approach", place, reason, is_undecided=True)]

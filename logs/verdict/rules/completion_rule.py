@@ -97,9 +97,7 @@ _RETURN_MODE = "RTL"
 def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLegs], log_complete: bool) -> Finding:
     """Judge whether an imported flight completed its mission; a log that ends en route leaves the rest undecided."""
     last_leg, faults, unknown_texts, notes = setup.route.legs - 1, [], [], []
-    flown_legs = {
-        leg for stretch_legs in stretches for leg in range(stretch_legs.first, stretch_legs.last - stretch_legs.partial)
-    }
+    flown_legs = {leg for legs in stretches for leg in range(legs.first, legs.last - legs.partial)}
     leg_count = len(set(setup.route.leg_numbers.tolist()))
     finished_count = leg_count - len(_leg_numbers(setup, set(range(setup.route.legs)) - flown_legs))
     missing_items = None if setup.source is None else setup.source.missing
@@ -125,11 +123,9 @@ def imported_completion_finding(setup: FlightSetup, stretches: Sequence[FlownLeg
     elif last_leg in flown_legs:
         last_leg_text = f"{finished_count} of {leg_count} legs flown, the last of them to its end"
         unflown_legs, doubt_texts = _unflown_legs(setup, stretches, flown_legs)
-        faults += (
-            [message(f"{_legs_text(setup, unflown_legs)} not flown along the mission", f": {last_leg_text}")]
-            if unflown_legs
-            else []
-        )
+        if unflown_legs:
+            unflown_text = f"{_legs_text(setup, unflown_legs)} not flown along the mission"
+            faults.append(message(unflown_text, f": {last_leg_text}"))
         unknown_texts += [f"{'; '.join(doubt_texts)}: {last_leg_text}"] if doubt_texts else []
         notes += [] if unflown_legs or doubt_texts else [last_leg_text]
     else:

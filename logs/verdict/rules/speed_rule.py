@@ -66,10 +66,7 @@ def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
 def _speed_finding(
     requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, demanded: float, *, geometric: bool
 ) -> Finding:
-    """Judge the airspeed on one leg.
-
-    demanded: airspeed that the mission demands, m/s; equivalent airspeed if it differs from the route's true airspeed.
-    """
+    """Judge the airspeed on one leg, on which the mission demands a true or equivalent airspeed, m/s."""
     commanded = float(requirements.route.airspeed[leg])
     min_speed, max_speed, faults = _level_speed_range(requirements, leg, commanded)
     notes = [*_speed_range_notes(requirements, leg), _command_text(demanded, commanded, min_speed, max_speed)]
@@ -88,16 +85,15 @@ def _speed_finding(
             notes.append(f"{mean_speed:.1f} m/s reached; the leg is too short to hold it")
         else:
             mean_speed, tolerance, min_mean = measurement
-            error = abs(mean_speed - commanded)
+            error = mean_speed - commanded
             notes.append(f"flown {mean_speed:.2f} m/s on average, {min_mean:.1f} m/s at the slowest second")
-            if error > MEAN_SPEED_TOLERANCE_MPS + tolerance and not _is_caused_by_air(
-                requirements, aligned, leg, mean_speed - commanded
-            ):
-                error_text = (
-                    f"flown {mean_speed:.1f} m/s on average, {error:.1f} m/s off the commanded {commanded:.1f} m/s"
+            is_off = abs(error) > MEAN_SPEED_TOLERANCE_MPS + tolerance
+            if is_off and not _is_caused_by_air(requirements, aligned, leg, error):
+                text = (
+                    f"flown {mean_speed:.1f} m/s on average, {abs(error):.1f} m/s off the commanded {commanded:.1f} m/s"
                 )
-                notes += [error_text] if requirements.envelope else []
-                faults += [] if requirements.envelope else [message(error_text)]
+                notes += [text] if requirements.envelope else []
+                faults += [] if requirements.envelope else [message(text)]
             if not faults and (held_speed := _find_held_speed(requirements, aligned, leg, commanded)):
                 # From here on the flown speed is judged by the command, instead of the command by the envelope.
                 mean_speed, allowed_error, source = held_speed.speed, held_speed.allowed_error, "mission"

@@ -39,7 +39,10 @@ from world.geometry import fly_by_offset
 def turn_findings(
     requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
-    """Judge the turn at each inner waypoint; if ``geometric``, judge only the route, without a flight."""
+    """Return a finding for the turn at each inner waypoint, except at the waypoints of turnarounds.
+
+    If ``geometric``, judge only the route, without a flight.
+    """
     measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
@@ -59,13 +62,14 @@ def _turn_finding(
     aligned: AlignedTrack | None,
     distance_of_shortcut: ShortcutDistance,
 ) -> Finding:
-    """Judge the turn at waypoint i.  measure: the flown turn; None before a flight.
+    """Return the finding for the turn at waypoint i.
 
+    measure: measurements of the flown turn; None before a flight.
     distance_of_shortcut: as for `negligible_kink`.
     """
     planned_turn = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
-    # A neighbouring turn that needs more than the whole leg is itself at fault: going straight on needs no length.
+    # A neighbouring turn that needs more than the whole leg has the fault itself: going straight on needs no length.
     limit = max(limit, 0.0)
     if requirements.runs[i - 1 : i + 1].min() < MIN_LEG_LENGTH_M:
         reason = "a neighbouring leg is vertical and has no course, so the turn cannot be judged"
@@ -75,19 +79,17 @@ def _turn_finding(
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
         lateral = negligible_kink(requirements, i, distance_of_shortcut)
         if lateral is None:
-            # The message states the turn and its limit.
+            # The message already states the turn and its limit.
             faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []
         else:
-            facts.append(
-                f"a negligible kink: the path without this waypoint passes it at {lateral:.1f} m and can be flown"
-            )
+            facts.append(f"a negligible kink: a flyable path without this waypoint passes it at {lateral:.1f} m")
     facts += _fly_over_notes(requirements, i, planned_turn)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE_RAD
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE_RAD
         flown_faults = _flown_faults(requirements, i, measure, limit)
         facts += [text for name, text in _flown_facts(requirements, i, measure) if name not in flown_faults]
-        # If the aircraft's limits apply, the turn is judged by them; faults of the flown turn are only reported.
+        # If the aircraft's limits are known, the turn is judged by them, and faults of the flown turn are only facts.
         facts += [fault.brief for fault in flown_faults.values()] if requirements.envelope else []
         faults += [] if requirements.envelope else flown_faults.values()
         fit = "least-squares courses of both legs" if measure.is_fitted else "course change over the turn"
@@ -117,7 +119,7 @@ def _turn_finding(
 def _unflown_turn_text(
     requirements: RouteRequirements, i: int, measure: TurnMeasure, aligned: AlignedTrack | None
 ) -> str:
-    """Explain why a turn was not flown.
+    """Return the text why a turn was not flown.
 
     Either the flight ended before the turn, or the autopilot skipped a neighbouring leg.
     """
@@ -137,7 +139,10 @@ def _unflown_turn_text(
 
 
 def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> list[str]:
-    """Return a note if a waypoint is flown over because a fly-by arc would miss its acceptance radius."""
+    """Return a note if a waypoint is flown over because a fly-by arc would miss its acceptance radius, else [].
+
+    turn: course change, rad.
+    """
     radius, acceptance = float(requirements.radius[i]), float(requirements.setup.route.acceptance[i])
     if not requirements.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
         return []
@@ -154,10 +159,13 @@ def _fly_over_notes(requirements: RouteRequirements, i: int, turn: float) -> lis
 def _sharp_turn_message(
     requirements: RouteRequirements, i: int, planned_turn: float, limit: float, source: str
 ) -> Message:
-    """Explain why the planned turn (rad) at waypoint i does not fit: its limit, or the leg length that it takes."""
+    """Return the message why the planned turn (rad) at waypoint i does not fit.
+
+    The message states the limit (rad), or the leg length that the turn takes.
+    """
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":
-        return message(f"{turn_text}, beyond the scenario's {math.degrees(limit):.1f}°")
+        return message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
     speed, bank = float(max(requirements.route.airspeed[i - 1 : i + 1])), math.degrees(requirements.limits.max_bank)
     radius = float(requirements.radius[i])
     if not math.isfinite(radius):
@@ -183,7 +191,7 @@ def _sharp_turn_message(
 
 
 def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[tuple[str, str]]:
-    """Describe how the turn was flown: quantities and their texts."""
+    """Return the measured quantities of a flown turn and their texts."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
         facts.append(("course change", f"flown course change {math.degrees(measure.angle):.2f}°"))
@@ -220,16 +228,22 @@ def _measured_facts(measure: TurnMeasure | None) -> list[Fact]:
 
 
 def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> dict[str, Message]:
-    """Return the faults of the flown turn by quantity: angle or bank beyond the limit, a tight arc, overshoot."""
+    """Return the faults of the flown turn, by the quantities of `_flown_facts` and by "circles".
+
+    limit: largest course change, rad.
+    """
     faults = {}
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
-        flown_angle, max_value = math.degrees(measure.angle), math.degrees(limit)
-        faults["course change"] = message(f"flown course change {flown_angle:.1f}° beyond {max_value:.1f}°")
+        flown_angle, max_angle = math.degrees(measure.angle), math.degrees(limit)
+        faults["course change"] = message(
+            f"flown course change {flown_angle:.1f}°, more than the limit of {max_angle:.1f}°"
+        )
     max_bank = requirements.limits.max_bank + BANK_TOLERANCE_RAD
-    # Roll in a gust, or into a turn, is not the bank of the turn: the mean over a second applies.
+    # A gust, and the roll into the turn, change the bank for a moment only: the mean over a second is judged.
     if measure.held_bank is not None and measure.held_bank > max_bank:
-        held_bank, max_value = math.degrees(measure.held_bank), math.degrees(max_bank)
-        faults["bank"] = message(f"bank {held_bank:.1f}° beyond {max_value:.1f}°")
+        faults["bank"] = message(
+            f"bank {math.degrees(measure.held_bank):.1f}°, more than the limit of {math.degrees(max_bank):.1f}°"
+        )
     if (tight_turn := _tight_turn_fault(requirements, i, measure)) is not None:
         faults["radius"] = tight_turn
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT_TOLERANCE_M:
@@ -237,10 +251,10 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
         faults["overshoot"] = message(
             f"overshoots {passed_text} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT_TOLERANCE_M:.0f} m)"
         )
-    max_value = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
-    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_value:
+    max_offset = SETTLED_CROSS_TRACK_M + GUST_OFFSET_M[requirements.setup.scenario.wind.turbulence]
+    if measure.settled_distance is not None and measure.is_complete and measure.settled_distance > max_offset:
         offset_text = f"still {measure.settled_distance:.1f} m off the next leg at its end"
-        faults["settled"] = message(offset_text, f" (at most {max_value:.1f} m)")
+        faults["settled"] = message(offset_text, f" (at most {max_offset:.1f} m)")
     if measure.full_circles:
         faults["circles"] = message(f"{measure.full_circles} full circle(s) flown at the corner")
     return faults
@@ -249,14 +263,14 @@ def _flown_faults(requirements: RouteRequirements, i: int, measure: TurnMeasure,
 def _tight_turn_fault(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> Message | None:
     """Return a fault if a turn passed its waypoint closer than the arc at the bank limit does, else None.
 
-    Legs too short for their turn are joined by a tighter arc, and a flight that follows this arc exceeded the bank
-    limit or slowed down.
+    A tighter arc joins legs that are too short for their turn.  A flight that followed this arc exceeded the bank limit
+    or slowed down.
     """
     turn, setup = abs(float(requirements.turns[i])), requirements.setup
     min_radius = float(requirements.min_radius[i])
-    # Guidance's own limit: a sharper corner has no arc to follow if its legs are short.
+    # planfly's guidance has the same limit: a sharper corner with short legs has no arc to follow.
     min_distance = fly_by_offset(turn, min_radius) if turn < SHARPEST_FLY_BY_RAD else math.inf
-    # An autopilot that does not follow the arc may pass the waypoint at any distance.
+    # An autopilot that does not keep to the arc may pass the waypoint at any distance.
     follows_arc = setup.autopilot.turns.keeps_to_arcs and setup.source is None and not setup.route.fly_over[i]
     if measure.min_distance is None or not math.isfinite(min_distance) or not follows_arc:
         return None

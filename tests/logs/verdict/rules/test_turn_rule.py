@@ -141,7 +141,8 @@ def test_a_jog_that_the_corridor_has_room_for(aside: float, corridor: float, ok:
     assert [of(verdict, "turn", waypoint(k)).ok for k in (1, 2)] == [ok, ok]
     if ok:
         assert (
-            "a negligible kink: the path without this waypoint passes it at" in of(verdict, "turn", waypoint(1)).reason
+            "a negligible kink: a flyable path without this waypoint passes it at"
+            in of(verdict, "turn", waypoint(1)).reason
         )
 
 
