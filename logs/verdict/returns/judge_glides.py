@@ -220,8 +220,7 @@ def judge_glides(world: ReturnWorld, starts: ReturnStarts) -> Glides:
     burns_fuel = world.setup.envelope.volts <= 0.0
     terrain, environment, aircraft = world.scenario.terrain, world.environment, world.aircraft
     if terrain is None or not aircraft.glides:
-        not_judged = "terrain" if terrain is None else "trim"
-        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged=not_judged)
+        return Glides((), sites, airspeed, fuel=burns_fuel, not_judged="terrain" if terrain is None else "trim")
     rows = starts.rows
     if not len(rows):
         return Glides((), sites, airspeed, fuel=burns_fuel)
