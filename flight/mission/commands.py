@@ -257,7 +257,12 @@ _DELAY_REASON = "delays the commands after it; the verdict is undecided if one o
 # Treatment of each command that at least one autopilot accepts; both refuse any other.
 SUPPORT: dict[Command, Support] = {
     C.NAV_WAYPOINT: Support(_FLOWN, _FLOWN, "a position to fly to"),
-    C.NAV_LOITER_UNLIM: Support(_FLOWN, _FLOWN, "a loiter without end; one minute of it is flown"),
+    C.NAV_LOITER_UNLIM: Support(
+        _FLOWN,
+        _FLOWN,
+        "a loiter without end; one minute of it is flown. A height of 0 m keeps the altitude of the item before, in "
+        "all four loiters, as in ArduPlane (`Location::sanitize`); with PX4 it is not judged",
+    ),
     C.NAV_LOITER_TURNS: Support(_FLOWN, _REFUSED, "a loiter for a number of turns"),
     C.NAV_LOITER_TIME: Support(_FLOWN, _FLOWN, "a loiter for a time"),
     C.NAV_RETURN_TO_LAUNCH: Support(_FLOWN, _FLOWN, "a return to launch"),

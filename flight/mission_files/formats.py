@@ -49,9 +49,9 @@ def mission_kind(path: Path) -> FileKind:
     try:
         return KINDS[path.suffix.lower()]
     except KeyError:
-        allowed = f"expected one of {', '.join(KINDS)}"
+        allowed = ", ".join(KINDS)
         raise MissionError(
-            f"{path}: suffix {path.suffix!r}: {allowed}",
+            f"{path}: suffix {path.suffix!r}: expected one of {allowed}",
             file=path,
             field="suffix",
             value=path.suffix,
