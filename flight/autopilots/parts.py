@@ -311,13 +311,15 @@ class MissionParts(NamedTuple):
     takes_off, lands: True if the take-off or the landing is flown from or to the ground.
     loiters_to_land: True if the last item before a landing is a loiter.
     has_fence: True if the mission carries a fence.
-    has_rally: True if the mission carries rally points.
-    has_rally_at_home: True if a rally point is within 10 m of home.
+    fence_at_home: how home violates the mission's fence; "" if it does not.
+    smallest_inclusion: radius of the fence's smallest inclusion circle, m; infinite without one.
+    rally_distance: distance of the nearest rally point from home, m; infinite without one, NaN without a home.
     enables_fence: True if the mission switches the fence on (DO_FENCE_ENABLE).
     throttled_airspeeds: airspeeds that the mission commands together with a throttle, m/s.
     follows_terrain: True if the mission has a position above terrain.
     moves_payload: True if the mission commands a gripper, a winch or a gimbal, after which PX4 may wait.
     wind: highest mean wind speed on the route, m/s.
+    full_voltage: voltage of the aircraft's full battery, V; infinite if it is not known.
     commands: commands of the mission's items.
     aircraft: the aircraft; None if it is not known here.
     """
@@ -328,13 +330,15 @@ class MissionParts(NamedTuple):
     lands: bool = False
     loiters_to_land: bool = False
     has_fence: bool = False
-    has_rally: bool = False
-    has_rally_at_home: bool = False
+    fence_at_home: str = ""
+    smallest_inclusion: float = math.inf
+    rally_distance: float = math.inf
     enables_fence: bool = False
     throttled_airspeeds: tuple[float, ...] = ()
     follows_terrain: bool = False
     moves_payload: bool = False
     wind: float = 0.0
+    full_voltage: float = math.inf
     commands: frozenset[int] = frozenset()
     aircraft: Aircraft | None = None
 

@@ -142,14 +142,15 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
 
 
 def fence_problem(
-    fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float
+    fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float, *, unites_inclusions: bool = False
 ) -> tuple[str, int] | None:
     """Return the first fence that a position violates: its description and the number of its first item; or None.
 
     fences: items 5001..5004, a polygon's corners together.
     east, north: m on the map about ``origin``.
+    unites_inclusions: True if a position must be inside any inclusion; False if inside all of them.
 
-    A position must be inside all inclusions. Raises MissionError if a polygon has fewer corners than stated.
+    Raises MissionError if a polygon has fewer corners than stated.
 
     >>> radius = (500.0, 0.0, 0.0, 0.0)
     >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
@@ -159,6 +160,8 @@ def fence_problem(
     >>> fence_problem((circle,), origin, east=0.0, north=400.0) is None
     True
     """
+    first_left: tuple[str, int] | None = None
+    is_in_inclusion = False
     for shape in fence_shapes(fences):
         item = shape[0]
         lat, lon = [corner.lat_deg for corner in shape], [corner.lon_deg for corner in shape]
@@ -169,9 +172,14 @@ def fence_problem(
         else:
             is_inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
             name = f"circle of {item.params[0]:.0f} m"
-        if is_inside != (item.command in INCLUSIONS):
-            return f"{'outside an inclusion' if not is_inside else 'inside an exclusion'} {name}", item.seq
-    return None
+        if is_inside == (item.command in INCLUSIONS):
+            is_in_inclusion |= is_inside
+            continue
+        problem = f"{'outside an inclusion' if not is_inside else 'inside an exclusion'} {name}", item.seq
+        if is_inside or not unites_inclusions:
+            return problem
+        first_left = first_left or problem
+    return None if is_in_inclusion else first_left
 
 
 # Test whether a mission's path passes through a fence shape, given as its items, at any altitude.

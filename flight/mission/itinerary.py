@@ -123,6 +123,8 @@ _MAX_BYTE_TURNS = 255
 
 # Longest distance that ArduPlane flies on beyond a waypoint, m: it is stored as whole metres in a byte.
 _MAX_PASS_BY_M = 255
+# Lowest altitude above 0 that ArduPlane stores, m.
+_ALTITUDE_STEP_M = 0.01
 
 
 def pass_by_distance(item: MissionItem) -> float:
@@ -757,6 +759,10 @@ class _ItineraryBuilder:
                 self.add_open_item(f"{name} to the aircraft's current position: not flown", item.seq, px4=False)
             else:
                 self.notes.arduplane.add(f"{name} before the start: home is where the aircraft stands", item.seq)
+            return
+        if not item.has_position and abs(item.alt) >= _ALTITUDE_STEP_M:
+            # `AP_AHRS::set_home` ignores a home only if its altitude is 0, too.
+            self.add_open_item(f"{name} to 0° N 0° E: not flown", item.seq, px4=False)
             return
         if not item.has_position:
             self.notes.arduplane.add(f"{name} without a position: ignored, as ArduPlane does", item.seq)

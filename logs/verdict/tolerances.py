@@ -224,6 +224,8 @@ NOMINAL_CELL_VOLTAGE_V = 3.7
 # V.  Loaded voltage of an empty cell, the default of PX4's BAT1_V_EMPTY: with the reserve left, the loaded voltage of a
 # healthy cell is higher.  A battery failsafe with a higher threshold may act earlier.
 EMPTY_CELL_VOLTAGE_V = 3.6
+# V.  Voltage to which a lithium polymer cell is charged: ArduPlane does not arm with a higher threshold for each cell.
+FULL_CELL_VOLTAGE_V = 4.2
 
 # Surveys
 

@@ -38,8 +38,8 @@ AMSL = 480.0
 DENSITY = 1.1695
 # Throttle above which level flight is beyond the motor; the search for it ends just below 1.
 _FULL_THROTTLE = 0.999
-# Prefix of the parameters of servo outputs, which describe hardware.
-_OUTPUT_PREFIX = "SERVO"
+# Prefixes of the parameters of servo outputs and radio channels, which describe hardware.
+_HARDWARE_PREFIXES = ("SERVO", "RC")
 # Prefixes of the parameters that determine flight behaviour; other parameters describe hardware.
 _FLIGHT_PREFIXES = (
     "AIRSPEED_",
@@ -263,7 +263,7 @@ def flown_parameters(log: MotionLog) -> dict[str, float]:
         if name.startswith(_FLIGHT_PREFIXES) and name not in old_names and name not in current_names
     }
     flight_parameters = others | law_parameters.by_origin("file")
-    return {name: value for name, value in flight_parameters.items() if not name.startswith(_OUTPUT_PREFIX)}
+    return {name: value for name, value in flight_parameters.items() if not name.startswith(_HARDWARE_PREFIXES)}
 
 
 def _parameter_file(identified: Identified) -> dict[str, str]:

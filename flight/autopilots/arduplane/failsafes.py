@@ -130,7 +130,7 @@ def _battery_causes(parameters: ArduPilotParameters, *, has_landing: bool) -> li
             if action == "land" and not has_landing:
                 action = "return"
             has_voltage = parameters[f"{monitor}_{level}_VOLT"] > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0
-            has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and _measures_current(parameters, monitor)
+            has_charge = parameters[f"{monitor}_{level}_MAH"] > 0.0 and measures_current(parameters, monitor)
             if action != "on" and not (monitor in monitors and (has_voltage or has_charge)):
                 action = "never"
             causes.append(Cause(f"battery{number} {name}", action, parameter, value))
@@ -156,7 +156,7 @@ def battery_failsafes(parameters: ArduPilotParameters) -> tuple[BatteryFailsafe,
             charge, voltage = parameters[f"{monitor}_{level}_MAH"], parameters[f"{monitor}_{level}_VOLT"]
             if _BATTERY_FAILSAFE.get(int(action), "on") == "on":
                 continue
-            if charge > 0.0 and _measures_current(parameters, monitor):
+            if charge > 0.0 and measures_current(parameters, monitor):
                 used_charge = parameters[f"{monitor}_CAPACITY"] - charge
                 found.append(BatteryFailsafe(f"{monitor}_{level}_MAH", charge, used_charge, len(monitors) > 1))
             if voltage > 0.0 and parameters[f"{monitor}_LOW_TIMER"] > 0.0:
@@ -181,6 +181,6 @@ def monitored_batteries(parameters: ArduPilotParameters) -> list[str]:
     ]
 
 
-def _measures_current(parameters: ArduPilotParameters, monitor: str) -> bool:
+def measures_current(parameters: ArduPilotParameters, monitor: str) -> bool:
     """Return True if a battery monitor measures the current."""
     return int(parameters[f"{monitor}_MONITOR"]) not in _MONITORS_WITHOUT_CURRENT

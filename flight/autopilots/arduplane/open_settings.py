@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 from aircraft.catalog import Aircraft
 from aircraft.envelope import GRAVITY
+from flight.autopilots.arduplane.arming_checks import describe_failed_arming_checks
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.parameter_set import AIRCRAFT_FILE
 from flight.autopilots.parts import MissionParts
 from flight.autopilots.rate_loop import RateGains, rate_gains_fault
-from flight.mission.commands import Command as C
 
 
 class Phase(StrEnum):
@@ -126,22 +126,6 @@ _EKF3 = 3.0
 _EXTERNAL_AHRS = 11.0
 # Values of EK3_SRC1_POSZ: barometer, GPS.
 _HEIGHT_SOURCES = (1.0, 3.0)
-# Items that bits of ARMING_MIS_ITEMS require (`AP_Arming::mission_checks`).
-_ITEMS_FOR_ARMING = {
-    1 << 0: C.NAV_LAND,
-    1 << 2: C.DO_LAND_START,
-    1 << 3: C.NAV_TAKEOFF,
-    1 << 6: C.NAV_RETURN_TO_LAUNCH,
-}
-# Limits without which ArduPlane does not arm (`AP_Arming_Plane::pre_arm_checks`): lowest and highest value.
-_LIMITS_FOR_ARMING = {
-    "ROLL_LIMIT_DEG": (3.0, math.inf),
-    "PTCH_LIM_MAX_DEG": (3.0, math.inf),
-    "PTCH_LIM_MIN_DEG": (-math.inf, -3.0),
-    "AIRSPEED_MIN": (5.0, math.inf),
-}
-# Marks with which ArduPlane does not arm if RTL_AUTOLAND is 0 (`AP_Arming_Plane::mission_checks`).
-_MARKS_OF_AUTOLAND = (C.DO_LAND_START, C.DO_RETURN_PATH_START)
 # Largest TERRAIN_SPACING whose grid follows the ground as the elevation data do, m: ArduPlane's default.
 _MAX_TERRAIN_SPACING_M = 100.0
 # Number of outputs without SERVO_32_ENABLE.
@@ -198,7 +182,7 @@ def _describe_dependent_settings(
     """Describe settings whose effect depends on other settings, on the mission or on the aircraft."""
     yield from _describe_airspeed_sensor(values)
     yield from _describe_position_estimate(values)
-    yield from _describe_arming(parameters, values, mission)
+    yield from describe_failed_arming_checks(parameters, values, mission)
     yield from _describe_missing_outputs(parameters, values)
     if mission.follows_terrain and parameters.terrain_spacing > _MAX_TERRAIN_SPACING_M:
         # `AP_Terrain::height_amsl` interpolates between points of that spacing.
@@ -285,34 +269,17 @@ def _describe_position_estimate(values: Mapping[str, float]) -> Iterator[str]:
         yield f"EK3_SRC1_POSZ {height_source:g} uses neither barometer nor GPS for the altitude, which is not simulated"
 
 
-def _describe_arming(
-    parameters: ArduPilotParameters, values: Mapping[str, float], mission: MissionParts
-) -> Iterator[str]:
-    """Describe missing items, items that RTL_AUTOLAND 0 forbids, and values that prevent arming."""
-    # 4.7 has ARMING_SKIPCHK for ARMING_CHECK.
-    if values["ARMING_CHECK"] == 0.0 or values["ARMING_SKIPCHK"] != 0.0 or values["ARMING_REQUIRE"] == 0.0:
-        return
-    for name, (lowest, highest) in _LIMITS_FOR_ARMING.items():
-        if not lowest <= values[name] <= highest:
-            limit_text = f"at least {lowest:g}" if math.isinf(highest) else f"at most {highest:g}"
-            yield f"{name} {values[name]:g} prevents arming, which needs {limit_text}"
-    if parameters.by_origin("file").get("RTL_AUTOLAND") == 0.0:
-        for mark in _MARKS_OF_AUTOLAND:
-            if mark in mission.commands:
-                yield f"RTL_AUTOLAND 0 prevents arming with {mark.name} in the mission"
-    for bit, command in _ITEMS_FOR_ARMING.items():
-        if int(values["ARMING_MIS_ITEMS"]) & bit and command not in mission.commands:
-            yield f"ARMING_MIS_ITEMS {values['ARMING_MIS_ITEMS']:g} prevents arming without {command.name}"
-
-
 def _describe_missing_outputs(parameters: ArduPilotParameters, values: Mapping[str, float]) -> Iterator[str]:
     """Describe each of ailerons, elevator and motor to which the user's file assigns no servo output."""
     if not any(name.startswith("SERVO") for name in parameters.by_origin("file")):
         return
     count = 2 * _BASE_OUTPUT_COUNT if values["SERVO_32_ENABLE"] else _BASE_OUTPUT_COUNT
     pins = int(values["SERVO_GPIO_MASK"])
-    functions = {values[f"SERVO{output}_FUNCTION"] for output in range(1, count + 1) if not pins & 1 << (output - 1)}
+    outputs = [output for output in range(1, count + 1) if not pins & 1 << (output - 1)]
+    moving_outputs = [output for output in outputs if values[f"SERVO{output}_MIN"] < values[f"SERVO{output}_MAX"]]
+    functions = {values[f"SERVO{output}_FUNCTION"] for output in moving_outputs}
     names = f"SERVO1_FUNCTION to SERVO{count}_FUNCTION" + (f" without SERVO_GPIO_MASK {pins}" if pins else "")
+    names += " with SERVOn_MIN below SERVOn_MAX" if moving_outputs != outputs else ""
     for part, moving in _FUNCTIONS_BY_PART.items():
         if functions.isdisjoint(moving):
             yield f"{names} move no {part}, which is not simulated"

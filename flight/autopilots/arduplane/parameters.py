@@ -145,7 +145,7 @@ _FOLLOW_ALWAYS_BIT = 1 << 0
 # Bit of TERRAIN_FOLLOW: RTL.
 _FOLLOW_HOME_BIT = 1 << 4
 # Bits of FENCE_TYPE for ArduPlane's own limits, not the mission's fence: altitudes and a circle about home.
-_OWN_FENCE_BITS = 0b1011
+OWN_FENCE_BITS = 0b1011
 # Radius of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
 _DEFAULT_LOITER_RADIUS_M = 60.0
 # Parameters that are read but not flown: an RTL is flown on a slope where this would make it follow the terrain.
@@ -167,8 +167,12 @@ _PAIRS = (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX"))
 # Prefixes of the parameters of battery monitors after the first (`AP_BattMonitor::var_info`).
 OTHER_BATTERY_MONITORS = tuple(f"BATT{number}" for number in "23456789ABCDEFG")
 _BATTERY_THRESHOLDS = ("LOW_VOLT", "LOW_MAH", "FS_LOW_ACT", "CRT_VOLT", "CRT_MAH", "FS_CRT_ACT")
-# Parameters without a part in the control law that decide verdicts (`flight.autopilots.arduplane.open_settings` and
-# `flight.autopilots.arduplane.failsafes`), with their defaults.
+# Number of radio channels.
+RADIO_CHANNEL_COUNT = 16
+# Defaults of the pulses of radio channels and servo outputs, us (`RC_Channel::var_info`, `SRV_Channel::var_info`).
+_PULSES_US = {"MIN": 1100.0, "TRIM": 1500.0, "MAX": 1900.0}
+# Parameters without a part in the control law that decide verdicts (`flight.autopilots.arduplane.open_settings`,
+# `flight.autopilots.arduplane.arming_checks` and `flight.autopilots.arduplane.failsafes`), with their defaults.
 _WHEN_STATED = {
     **dict.fromkeys(("KFF_THR2PTCH", "BATT_WATT_MAX", "FWD_BAT_THR_CUT", "TECS_OPTIONS", "AFS_ENABLE"), 0.0),
     **dict.fromkeys(("CHUTE_CRT_SINK", "ICE_IDLE_PCT", "AHRS_WIND_MAX", "ARSPD_WIND_MAX", "MIS_OPTIONS"), 0.0),
@@ -209,6 +213,23 @@ _WHEN_STATED = {
     "TKOFF_ACCEL_CNT": 1.0,
     "TKOFF_ALT": 50.0,
     "USE_REV_THRUST": 2.0,
+    # Read for the checks before arming alone.
+    **{f"SERVO{output}_{name}": pulse for output in range(1, 33) for name, pulse in _PULSES_US.items()},
+    **{
+        f"RC{channel}_{name}": value
+        for channel in range(1, RADIO_CHANNEL_COUNT + 1)
+        for name, value in (*_PULSES_US.items(), ("REVERSED", 0.0))
+    },
+    "RCMAP_THROTTLE": 3.0,
+    "THR_FS_VALUE": 950.0,
+    "FS_SHORT_TIMEOUT": 1.5,
+    "FS_LONG_TIMEOUT": 5.0,
+    "FENCE_MARGIN": 2.0,
+    "FENCE_MARGIN_XY": 0.0,
+    "FENCE_RADIUS": 300.0,
+    "FENCE_ALT_MAX": 100.0,
+    "FENCE_ALT_MIN": -10.0,
+    **{f"{monitor}_ARM_{unit}": 0.0 for monitor in ("BATT", *OTHER_BATTERY_MONITORS) for unit in ("VOLT", "MAH")},
     # Read for the battery failsafes alone; `BATT_MONITOR` and its thresholds have definitions of their own.
     "BATT_CAPACITY": 3300.0,
     "BATT_LOW_TIMER": 10.0,
@@ -497,7 +518,7 @@ class ArduPilotParameters(ParameterSet):
         [False, True]
         """
         enabled = self.fence_enable > 0.0 or self.fence_auto_enable > 0.0
-        return enabled and self.fence_action > 0.0 and bool(int(self.fence_type) & _OWN_FENCE_BITS)
+        return enabled and self.fence_action > 0.0 and bool(int(self.fence_type) & OWN_FENCE_BITS)
 
     @property
     def return_radius(self) -> float:

@@ -98,6 +98,8 @@ _ALONG_THE_MISSION = (2.0, 4.0)
 _TO_LANDING = (1.0, 3.0)
 # Value of RTL_TYPE for an RTL to a rally point alone.
 _TO_RALLY_POINT = 5.0
+# Distance from home within which PX4 ignores a rally point, m (`MAX_DIST_FROM_HOME_FOR_LAND_APPROACHES` in rtl.cpp).
+_RALLY_HOME_DISTANCE_M = 10.0
 # COM_WIND_MAX_ACT and GF_ACTION that only warn.
 _WARN_OF_WIND = 1.0
 _WARN_OF_FENCE = 1.0
@@ -248,9 +250,9 @@ class Px4(Autopilot):
             yield f"RTL_TYPE {return_type:g} returns along the mission, which is not simulated"
         if return_type in _TO_LANDING and not mission.commands.isdisjoint((*LANDINGS, Command.DO_LAND_START)):
             yield f"RTL_TYPE {return_type:g} may return to the mission's landing, which is not simulated"
-        if return_type == _TO_RALLY_POINT and not mission.has_rally:
+        if return_type == _TO_RALLY_POINT and math.isinf(mission.rally_distance):
             yield f"RTL_TYPE {return_type:g} without a rally point loiters where it begins, which is not simulated"
-        if return_type != _TO_RALLY_POINT and mission.has_rally_at_home:
+        if return_type != _TO_RALLY_POINT and mission.rally_distance <= _RALLY_HOME_DISTANCE_M:
             yield "PX4 ignores a rally point within 10 m of home, to which the return is simulated"
         if parameters["RTL_DESCEND_ALT"] != parameters["RTL_RETURN_ALT"]:
             end_text = f"RTL_DESCEND_ALT {parameters['RTL_DESCEND_ALT']:g}"
@@ -261,6 +263,9 @@ class Px4(Autopilot):
     def _describe_endings(self, mission: MissionParts) -> Iterator[str]:
         """Describe settings with which PX4 may abort a mission in flight."""
         parameters = self.parameters
+        if mission.fence_at_home and parameters["GF_ACTION"] > 0.0:
+            # `GeofenceChecks::checkAndReport`.
+            yield f"GF_ACTION {parameters['GF_ACTION']:g} prevents arming at home, which is {mission.fence_at_home}"
         if mission.has_fence and parameters["GF_PREDICT"] > 0.0 and parameters["GF_ACTION"] > _WARN_OF_FENCE:
             yield "GF_PREDICT 1 leaves the mission before its fence is reached, which is not simulated"
         time_action = _RETURN_IN_TIME_DEFAULT[self.parameters.version]

@@ -43,6 +43,8 @@ from logs.verdict.measures.mission_ends import missing_ends_text, returns_after_
 from logs.verdict.places import Place
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
+    FULL_CELL_VOLTAGE_V,
+    NOMINAL_CELL_VOLTAGE_V,
     PX4_FIRST_WAYPOINT_DISTANCE_M,
     PX4_GATE_SPACING_M,
     PX4_LANDING_BUFFER_RAD,
@@ -275,8 +277,12 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         lands=procedures.approach is not None,
         loiters_to_land=any(a.command == C.NAV_LOITER_TO_ALT and b.command in LANDINGS for a, b in pairs),
         has_fence=bool(setup.mission.fences),
-        has_rally=bool(setup.mission.rally),
-        has_rally_at_home=_has_rally_at_home(setup.mission),
+        fence_at_home=_fence_at_home(setup),
+        smallest_inclusion=min(
+            (item.params[0] for item in setup.mission.fences if item.command == C.NAV_FENCE_CIRCLE_INCLUSION),
+            default=math.inf,
+        ),
+        rally_distance=_rally_distance(setup.mission),
         enables_fence=any(item.command == C.DO_FENCE_ENABLE and item.params[0] == 1.0 for item in items),
         throttled_airspeeds=tuple(
             item.params[1]
@@ -286,24 +292,37 @@ def _mission_parts(setup: FlightSetup) -> MissionParts:
         follows_terrain=any(item.frame in OVER_TERRAIN and item.has_position for item in items),
         moves_payload=not commands.isdisjoint((C.DO_GRIPPER, C.DO_WINCH, C.DO_GIMBAL_MANAGER_PITCHYAW)),
         wind=setup.scenario.wind.max_speed_at(setup.route.waypoints[:, 2]),
+        full_voltage=_full_voltage(setup),
         commands=frozenset(commands),
         aircraft=aircraft,
     )
 
 
-# Distance from home within which PX4 ignores a rally point, m (`MAX_DIST_FROM_HOME_FOR_LAND_APPROACHES` in rtl.cpp).
-_RALLY_HOME_DISTANCE_M = 10.0
-
-
-def _has_rally_at_home(mission: Mission) -> bool:
-    """Return True if a rally point is so close to home that PX4 ignores it."""
+def _rally_distance(mission: Mission) -> float:
+    """Return the distance of the nearest rally point from home, m; infinite without one, NaN without a home."""
     if mission.home is None:
-        return False
+        return math.nan if mission.rally else math.inf
     origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
-    return any(
-        math.hypot(*map(float, to_map(origin, point.lat_deg, point.lon_deg))) <= _RALLY_HOME_DISTANCE_M
-        for point in mission.rally
+    return min(
+        (math.hypot(*map(float, to_map(origin, point.lat_deg, point.lon_deg))) for point in mission.rally),
+        default=math.inf,
     )
+
+
+def _fence_at_home(setup: FlightSetup) -> str:
+    """Return how home violates the mission's fence, such as "inside an exclusion polygon"; "" if it does not."""
+    mission, checks = setup.mission, setup.autopilot.checks
+    if mission.home is None or not mission.fences:
+        return ""
+    origin = GeoOrigin(mission.home.lat_deg, mission.home.lon_deg)
+    problem = fence_problem(mission.fences, origin, 0.0, 0.0, unites_inclusions=checks.unites_inclusions)
+    return "" if problem is None else problem[0]
+
+
+def _full_voltage(setup: FlightSetup) -> float:
+    """Return the voltage of the full battery, V; infinite without a battery, and for a guessed one."""
+    cells = 0 if setup.envelope.battery_guessed else round(setup.envelope.volts / NOMINAL_CELL_VOLTAGE_V)
+    return cells * FULL_CELL_VOLTAGE_V if cells else math.inf
 
 
 def _flown_items(mission: Mission) -> list[MissionItem]:
@@ -517,6 +536,7 @@ def _check_fence(setup: FlightSetup) -> Iterator[_Remark]:
 RULE = Rule(
     name="mission",
     tolerances=(
+        *("NOMINAL_CELL_VOLTAGE_V", "FULL_CELL_VOLTAGE_V"),
         *("PX4_LANDING_BUFFER_RAD", "PX4_FIRST_WAYPOINT_DISTANCE_M", "PX4_WAYPOINT_SPACING_M", "PX4_GATE_SPACING_M"),
     ),
     judge_items=mission_findings,

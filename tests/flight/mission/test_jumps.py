@@ -167,6 +167,17 @@ def test_a_home_that_is_set_counts_for_the_altitudes_and_the_return_behind_it() 
     assert route("2 179 1 0 0 0 0 0 0", wp(0, 0), wp(0, 900)).open_items == ()
 
 
+@pytest.mark.parametrize(
+    ("altitude", "frame", "opens"),
+    [("0", 3, False), ("0.009", 3, False), ("-330", 3, True), ("1", 0, True), ("0", 0, False)],
+)
+def test_a_home_at_zero_degrees_is_ignored_only_at_altitude_zero(altitude: str, frame: int, opens: bool) -> None:
+    """`AP_AHRS::set_home` refuses latitude, longitude and altitude of 0 alone, the altitude in whole centimetres."""
+    made = route(wp(0, 0), wp(0, 900), f"{frame} 179 0 0 0 0 0 0 {altitude}", wp(900, 900))
+    assert [one.item for one in made.open_items] == [3] * opens
+    assert any("ignored, as ArduPlane does" in note for note in made.notes) != opens
+
+
 @pytest.mark.parametrize(("jumps", "open_item"), [(63, None), (64, 2)])
 def test_arduplane_ends_a_mission_at_65_jumps_in_a_row(jumps: int, open_item: int | None) -> None:
     """`AP_Mission::get_next_cmd`: the 65th jump item ends the search; after 64 repeats the item is read once more."""

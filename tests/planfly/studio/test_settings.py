@@ -35,14 +35,14 @@ def test_settings_are_judged_at_once() -> None:
 
 def test_parameters_are_flown_with_and_saved() -> None:
     session = drawn_session(6, 14)
-    text = "# of a ground station\nLIM_ROLL_CD,2500\nWP_RADIUS 45\nSERVO1_MIN 1100\n"
+    text = "# of a ground station\nLIM_ROLL_CD,2500\nWP_RADIUS 45\nSERIAL1_BAUD 57\n"
     set_in(session, parameter_file="mine.param", parameter_text=text)
     assert session.settings_json()["parameters"] == {"ROLL_LIMIT_DEG": 25.0, "WP_RADIUS": 45.0}
     # What they set is judged: turns are wider with less bank.
     assert session.judged.setup.limits.max_bank < 0.45
     assert "the parameters of mine.param" in session.judged.setup.autopilot.describe("aerosonde")
     shown = session.settings_json()
-    assert (shown["parameter_file"], shown["unused"]) == ("mine.param", "SERVO1_MIN")
+    assert (shown["parameter_file"], shown["unused"]) == ("mine.param", "SERIAL1_BAUD")
     set_in(session, parameter="WP_RADIUS=60")
     set_in(session, without=["ROLL_LIMIT_DEG"])
     assert session.settings_json()["parameters"] == {"WP_RADIUS": 60.0}

@@ -101,6 +101,28 @@ def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
 
 
 @pytest.mark.parametrize(
+    ("values", "fence_at_home", "words"),
+    [
+        # `GeofenceChecks::checkAndReport`: any action other than none, by default 2.
+        (
+            {},
+            "outside an inclusion polygon",
+            ["GF_ACTION 2 prevents arming at home, which is outside an inclusion polygon"],
+        ),
+        ({"GF_ACTION": 1.0}, "outside", ["GF_ACTION 1 prevents arming at home, which is outside"]),
+        ({"GF_ACTION": 0.0}, "outside", []),
+        ({}, "", []),
+    ],
+)
+def test_a_home_beyond_the_missions_fence_leaves_the_verdict_open(
+    values: dict[str, float], fence_at_home: str, words: list[str]
+) -> None:
+    made = Px4(Px4Parameters.defaults().changed(**values))
+    mission = MissionParts(has_fence=True, fence_at_home=fence_at_home)
+    assert made.checks.settings_not_flown(mission) == words
+
+
+@pytest.mark.parametrize(
     ("values", "has_fence", "opens"),
     [
         ({"GF_PREDICT": 1.0}, True, True),

@@ -1,5 +1,7 @@
 """PX4's settings that leave no position, no control or no arming, and gains that hold no attitude."""
 
+import math
+
 import pytest
 
 from aircraft.catalog import aircraft_names, load_aircraft
@@ -145,9 +147,10 @@ def test_px4s_own_program_flies_the_gains_but_has_a_gps() -> None:
         ("RTL_TYPE 1", MissionParts(returns=True, commands=frozenset({16, 20})), ""),
         ("RTL_TYPE 1", MissionParts(commands=frozenset({16, 21})), ""),
         ("RTL_TYPE 5", MissionParts(returns=True), "RTL_TYPE 5 without a rally point loiters"),
-        ("RTL_TYPE 5", MissionParts(returns=True, has_rally=True, has_rally_at_home=True), ""),
-        ("RTL_TYPE 0", MissionParts(returns=True, has_rally=True, has_rally_at_home=True), "PX4 ignores a rally point"),
-        ("RTL_TYPE 0", MissionParts(returns=True, has_rally=True), ""),
+        ("RTL_TYPE 5", MissionParts(returns=True, rally_distance=10.0), ""),
+        ("RTL_TYPE 0", MissionParts(returns=True, rally_distance=10.0), "PX4 ignores a rally point"),
+        ("RTL_TYPE 0", MissionParts(returns=True, rally_distance=10.1), ""),
+        ("RTL_TYPE 5", MissionParts(returns=True, rally_distance=math.nan), ""),
     ],
 )
 def test_returns_to_other_places_than_the_simulated_one(text: str, mission: MissionParts, name: str) -> None:

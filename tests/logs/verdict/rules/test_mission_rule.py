@@ -8,13 +8,15 @@ from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
 from flight.autopilots.px4.autopilot import Px4
 from flight.autopilots.px4.parameters import Px4Parameters
+from flight.mission.items import MissionItem
 from logs.recording.setup_schema import RouteTable
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Place
 from logs.verdict.rules.mission_rule import mission_findings
 from tests.flight.autopilots.arduplane.kept_missions import setup_by_law
-from tests.mission_lines import mission, setup_of, wp
+from tests.mission_lines import ORIGIN, mission, setup_of, wp
+from world.frames import to_geo
 from world.scenario_tables import Px4Version
 from world.wind import Wind
 
@@ -230,18 +232,7 @@ def test_what_px4_only_remarks_on_does_not_fail() -> None:
 
 def test_geofence() -> None:
     """A square of 2 km around the origin, and a hole in it that the route's second place lies in."""
-    from flight.mission.items import MissionItem
-    from world.frames import to_geo
-
-    setup = setup_of(*GOOD)
-    origin = setup.scenario.origin
-
-    def fence(command: int, p1: float, *places: tuple[float, float]) -> tuple[MissionItem, ...]:
-        spots = [tuple(float(value) for value in to_geo(origin, *place)) for place in places]
-        return tuple(
-            MissionItem(k, command, 0, (p1, 0.0, 0.0, 0.0), lat, lon, 0.0) for k, (lat, lon) in enumerate(spots)
-        )
-
+    setup, fence = setup_of(*GOOD), _fence
     square = fence(5001, 4, (-2000, -2000), (2000, -2000), (2000, 2000), (-2000, 2000))
     small = fence(5001, 4, (-1000, -1000), (1000, -1000), (1000, 1000), (-1000, 1000))
     hole, ring = fence(5004, 300, (100, 1500)), fence(5003, 3000, (0, 0))
@@ -257,6 +248,61 @@ def test_geofence() -> None:
         assert finding.ok == (words is None)
         assert "(PX4 checkGeofence)" in finding.reason
         assert words is None or words in finding.reason
+
+
+def _fence(command: int, p1: float, *places: tuple[float, float]) -> tuple[MissionItem, ...]:
+    """Fence items at places about home, which is the origin."""
+    spots = [tuple(float(value) for value in to_geo(ORIGIN, *place)) for place in places]
+    return tuple(MissionItem(k, command, 0, (p1, 0.0, 0.0, 0.0), lat, lon, 0.0) for k, (lat, lon) in enumerate(spots))
+
+
+_EAST = _fence(5001, 4, (500, -2000), (3000, -2000), (3000, 2000), (500, 2000))
+_AROUND = _fence(5003, 400, (0, 0))
+
+
+@pytest.mark.parametrize(
+    ("fences", "words"),
+    [
+        (_AROUND, ""),
+        (_EAST, "FENCE_ENABLE 1 prevents arming at home, which is outside an inclusion polygon"),
+        (_fence(5004, 100, (0, 99)), "FENCE_ENABLE 1 prevents arming at home, which is inside an exclusion circle of"),
+        (_fence(5004, 100, (0, 101)), ""),
+        # All inclusions, or with bit 1 of FENCE_OPTIONS any: `AC_PolyFence_loader::breached`.
+        ((*_EAST, *_AROUND), "FENCE_ENABLE 1 prevents arming at home, which is outside an inclusion polygon"),
+        (_fence(5003, 1, (0, 0)), "FENCE_MARGIN 2 prevents arming, which needs at most the 1 m of an inclusion circle"),
+    ],
+)
+def test_a_home_beyond_the_fence_leaves_the_verdict_open(fences: tuple[MissionItem, ...], words: str) -> None:
+    """`AC_Fence::pre_arm_check`: the flight begins in the air, inside the fence or not."""
+    setup = setup_of(wp(600, 0), wp(900, 900))
+    texts = []
+    for options in (1.0, 3.0):
+        law = ArduPlane(ArduPilotParameters.defaults().changed(FENCE_ENABLE=1.0, FENCE_OPTIONS=options))
+        fenced = replace(setup, autopilot=law, mission=replace(setup.mission, fences=fences))
+        texts.append([item.reason for item in mission_findings(fenced) if item.check == "not flown"])
+    assert [text.startswith(words) for text in texts[0]] == [True] * bool(words)
+    assert texts[1] == ([] if fences == (*_EAST, *_AROUND) else texts[0])
+
+
+@pytest.mark.parametrize(("north", "opens"), [(4900.0, False), (5100.0, True)])
+def test_a_required_rally_point_is_near_home(north: float, opens: bool) -> None:
+    """`AP_Rally::find_nearest_rally_point`: within RALLY_LIMIT_KM, by default 5."""
+    setup = setup_of(wp(600, 0), wp(900, 900))
+    law = ArduPlane(ArduPilotParameters.defaults().changed(ARMING_MIS_ITEMS=32.0))
+    rally = tuple(replace(item, command=5100) for item in _fence(5004, 0, (0, 9000), (0, north)))
+    made = replace(setup, autopilot=law, mission=replace(setup.mission, rally=rally))
+    reasons = [item.reason for item in mission_findings(made) if item.check == "not flown"]
+    assert [reason.startswith("ARMING_MIS_ITEMS 32 prevents arming") for reason in reasons] == [True] * opens
+
+
+@pytest.mark.parametrize(("volts", "opens"), [(50.4, False), (50.5, True)])
+def test_a_voltage_above_the_full_batterys_prevents_arming(volts: float, opens: bool) -> None:
+    """The aircraft's battery of 44.4 V has 12 cells of 3.7 V, which are charged to 4.2 V: 50.4 V."""
+    law = ArduPlane(ArduPilotParameters.defaults().changed(BATT_ARM_VOLT=volts))
+    made = replace(setup_of(wp(600, 0), wp(900, 900)), autopilot=law)
+    assert made.envelope.volts == 44.4
+    reasons = [item.reason for item in mission_findings(made) if item.check == "not flown"]
+    assert [reason.startswith("BATT_ARM_VOLT 50.5 prevents arming") for reason in reasons] == [True] * opens
 
 
 def test_without_a_home_there_is_no_distance_to_the_first_waypoint() -> None:
@@ -341,7 +387,7 @@ def test_a_take_off_inside_the_first_circle_is_no_fault() -> None:
         ({}, ()),
         ({"ALT_OFFSET": -120.0}, ("ALT_OFFSET -120",)),
         ({"SOAR_ENABLE": 1.0, "Q_ENABLE": 1.0}, ("SOAR_ENABLE 1", "Q_ENABLE 1")),
-        ({"FENCE_ENABLE": 1.0}, ()),
+        ({"FENCE_ENABLE": 1.0}, ("FENCE_ENABLE 1 prevents arming without a fence",)),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 2.0}, ("FENCE_TYPE 2",)),
         ({"FENCE_AUTOENABLE": 1.0, "FENCE_TYPE": 5.0}, ("FENCE_TYPE 5",)),
         ({"FENCE_ENABLE": 1.0, "FENCE_TYPE": 3.0, "FENCE_ACTION": 0.0}, ()),
