@@ -103,12 +103,14 @@ def test_the_edges_of_a_range_are_taken() -> None:
 def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path: Path) -> None:
     aircraft: Aircraft = replace(load_aircraft("aerosonde"), folder=tmp_path)
     assert ArduPilotParameters.load(aircraft) == ArduPilotParameters.defaults()
-    (tmp_path / "ardupilot.parm").write_text("WP_RADIUS 70\nROLL_LIMIT_DEG 30\nSERVO1_TRIM 1500\n", encoding="utf-8")
+    (tmp_path / "ardupilot.parm").write_text(
+        "WP_RADIUS 70\nROLL_LIMIT_DEG 30\nSERVO1_TRIM 1500\nSERIAL2_BAUD 57\n", encoding="utf-8"
+    )
     mine = tmp_path / "mine.param"
     mine.write_text("WP_RADIUS 50\nSERIAL1_BAUD 57\n", encoding="utf-8")
     found = ArduPilotParameters.load(aircraft, mine)
     assert found.by_origin("file") == {"WP_RADIUS": 50.0}
-    assert found.by_origin("aircraft") == {"ROLL_LIMIT_DEG": 30.0}
+    assert found.by_origin("aircraft") == {"ROLL_LIMIT_DEG": 30.0, "SERVO1_TRIM": 1500.0}
     assert found.by_origin("default")["NAVL1_PERIOD"] == 17.0
     # Of the file that a person gave; the aircraft's own holds what its servos need, too.
     assert (found.unused, found.source) == (("SERIAL1_BAUD",), str(mine))
