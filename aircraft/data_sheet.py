@@ -298,8 +298,9 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         min_span, max_span = (math.sqrt(aspect_limit * area) for aspect_limit in ASPECT_RANGE)
         allowed = f"allowed {min_span:.2f}..{max_span:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
         raise _out_of_range("span", sheet.span, allowed, "m")
-    if sheet.fuelled and (sheet.motor or sheet.volts):
-        raise _out_of_range("fuel", sheet.fuel, "cannot be combined with --battery and --motor", "kg")
+    electric_options = [name for name, is_given in (("--battery", sheet.volts), ("--motor", sheet.motor)) if is_given]
+    if sheet.fuelled and electric_options:
+        raise _out_of_range("fuel", sheet.fuel, f"cannot be combined with {' and '.join(electric_options)}", "kg")
     if not _is_within(sheet.fuel, 0.0, 0.6 * sheet.mass):
         raise _out_of_range("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
     if not sheet.fuelled and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):

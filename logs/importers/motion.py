@@ -4,6 +4,7 @@
 aircraft's model.  `logs.importers.motion_log` reads them from logs.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -64,6 +65,7 @@ class MotionLog:
     angles: True for each of the first three controls that is a deflection, rad, instead of a fraction.
     elevons: True if elevons make the controls.
     hovering: start and end of each period on lifting motors that the log itself names, s.
+    span: first and last time of the part of the file that was read, s of the log.
     """
 
     source: str
@@ -87,6 +89,7 @@ class MotionLog:
     angles: tuple[bool, bool, bool] = (False, False, False)
     elevons: bool = False
     hovering: tuple[tuple[float, float], ...] = ()
+    span: tuple[float, float] = (-math.inf, math.inf)
 
     @property
     def surface_commands(self) -> Samples:

@@ -218,15 +218,15 @@ def _check_stated(stated_numbers: dict[str, float], prior: Aircraft) -> None:
 
 
 def _check_distinct(logs: Sequence[MotionLog]) -> None:
-    """Raise LogError if a log is given twice, or if the check log is also used for identification."""
-    sources: dict[str, str] = {}
-    for log in logs:
-        if log.sha256 in sources:
-            allowed = "name each log only once, and use another log to check the result"
-            raise LogError(
-                f"{log.source}: the same bytes as {sources[log.sha256]}: {allowed}", file=log.source, allowed=allowed
-            )
-        sources[log.sha256] = log.source
+    """Raise LogError if rows of a log are given twice, or if the check log has rows used for identification."""
+    for number, log in enumerate(logs):
+        for other in logs[:number]:
+            overlap = min(log.span[1], other.span[1]) - max(log.span[0], other.span[0])
+            if log.sha256 == other.sha256 and overlap > 0.0:
+                allowed = "name each log only once, and use another log to check the result"
+                raise LogError(
+                    f"{log.source}: the same bytes as {other.source}: {allowed}", file=log.source, allowed=allowed
+                )
 
 
 def records_and_outputs(

@@ -23,7 +23,7 @@ from planfly.arguments import check_arguments
 from planfly.campaigns.campaign_base import TURBULENCE_LEVELS, with_aircraft_draws
 from planfly.campaigns.dispersions import default_dispersions, draw_flight
 from planfly.flight_logs import is_log
-from planfly.flight_options import LogOptions, takes_options
+from planfly.flight_options import LogOptions, option_defaults, takes_options
 from planfly.identification.base_numbers import varied_model
 from planfly.identification.records import MIN_CHECK_SECONDS
 from planfly.kernel_units.unit_kernels import FLYING
@@ -121,6 +121,7 @@ def predict(
         reason = "a flight log of planfly has no inertial sensors; predict it by its mission"
         raise LogError(f"{path}: {reason}", file=path)
     if motion is not None:
+        _check_options_by_controls(options)
         predicted = _predict_by_controls(motion, aircraft, start)
     elif start is not None:
         allowed = "only for a prediction by controls; a prediction by mission judges every leg that was followed"
@@ -133,6 +134,15 @@ def predict(
         with stage("drawing", "drawing a prediction"):
             files = _write_page(folder, predicted)
     return replace(predicted, files=files)
+
+
+def _check_options_by_controls(options: LogOptions) -> None:
+    """Raise PlanflyError for an option that changes nothing if the logged controls are followed."""
+    defaults = option_defaults(LogOptions)
+    for name, value in options.items():
+        if name != "aircraft" and value != defaults[name]:
+            allowed = "only for a prediction by mission; this one follows the logged controls"
+            raise PlanflyError.of_argument(name, value, allowed)
 
 
 def _read_motion(path: Path, *, required: bool) -> MotionLog | None:
@@ -199,10 +209,11 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
     for the identification.  Raises LogError if the aircraft was identified from the whole log, and PlanflyError for a
     start within the part from which it was identified.
     """
-    used = _used_until(aircraft, motion.sha256)
+    first_time, last_time = motion.inertial.time[[0, -1]].tolist()
+    used = _used_until(aircraft, motion.sha256, first_time)
     if used is None:
         return float(np.median(np.concatenate([record.time for record in records]))) if start is None else start
-    if not math.isfinite(used):
+    if used >= last_time:
         allowed = "identify it with --until S, and predict the rest"
         message = f"{motion.source}: {aircraft.name} was identified from the whole log: {allowed}"
         raise LogError(message, file=motion.source, field="aircraft", value=aircraft.name, allowed=allowed)
@@ -212,18 +223,18 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
     return used if start is None else start
 
 
-def _used_until(aircraft: Aircraft, sha256: str) -> float | None:
-    """Return the end of the part of a log from which an aircraft was identified, s; infinity for the whole log.
+def _used_until(aircraft: Aircraft, sha256: str, start: float) -> float | None:
+    """Return the end of the parts of a log from which an aircraft was identified, s; infinity for the whole log.
 
-    Return None for a log that was not used.
+    start: first time that is read, s of the log; parts that end before it do not count.
+    Return None for a log of which no part was used.  A log is recognised by the bytes of its data.
     """
     file = aircraft.folder / "posterior.toml"
     if not file.is_file():
         return None
-    for entry in read_toml(file, "uncertainty").get("log", []):
-        if entry.get("sha256") == sha256:
-            return float(entry.get("until_s", math.inf))
-    return None
+    entries = [entry for entry in read_toml(file, "uncertainty").get("log", []) if entry.get("sha256") == sha256]
+    ends = [end for entry in entries if (end := float(entry.get("until_s", math.inf))) > start]
+    return max(ends, default=None)
 
 
 def drawn_flights(aircraft: Aircraft, count: int = DRAWS) -> list[DrawnFlight]:

@@ -128,7 +128,7 @@ def aircraft(args: argparse.Namespace) -> int:
     """List the built-in aircraft, show the named aircraft, or make a folder for a new aircraft."""
     if args.logs is not None:
         return _identify(args)
-    for name in ("base", "check"):
+    for name in ("base", "check", "until"):
         if getattr(args, name) is not None:
             raise PlanflyError.of_argument(name, getattr(args, name), "only with `logs` LOG", shown="")
     if args.folder is not None:
@@ -169,6 +169,12 @@ def _make_folder(args: argparse.Namespace) -> int:
     if args.name is not None:
         message = f"{args.name}: --new takes only the folder; --from names the aircraft to start from"
         raise PlanflyError(message, field="--new", value=args.folder)
+    for field, is_given, reason in (
+        ("--out", args.out is not None, "--new names the folder to make"),
+        ("--motor-braking", args.motor_braking, "it is chosen for each flight"),
+    ):
+        if is_given:
+            raise PlanflyError(f"--new cannot be combined with {field}: {reason}", field=field)
     folder = Path(args.folder)
     new_aircraft = call_api(planfly.new_aircraft, args)
     files = sorted(file.name for file in new_aircraft.folder.iterdir())

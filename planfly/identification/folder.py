@@ -326,7 +326,9 @@ def posterior_text(identified: Identified) -> str:
     ]
     for log in identified.logs:
         lines += ["", "[[log]]", f'file = "{_toml_safe(Path(log.source).name)}"', f'sha256 = "{log.sha256}"']
-        lines += [] if identified.until is None else [f"until_s = {identified.until:.9g}  # later rows were not used"]
+        end = log.span[1] if identified.until is None else min(identified.until, log.span[1])
+        lines += [f"from_s = {log.span[0]:.9g}  # earlier rows were not used"] if math.isfinite(log.span[0]) else []
+        lines += [f"until_s = {end:.9g}  # later rows were not used"] if math.isfinite(end) else []
     for k, parameter in enumerate(PARAMETERS):
         numbers = parameter.prior, parameter.sd, estimate.values[k], estimate.sds[k], log_fractions[k]
         unit = "factor" if parameter.kind == "factor" else "1"

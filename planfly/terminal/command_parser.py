@@ -171,7 +171,7 @@ class LineParser(CommandParser):
     def add_command(self, name: str, summary: str, *examples: str, extra: str = "", details: str = "") -> CommandParser:
         """Add the parser for a command, and return it.
 
-        summary: one sentence on the command.
+        summary: one sentence on the command, without the escapes of argparse.
         examples: example command lines in its help.
         extra: the extra of planfly that the command needs, or "".
         details: further sentences of its help.
@@ -180,7 +180,7 @@ class LineParser(CommandParser):
         example_text = f"\n{' ' * len('example: ')}".join(examples)
         command_parser: CommandParser = self._parsers.add_parser(
             name,
-            help=summary,
+            help=summary.replace("%", "%%"),
             description=f"{summary[0].upper()}{summary[1:]}.{details}{extra_note}",
             epilog=f"example: {example_text}\n\n{EXIT_CODES}",
         )

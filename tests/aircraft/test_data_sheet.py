@@ -187,7 +187,7 @@ def test_the_slope_of_an_elliptic_wing() -> None:
         ),
         ({"span": 0.8}, "span 0.8 m: allowed 0.82..2.59 m with a wing of 0.269 m2"),
         ({"fuel": 1.3}, "fuel 1.3 kg: allowed up to 60 % of the mass, 1.26 kg"),
-        ({"fuel": 0.3, "motor": 900.0}, "fuel 0.3 kg: cannot be combined with --battery and --motor"),
+        ({"fuel": 0.3, "motor": 900.0}, "fuel 0.3 kg: cannot be combined with --motor"),
         ({"top": 15.9, "climb": math.radians(30.0)}, "climb 30 degrees: allowed about 2.."),
         ({"motor": 120.0, "volts": 7.4, "propeller": (0.2, 0.1)}, "motor 120 rpm a volt: allowed about "),
     ],

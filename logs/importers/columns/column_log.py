@@ -95,11 +95,11 @@ class ColumnLog:
 
     @property
     def data_sha256(self) -> str:
-        """SHA-256 of the bytes of all data files, in the order of their paths, and of the span that is read.
+        """SHA-256 of the bytes of all data files, in the order of their paths.
 
-        It identifies the rows from which an aircraft was identified, even if other parts of the table are edited.
+        It identifies the log from which an aircraft was identified, even if the table is edited.
         """
-        digest = hashlib.sha256(repr(self.table.span_s).encode())
+        digest = hashlib.sha256()
         for path in sorted({self._file_of(clock) for clock in self.table.clocks.values()}):
             digest.update(path.read_bytes())
         return digest.hexdigest()

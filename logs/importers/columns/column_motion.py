@@ -49,6 +49,7 @@ def read_column_motion(path: Path) -> MotionLog:
     return MotionLog(
         source=str(path),
         sha256=log.data_sha256,
+        span=log.table.span_s or (-math.inf, math.inf),
         program=log.table.program,
         vehicle="plane",
         inertial=_group(log, *inertial),

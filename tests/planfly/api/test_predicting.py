@@ -78,12 +78,31 @@ def test_the_part_that_identified_the_aircraft_is_not_judged(tmp_path: Path) -> 
     assert predicting._judged_start(motion, other, [], 300.0) == 300.0
 
 
+def test_the_part_that_identified_the_aircraft_is_recognised_in_another_span_of_the_same_data(tmp_path: Path) -> None:
+    """A table that reads the seconds 30 to 696 reads rows that were used before 400 s; one from 450 s on does not."""
+    for path in (THOR, *THOR.parent.glob("*.mat")):
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    table = (tmp_path / THOR.name).read_text("utf-8")
+    parts = {}
+    for span in ("[30.0, 696.0]", "[450.0, 696.0]"):
+        (tmp_path / THOR.name).write_text(f"span_s = {span}\n{table}", encoding="utf-8")
+        parts[span] = read_motion(tmp_path / THOR.name)
+    entry = f'[[log]]\nfile = "x"\nsha256 = "{read_motion(THOR).sha256}"\nuntil_s = 400.0\n'
+    used = _with_posterior(load_aircraft("ultrastick25e"), tmp_path, entry)
+    with pytest.raises(PlanflyError, match=r"399.*at least 400"):
+        predicting._judged_start(parts["[30.0, 696.0]"], used, [], 399.0)
+    assert predicting._judged_start(parts["[450.0, 696.0]"], used, [], 460.0) == 460.0
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({}, "aircraft: name the aircraft"),
         ({"aircraft": "ultrastick25e", "start": 230.0}, "start = 230|before 230"),
         ({"aircraft": "ultrastick25e", "start": 1e6}, "from 1000000"),
+        ({"aircraft": "ultrastick25e", "plan": "nofile.waypoints"}, "plan nofile.waypoints: only for a prediction by"),
+        ({"aircraft": "ultrastick25e", "flight": 7}, "flight.*7.*only for a prediction by mission"),
+        ({"aircraft": "ultrastick25e", "wind": (30.0, 270.0)}, "wind.*only for a prediction by mission"),
         ({"aircraft": "ultrastick25e", "by": "mission", "start": 300.0}, "only for a prediction by controls"),
     ],
 )
