@@ -421,14 +421,8 @@ def _assemble_scenario(
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start", file=source, field="destination")
-    wind = Wind(
-        spec.wind.speed_mps,
-        math.radians(spec.wind.from_deg),
-        spec.wind.gradient,
-        spec.wind.turbulence,
-        spec.wind.seed,
-        float(start[2]),
-    )
+    table, start_up = spec.wind, float(start[2])
+    wind = Wind(table.speed_mps, math.radians(table.from_deg), table.gradient, table.turbulence, table.seed, start_up)
     return Scenario(
         name=spec.name,
         spec=spec,
