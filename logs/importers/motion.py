@@ -66,6 +66,11 @@ class MotionLog:
     elevons: True if elevons make the controls.
     hovering: start and end of each period on lifting motors that the log itself names, s.
     span: first and last time of the part of the file that was read, s of the log.
+    elevons: true if the controls are made by elevons.
+    hovering: periods on lifting motors (s) that the log itself names.
+    missing: quantities of "inertial" and "outputs" that a table of columns lacks.
+    home: latitude and longitude, degrees, and m AMSL: the last home of the vehicle (ORGN), or its first position on the
+        ground; None if neither is logged.
     """
 
     source: str
@@ -90,6 +95,7 @@ class MotionLog:
     elevons: bool = False
     hovering: tuple[tuple[float, float], ...] = ()
     span: tuple[float, float] = (-math.inf, math.inf)
+    missing: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def surface_commands(self) -> Samples:

@@ -15,7 +15,7 @@ from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from planfly.arguments import check_arguments
 from planfly.identification.base_numbers import base_model, scale_model
-from planfly.identification.checks import check_battery, check_estimate
+from planfly.identification.checks import check_battery, check_commands, check_estimate, check_power
 from planfly.identification.folder import Identified, folder_files, make_identified
 from planfly.identification.model_text import check_base
 from planfly.identification.propulsion_check import PowerConflict
@@ -138,11 +138,13 @@ def identify_aircraft(
         checked = [] if check_motion is None else records_and_outputs(check_motion, prior, MIN_CHECK_SECONDS)[0]
     records = [record for _, stretches, _ in log_parts for record in stretches]
     check_battery(records, volts)
+    check_commands(records)
     log, _, outputs = log_parts[-1]
     with stage("estimating"):
         has_fast_rows = all(slowest_rows(motion_log) >= MIN_HZ for motion_log, _, _ in log_parts)
         estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
         check_estimate(estimate, base_numbers, _unmixed_outputs(log, prior), log.source)
+        check_power(estimate, records, base_numbers)
         identified = make_identified(
             prior, base_numbers, estimate, [motion_log for motion_log, _, _ in log_parts], outputs, until
         )

@@ -1,5 +1,6 @@
 """Check an estimate for impossible results, such as reversed outputs, values at their bounds, or a changing mass."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,6 +23,14 @@ MAX_MASS_CHANGE = 0.05
 _MASS_CHANGE_SIGMAS = 4.0
 # Minimum and maximum voltage of a battery in flight, as a ratio to its nominal voltage: 3.0 to 4.35 V of 3.7 V a cell.
 _VOLTAGE_RATIO_RANGE = (0.75, 1.2)
+# Least range of a throttle that moves.
+_MIN_THROTTLE_RANGE = 0.01
+# Least range of a surface's command in a flight with turns, rad; 60 degrees in the wrong unit are 1.05.
+_MIN_SURFACE_RANGE_RAD = math.radians(1.2)
+# Bank beyond which a flight has turns, rad.
+_TURN_BANK_RAD = math.radians(15.0)
+# Largest ratio of logged to identified battery power, in either direction; for 1 the fit is exact.
+_MAX_POWER_RATIO = 1.5
 # Duration of the blocks over which the trend of the mass is averaged, s.
 _BLOCK_SECONDS = 30.0
 
@@ -37,6 +46,46 @@ def check_battery(records: Sequence[FlightRecord], volts: float) -> None:
         if np.isfinite(measured) and not min_value <= measured <= max_value:
             allowed = f"a battery of {volts:g} V has {min_value:.3g}..{max_value:.3g} V; state yours, or check the log"
             raise LogError.at(record.source, "voltage", measured, allowed, shown=f"{measured:.3g} V in flight")
+
+
+def check_commands(records: Sequence[FlightRecord]) -> None:
+    """Raise LogError for a log whose throttle never moves, or whose elevator or aileron hardly moves in turns."""
+    for source in dict.fromkeys(record.source for record in records):
+        parts = [record for record in records if record.source == source]
+        controls = np.concatenate([part.controls for part in parts])
+        max_bank = max(float(np.abs(part.attitude[:, 0]).max()) for part in parts)
+        ranges = np.ptp(controls, axis=0)
+        if ranges[3] < _MIN_THROTTLE_RANGE:
+            throttle = float(controls[0, 3])
+            reason = "the log holds no powered flight" if throttle < _MIN_THROTTLE_RANGE else "it never moves"
+            raise LogError.at(source, "throttle", throttle, reason, shown=f"{throttle:.3g} in all rows of the flight")
+        for name, surface_range in zip(("elevator", "aileron"), ranges.tolist(), strict=False):
+            if surface_range < _MIN_SURFACE_RANGE_RAD and max_bank > _TURN_BANK_RAD:
+                shown = f"moves by {math.degrees(surface_range):.2g} deg in all"
+                reason = f"the aircraft banks to {math.degrees(max_bank):.0f} deg: check its unit (radians?) and scale"
+                raise LogError.at(source, name, surface_range, reason, shown=shown)
+
+
+def check_power(estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel) -> None:
+    """Raise LogError if the logged battery power is not the power of the identified aircraft in these flights."""
+    if not estimate.with_current:
+        return
+    factors = (float(estimate.values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
+    motor = base.motor.with_factors(*factors)
+    for source in dict.fromkeys(record.source for record in records):
+        parts = [record for record in records if record.source == source]
+        airspeed, throttle, density, voltage, current = (
+            np.concatenate(columns)
+            for columns in zip(
+                *((part.airspeed, part.controls[:, 3], part.density, part.voltage, part.current) for part in parts),
+                strict=True,
+            )
+        )
+        _, drawn = motor.thrust_and_current(estimate.airspeed[0] * airspeed, throttle, density, voltage)
+        ratio = float((voltage * current).mean() / (voltage * drawn).mean())
+        if not 1.0 / _MAX_POWER_RATIO <= ratio <= _MAX_POWER_RATIO:
+            shown = f"{current.mean():.3g} A on average, {ratio:.2g} times the current of the identified aircraft"
+            raise LogError.at(source, "current", float(current.mean()), "check its unit and scale", shown=shown)
 
 
 def check_estimate(estimate: Estimate, base: BaseModel, outputs: dict[str, int], source: str) -> None:

@@ -34,6 +34,14 @@ _MAX_SLOW_WIND_GAP_S = 2.5
 _SETTLING_TIME_S = 15.0
 # Fraction of AIRSPEED_MIN above which the aircraft is flying.
 _MIN_AIRSPEED_FRACTION = 0.8
+# Duration of the windows over which airspeed and ground velocity are compared, s.
+_COMPARED_WINDOW_S = 10.0
+# Standard deviation of the airspeed in a window below which a sensor may be blocked, m/s; in real air it is above 0.3.
+_BLOCKED_AIRSPEED_SD_MPS = 0.1
+# Standard deviation, in the same window, of ground velocity minus wind along the heading that shows that it is, m/s.
+_MOVING_AIRSPEED_SD_MPS = 1.0
+# Largest part of the flight with a blocked airspeed sensor, as a fraction, for the rest to be used.
+_MAX_BLOCKED_FRACTION = 0.25
 # ArduPlane's quadplane modes (QSTABILIZE 17 to QACRO 23, QAUTOTUNE 22, LOITER_ALT_QLAND 25), and the mode that does not
 # control the surfaces: INITIALISING 16.
 _VTOL_MODES = frozenset({17, 18, 19, 20, 21, 22, 23, 25})
@@ -113,13 +121,20 @@ def flight_records(
     unknown = np.full(len(grid), np.nan)
     battery = _interpolate(log.battery, grid) if _has_current(log) else np.column_stack([unknown, unknown])
     usable = _usable_rows(log, grid, airspeed / ratio, pulses) & (grid < until)
+    velocity, wind = _interpolate(log.velocity, grid), _interpolate(log.wind, grid)
+    is_blocked = _blocked_airspeed_rows(airspeed, velocity[:, :2] - wind, attitude[:, 2]) & usable
+    if is_blocked.sum() > _MAX_BLOCKED_FRACTION * usable.sum():
+        shown = f"hardly varies for {is_blocked.sum() / GRID_HZ:.0f} s of {usable.sum() / GRID_HZ:.0f} s of flight"
+        allowed = "ground velocity minus wind does: check the sensor"
+        raise LogError.at(log.source, "airspeed", float(is_blocked.sum() / GRID_HZ), allowed, shown=shown)
+    usable &= ~is_blocked
     flight = FlightRecord(
         time=grid,
         acceleration=inertial[:, :3],
         rates=inertial[:, 3:],
         attitude=attitude,
-        velocity=_interpolate(log.velocity, grid),
-        wind=_interpolate(log.wind, grid),
+        velocity=velocity,
+        wind=wind,
         airspeed=airspeed,
         density=1.225 / np.square(ratio),
         height=height,
@@ -227,7 +242,8 @@ def _check_usable(log: MotionLog) -> None:
     series_names = _SERIES[log.program_kind]
     for samples, name in ((log.inertial, "inertial"), (log.surface_commands, "outputs")):
         if len(samples.time) < 2:
-            raise LogError(f"{log.source}: no {series_names[name]}: {_recording_hint(log)}", file=log.source)
+            series = " and no ".join(log.missing.get(name, ())) or series_names[name]
+            raise LogError(f"{log.source}: no {series}: {_recording_hint(log)}", file=log.source)
     for samples, name in ((log.attitude, "attitude"), (log.velocity, "velocity"), (log.height, "height")):
         if len(samples.time) < 2:
             raise LogError(f"{log.source}: no {series_names[name]}", file=log.source)
@@ -409,6 +425,22 @@ def _usable_rows(log: MotionLog, grid: Floats, equivalent_airspeed: Floats, puls
     for begin, end in _find_segments(is_flying, 0.0):
         is_usable[begin : min(end, begin + round(_SETTLING_TIME_S * GRID_HZ))] = False
     return is_usable
+
+
+def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floats) -> Flags:
+    """Flag the windows in which the airspeed hardly varies although ground velocity minus wind does.
+
+    air_velocity: ground velocity minus wind, to north and east, m/s, (n, 2).
+    """
+    along = air_velocity[:, 0] * np.cos(heading) + air_velocity[:, 1] * np.sin(heading)
+    length = round(_COMPARED_WINDOW_S * GRID_HZ)
+    is_blocked = np.zeros(len(airspeed), np.bool_)
+    # Windows overlap by nine tenths.
+    for begin in range(0, len(airspeed) - length + 1, length // 10):
+        rows = slice(begin, begin + length)
+        if airspeed[rows].std() < _BLOCKED_AIRSPEED_SD_MPS and along[rows].std() > _MOVING_AIRSPEED_SD_MPS:
+            is_blocked[rows] = True
+    return is_blocked
 
 
 def _find_segments(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:

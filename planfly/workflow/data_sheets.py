@@ -135,6 +135,8 @@ _PROPELLER_PATTERN = re.compile(r"([0-9.]+)\s*[xX]\s*([0-9.]+)")
 _VOLTAGE_RANGE_V = (3.0, 60.0)
 # Accepted battery capacities, Wh.
 _ENERGY_RANGE_WH = (0.5, 5000.0)
+# Least time in which level flight empties a battery, s: 60 times its capacity per hour, which no battery delivers.
+_MIN_ENDURANCE_S = 60.0
 # Accepted propeller diameters, inches.
 _DIAMETER_IN = (3.0, 40.0)
 
@@ -441,7 +443,10 @@ def _make_files(
     sheet = sized.sheet
     (folder / f"{name}.toml").write_text(_metadata_text(sized, sheet.stall, sheet.stall, sheet.top), encoding="utf-8")
     aircraft = read_aircraft(folder)
-    performance = measure_performance(Fdm(aircraft, is_tested=True), aircraft)
+    draft_fdm = Fdm(aircraft, is_tested=True)
+    performance = measure_performance(draft_fdm, aircraft)
+    draft_fdm.balance(performance.level.vector())
+    _check_endurance(aircraft, float(draft_fdm.read().power))
     # At the stall the propeller carries part of the weight.  If the model could fly slower, the sheet's stall speed
     # applies.
     stall_speed = max(
@@ -464,6 +469,18 @@ def _make_files(
         DRAWS_FILE: draws_text(draws),
         "README.md": _readme_text(name, sized, performance, uncertainty, file_parameters),
     }
+
+
+def _check_endurance(aircraft: Aircraft, power: float) -> None:
+    """Raise FlightError for a battery that level flight empties in less than `_MIN_ENDURANCE_S`.  power: W."""
+    if not aircraft.battery_voltage or aircraft.battery_energy >= _MIN_ENDURANCE_S * power:
+        return
+    volts, watt_hours = aircraft.battery_voltage, aircraft.battery_energy / 3600.0
+    allowed = (
+        f"level flight at {aircraft.airspeed:g} m/s draws {power / volts:.0f} A and empties it in"
+        f" {aircraft.battery_energy / power:.0f} s: expected at least {_MIN_ENDURANCE_S:g} s"
+    )
+    raise FlightError.of_argument("battery", watt_hours, allowed, shown=f"{volts:g} V, {watt_hours:.3g} Wh")
 
 
 def measure_performance(fdm: Simulator, aircraft: Aircraft) -> Performance:

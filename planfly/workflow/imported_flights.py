@@ -109,6 +109,7 @@ def import_flight(path: Path, options: LogOptions) -> ImportedFlight:
     notes = (
         *_describe_gaps(flight),
         *_describe_other_flights(flight),
+        *_describe_throttle(flight),
         *autopilot_notes,
         *mission.warnings,
         *_describe_mission_change(flight, mission, options),
@@ -270,6 +271,14 @@ def _describe_gaps(flight: LoggedFlight) -> tuple[str, ...]:
     if usual_step > MAX_STEP_S:
         notes.append(f"the log has a position only every {usual_step:.1f} s: the flight in between is unknown")
     return tuple(notes)
+
+
+def _describe_throttle(flight: LoggedFlight) -> tuple[str, ...]:
+    """Describe a throttle that has the same value in all rows, as in the log of a glider."""
+    throttle = flight.raw.series.get("throttle")
+    if throttle is None or len(throttle.values) < 2 or np.ptp(throttle.values) > 0.0:
+        return ()
+    return (f"the throttle never moves: {abs(float(throttle.values.flat[0])):.3g} in all rows",)
 
 
 def _describe_other_flights(flight: LoggedFlight) -> tuple[str, ...]:

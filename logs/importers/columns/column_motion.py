@@ -22,6 +22,16 @@ _GAS_CONSTANT = 287.05
 _ZERO_CELSIUS_K = 273.15
 NO_SAMPLES = Samples(np.zeros(0), np.zeros((0, 1)))
 _SURFACES = ("elevator", "aileron", "rudder")
+_INERTIAL = (
+    *("acceleration_forward", "acceleration_right", "acceleration_down"),
+    *("roll_rate", "pitch_rate", "yaw_rate"),
+)
+# Commands that an identification needs, each with the pairs of halves that make it up.
+_COMMANDS = {
+    "elevator": (("elevon_left", "elevon_right"), ("elevator_left", "elevator_right")),
+    "aileron": (("elevon_left", "elevon_right"), ("aileron_left", "aileron_right")),
+    "throttle": (),
+}
 
 
 def read_column_motion(path: Path) -> MotionLog:
@@ -38,21 +48,13 @@ def read_column_motion(path: Path) -> MotionLog:
     place = _group(log, "latitude", "longitude", "altitude")
     if len(place.time):
         place = Samples(place.time, place.values * np.array([math.degrees(1.0), math.degrees(1.0), 1.0]))
-    inertial = (
-        "acceleration_forward",
-        "acceleration_right",
-        "acceleration_down",
-        "roll_rate",
-        "pitch_rate",
-        "yaw_rate",
-    )
     return MotionLog(
         source=str(path),
         sha256=log.data_sha256,
         span=log.table.span_s or (-math.inf, math.inf),
         program=log.table.program,
         vehicle="plane",
-        inertial=_group(log, *inertial),
+        inertial=_group(log, *_INERTIAL),
         outputs=NO_SAMPLES,
         attitude=_attitude(log),
         velocity=velocity,
@@ -67,6 +69,14 @@ def read_column_motion(path: Path) -> MotionLog:
         controls=controls,
         angles=angles,
         elevons=elevons,
+        missing={
+            "inertial": tuple(quantity for quantity in _INERTIAL if not log.has(quantity)),
+            "outputs": tuple(
+                quantity
+                for quantity, halves in _COMMANDS.items()
+                if not log.has(quantity) and not any(log.has(*pair) for pair in halves)
+            ),
+        },
     )
 
 

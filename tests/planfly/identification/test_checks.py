@@ -7,7 +7,13 @@ import pytest
 
 from aircraft.identification.estimate import Estimate, estimate_model
 from aircraft.identification.parameters import INDEX
-from planfly.identification.checks import check_battery, check_estimate, mass_change
+from planfly.identification.checks import (
+    check_battery,
+    check_commands,
+    check_estimate,
+    check_power,
+    mass_change,
+)
 from planfly.identification.records import flight_records
 from planfly.identification.servos import read_servos
 from tests.aircraft.identification.flown_truth import flown_truth
@@ -52,6 +58,42 @@ def test_a_voltage_that_the_battery_does_not_have_is_refused() -> None:
     for factor, said in ((0.1, "4.44 V in flight"), (1.0 / 12.0, "3.7 V in flight"), (10.0, "444 V in flight")):
         with pytest.raises(LogError, match=f"v3-3.BIN: voltage: {said}: a battery of 44.4 V has 33.3..53.3 V"):
             check_battery([replace(record, voltage=factor * record.voltage)], 44.4)
+
+
+def test_a_throttle_that_never_moves_is_refused() -> None:
+    """A glider's throttle is 0 in all rows; a frozen column has another value."""
+    record = flown_truth().records[0]
+    check_commands([record])
+    for throttle, said in (
+        (0.0, "0 in all rows of the flight: the log holds no powered flight"),
+        (0.6, "0.6 in all rows of the flight: it never moves"),
+    ):
+        controls = record.controls.copy()
+        controls[:, 3] = throttle
+        with pytest.raises(LogError, match=f"v3-3.BIN: throttle: {said}"):
+            check_commands([replace(record, controls=controls)])
+
+
+@pytest.mark.parametrize("name", ["elevator", "aileron"])
+def test_a_surface_that_hardly_moves_in_turns_is_refused(name: str) -> None:
+    """Radians read as degrees are 57 times too small; without turns, surfaces may rest."""
+    record = flown_truth().records[0]
+    controls = record.controls.copy()
+    controls[:, ("elevator", "aileron").index(name)] *= np.pi / 180.0
+    radians = replace(record, controls=controls)
+    with pytest.raises(LogError, match=rf"v3-3.BIN: {name}: moves by \d\.?\d* deg in all: .*\(radians\?\)"):
+        check_commands([radians])
+    check_commands([replace(radians, attitude=np.zeros_like(record.attitude))])
+
+
+def test_a_current_ten_times_too_large_or_too_small_is_refused() -> None:
+    """The logged current is that of the aircraft; times 10, it is 10 times the current of the estimate."""
+    flown = flown_truth()
+    check_power(flown.estimate, flown.records, flown.base)
+    for factor, said in ((10.0, r"(9\.\d|10|11) times"), (0.1, r"0\.(09\d?|1|11) times")):
+        records = [replace(record, current=factor * record.current) for record in flown.records]
+        with pytest.raises(LogError, match=rf"v3-3.BIN: current: .* A on average, {said} the current of"):
+            check_power(flown.estimate, records, flown.base)
 
 
 def test_an_estimate_at_its_bound_is_named() -> None:

@@ -81,6 +81,37 @@ def test_air_that_was_not_measured_is_not_used(name: str) -> None:
     assert parts[-1].time[-1] <= 330.0 < log.inertial.time[-1]
 
 
+def test_a_blocked_airspeed_sensor_is_not_used() -> None:
+    """A blocked tube gives a steady airspeed with noise, while the velocity through the air varies by 2 m/s."""
+    log = changed()
+    flight = log.airspeed.time[-1] - log.airspeed.time[0]
+    time = log.velocity.time
+    # Airspeed and ground velocity vary alike along the heading, with a period of 8 s.
+    yaw = np.interp(time, log.attitude.time, np.unwrap(log.attitude.values[:, 2]))
+    surge = 2.0 * np.sin(2.0 * np.pi * time / 8.0)
+    velocity = log.velocity.values + np.column_stack([surge * np.cos(yaw), surge * np.sin(yaw), 0.0 * surge])
+    moving = replace(log, velocity=Samples(time, velocity))
+
+    def blocked(begin: float, end: float) -> MotionLog:
+        values, rows = log.airspeed.values.copy(), (log.airspeed.time > begin) & (log.airspeed.time < end)
+        values[rows, 0] = 25.0 + np.random.default_rng(0).normal(0.0, 0.01, rows.sum())
+        return replace(moving, airspeed=Samples(log.airspeed.time, values))
+
+    assert flight > 300.0
+    assert len(flight_records(moving, PRIOR)) == 1
+    before, after = flight_records(blocked(150.0, 190.0), PRIOR)
+    assert 149.0 < before.time[-1] < 152.0
+    assert 188.0 < after.time[0] < 191.0
+    with pytest.raises(LogError, match=r"airspeed: hardly varies for 1\d\d s of \d+ s of flight: ground velocity"):
+        flight_records(blocked(100.0, 280.0), PRIOR)
+
+
+def test_only_the_missing_columns_are_named() -> None:
+    log = changed(outputs=NONE, program_kind="columns", missing={"inertial": (), "outputs": ("throttle",)})
+    with pytest.raises(LogError, match=r"^v3-3.BIN: no throttle: expected in \[columns\] of its table$"):
+        flight_records(log, PRIOR)
+
+
 def test_outputs_are_read_off_the_logs_parameters() -> None:
     """Full travel is the model's largest deflection; more microseconds are nose up, a trailing edge up."""
     found = log_outputs(changed({"SERVO1_REVERSED": 1.0, "SERVO2_TRIM": 1450.0}), PRIOR)

@@ -51,6 +51,14 @@ def test_the_model_does_what_the_sheet_says(foam: Aircraft) -> None:
     assert (foam.stall_speed, foam.mass, foam.wing_span, foam.airspeed) == (10.0, 2.1, 1.6, 15.0)
 
 
+def test_a_battery_that_level_flight_empties_at_once_is_refused(tmp_path: Path) -> None:
+    """25 kg at 25 m/s with a drag of a twentieth of the weight need 300 W and more: 0.6 Wh last for 7 s at most."""
+    sheet = DataSheet(mass=25.0, span=4.0, cruise=25.0, stall=16.0, volts=3.0, energy=0.6 * 3600.0)
+    with pytest.raises(FlightError, match=r"^battery 3 V, 0\.6 Wh: level flight .* empties it in [1-7] s: expected at"):
+        make_data_sheet_folder(tmp_path / "heavy", sheet)
+    assert not (tmp_path / "heavy").exists()
+
+
 def test_it_is_stable(foam: Aircraft) -> None:
     modes = {mode.name: mode for mode in level_flight_modes(foam, 15.0)}
     assert modes["short period"].damping > 0.3

@@ -19,6 +19,7 @@ from logs.importers.open_log import open_log
 from logs.importers.raw_log import ModeChange, example_raw_log
 from planfly.flight_options import LogOptions
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
+from tests.logs.importers.columns.column_files import circle, write_log
 from tests.logs.importers.judged_flights import judged
 from tests.logs.importers.pymavlink_rows import FLIGHTS, mission_lines, read_rows
 from world.arrays import Floats
@@ -259,3 +260,21 @@ def test_every_stretch_is_flown_again_the_longest_first(tmp_path: Path) -> None:
     flight = judged(tmp_path, replace(example_raw_log(), modes=turned), LogOptions(aircraft="aerosonde"))
     found = fly_again(flight.setup, flight.track, None, None, silent)
     assert [(again.stretch.start, again.first, len(again.legs)) for again in found] == [(20.0, 0, 1), (68.0, 1, 1)]
+
+
+@pytest.mark.parametrize("throttle", [None, 0.0])
+def test_a_throttle_that_never_moves_is_noted(tmp_path: Path, throttle: float | None) -> None:
+    """Where the log of a powered flight has two throttles, the log of a glider has 0 in all rows."""
+    changed = {} if throttle is None else {"thr": np.full(len(circle()["t"]), throttle)}
+    table = write_log(tmp_path, **changed)
+    plan = tmp_path / "plan.waypoints"
+    plan.write_text(
+        "QGC WPL 110\n"
+        "0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t400.0\t1\n"
+        "1\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.001\t500.0\t1\n"
+        "2\t0\t0\t16\t0\t0\t0\t0\t46.0\t8.012\t500.0\t1\n",
+        encoding="utf-8",
+    )
+    source = import_flight(table, LogOptions(plan=str(plan))).setup.source
+    assert source is not None
+    assert ("the throttle never moves: 0 in all rows" in source.notes) == (throttle is not None)
