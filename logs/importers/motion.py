@@ -66,11 +66,7 @@ class MotionLog:
     elevons: True if elevons make the controls.
     hovering: start and end of each period on lifting motors that the log itself names, s.
     span: first and last time of the part of the file that was read, s of the log.
-    elevons: true if the controls are made by elevons.
-    hovering: periods on lifting motors (s) that the log itself names.
     missing: quantities of "inertial" and "outputs" that a table of columns lacks.
-    home: latitude and longitude, degrees, and m AMSL: the last home of the vehicle (ORGN), or its first position on the
-        ground; None if neither is logged.
     """
 
     source: str

@@ -145,9 +145,7 @@ def identify_aircraft(
         estimate = estimate_model(records, base_numbers, dynamics=has_fast_rows)
         check_estimate(estimate, base_numbers, _unmixed_outputs(log, prior), log.source)
         check_power(estimate, records, base_numbers)
-        identified = make_identified(
-            prior, base_numbers, estimate, [motion_log for motion_log, _, _ in log_parts], outputs, until
-        )
+        identified = make_identified(prior, base_numbers, estimate, motion_logs, outputs, until)
         files = folder_files(identified, target.name, (volts, energy))
     with stage("predicting"):
         predicted = score_predictions(estimate, checked or records, base_numbers, prior.name)

@@ -118,16 +118,11 @@ def flight_records(
     attitude = np.column_stack(
         [np.interp(grid, log.attitude.time, np.unwrap(angle)) for angle in log.attitude.values.T]
     )
-    unknown = np.full(len(grid), np.nan)
-    battery = _interpolate(log.battery, grid) if _has_current(log) else np.column_stack([unknown, unknown])
+    battery = _interpolate(log.battery, grid) if _has_current(log) else np.full((len(grid), 2), np.nan)
     usable = _usable_rows(log, grid, airspeed / ratio, pulses) & (grid < until)
     velocity, wind = _interpolate(log.velocity, grid), _interpolate(log.wind, grid)
-    is_blocked = _blocked_airspeed_rows(airspeed, velocity[:, :2] - wind, attitude[:, 2]) & usable
-    if is_blocked.sum() > _MAX_BLOCKED_FRACTION * usable.sum():
-        shown = f"hardly varies for {is_blocked.sum() / GRID_HZ:.0f} s of {usable.sum() / GRID_HZ:.0f} s of flight"
-        allowed = "ground velocity minus wind does: check the sensor"
-        raise LogError.at(log.source, "airspeed", float(is_blocked.sum() / GRID_HZ), allowed, shown=shown)
-    usable &= ~is_blocked
+    is_blocked = _blocked_airspeed_rows(airspeed, velocity[:, :2] - wind, attitude[:, 2])
+    usable = _cut_blocked_rows(log, usable, is_blocked)
     flight = FlightRecord(
         time=grid,
         acceleration=inertial[:, :3],
@@ -441,6 +436,16 @@ def _blocked_airspeed_rows(airspeed: Floats, air_velocity: Floats, heading: Floa
         if airspeed[rows].std() < _BLOCKED_AIRSPEED_SD_MPS and along[rows].std() > _MOVING_AIRSPEED_SD_MPS:
             is_blocked[rows] = True
     return is_blocked
+
+
+def _cut_blocked_rows(log: MotionLog, usable: Flags, is_blocked: Flags) -> Flags:
+    """Return the usable rows without those of a blocked airspeed sensor; raise LogError if these are too many."""
+    blocked_seconds, seconds = float((usable & is_blocked).sum()) / GRID_HZ, float(usable.sum()) / GRID_HZ
+    if blocked_seconds > _MAX_BLOCKED_FRACTION * seconds:
+        shown = f"hardly varies for {blocked_seconds:.0f} s of {seconds:.0f} s of flight"
+        allowed = "ground velocity minus wind does: check the sensor"
+        raise LogError.at(log.source, "airspeed", blocked_seconds, allowed, shown=shown)
+    return usable & ~is_blocked
 
 
 def _find_segments(flags: Flags, min_duration: float = MIN_STRETCH) -> list[tuple[int, int]]:
