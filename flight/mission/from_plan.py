@@ -48,11 +48,12 @@ def plan_mission(
     tracking error of an autopilot is known, the radius is the one with the smallest error, because ArduPlane turns to
     the next leg at that distance before a waypoint.
 
+    >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
-    >>> scenario = load_scenario("tight")
+    >>> scenario, certificate = load_scenario("tight"), Certificate(*np.zeros(6), problems=())
     >>> points = np.array([[0.0, 0.0, 75.0], [1000.0, 0.0, 75.0], [2000.0, 1000.0, 75.0]])
     >>> plan = Plan(
-    ...     scenario, points, np.zeros(4, dtype=int), np.zeros(4), certificate=None, seed=1, algorithm="umda",
+    ...     scenario, points, np.zeros(4, dtype=int), np.zeros(4), certificate, seed=1, algorithm="umda",
     ...     evaluations=0, history=np.zeros((1, 3)),
     ... )
     >>> mission = plan_mission(plan, airspeed=25.0, max_bank=math.radians(30.0))

@@ -33,7 +33,8 @@ def test_the_other_figures_of_thor_are_the_benchmarks() -> None:
         ahead = ", ".join(f"{thor[row][axis]:g}" for axis in ("roll", "pitch", "yaw"))
         assert f"| {ahead} |" in PAGE, row
     whites = sorted(thor["white"].values())
-    assert f"{100.0 * whites[0]:.0f} to {100.0 * whites[-1]:.0f} % of the lags up to 0.5 s" in PAGE
+    share = f"{100.0 * whites[0]:.0f} to {100.0 * whites[-1]:.0f} %"
+    assert f"{share} of the autocorrelations at lags up to 0.5 s" in PAGE
     low, middle, high = thor["power_without_current"]
     assert f"| {middle} W, {low} to {high} W |" in PAGE
     assert f"in {thor['windows']} windows of 2 s" in PAGE

@@ -93,7 +93,7 @@ def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:
     file.write_text("a = [1]\n", encoding="utf-8")
     assert read_toml(file, "gains") == {"a": [1]}
     for text, said in (
-        ("a = " + "[" * 100_000, "without end"),
+        ("a = " + "[" * 100_000, "nested too deeply"),
         ("a = " + "9" * 10_000, "digits"),
         ("a", "Expected"),
         ("a." * 101 + "a = 1", "100 parts"),

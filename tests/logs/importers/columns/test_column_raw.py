@@ -49,10 +49,14 @@ def test_the_bytes_of_the_data_are_part_of_the_digest(tmp_path: Path) -> None:
 
 
 def test_rows_are_known_again_after_an_edit_of_their_table(tmp_path: Path) -> None:
-    """An aircraft that was identified from a log has seen it, whatever was edited in the table of its columns since."""
+    """An aircraft that was identified from a log has seen it, whatever was edited in the table of its columns since.
+
+    Another span is of the same data: the span itself says which rows were used.
+    """
     first = read_motion(write_log(tmp_path)).sha256
     assert read_motion(write_log(tmp_path, f"# A comment.\n{TABLE}")).sha256 == first
-    assert read_motion(write_log(tmp_path, f"span_s = [20.0, 60.0]\n{TABLE}")).sha256 != first
+    part = read_motion(write_log(tmp_path, f"span_s = [20.0, 60.0]\n{TABLE}"))
+    assert (part.sha256, part.span) == (first, (20.0, 60.0))
     assert read_motion(write_log(tmp_path, volt=circle()["volt"] + 0.1)).sha256 != first
 
 
