@@ -71,7 +71,7 @@ def plan(
     <Plan tight: 22 waypoints, safe, ...>
     >>> path.waypoints.shape
     (22, 3)
-    >>> mine = path.waypoints + [[0.0, 0.0, 0.0], *[[0.0, 4.0, 0.0]] * 20, [0.0, 0.0, 0.0]]
+    >>> mine = path.waypoints + [[0.0, 0.0, 0.0], *[[0.0, 100.0, 0.0]] * 20, [0.0, 0.0, 0.0]]
     >>> planfly.plan("tight", waypoints=mine)
     <Plan tight: 22 waypoints, not feasible, ...>
     """

@@ -177,7 +177,7 @@ class Work:
             (lattice, "continue_lattice_search"),
             (pattern_search, "_continue_search"),
             (shortening, "continue_shortening"),
-            (waypoint_chains, "_advance"),
+            (waypoint_chains, "_advance_sweeps"),
             (waypoint_fitting, "_choose_candidates"),
         ):
             self._count(monkeypatch, module, kernel)
