@@ -129,9 +129,9 @@ def to_frame(quantity: str, frame: str) -> tuple[float, float]:
 
 
 def better_unit(quantity: str, unit: str, size: float) -> str:
-    """Return another unit in which values of this size would be plausible; "" if there is none.
+    """Return the unit that the values are more likely to be in: the same numbers are plausible; "" if there is none.
 
-    size: size of the values in ``unit``.
+    size: magnitude of the numbers, which were read as values in ``unit``.
 
     >>> better_unit("roll", "rad", 179.0), better_unit("throttle", "fraction", 85.0), better_unit("roll", "deg", 9e9)
     ('deg', '%', '')

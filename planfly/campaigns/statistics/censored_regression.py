@@ -93,7 +93,7 @@ class _Probit:
         return self.log_cdf(-x)
 
     def survival(self, x: Floats) -> Floats:
-        """Return the normal probability of success."""
+        """Return the probability of success at the linear predictor x: the standard normal survival function."""
         from scipy.special import ndtr
 
         return ndtr(-x)

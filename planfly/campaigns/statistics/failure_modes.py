@@ -180,9 +180,10 @@ WIND_ORIGIN_MPS = 10.0
 
 
 def make_terms(speeds: Floats | float, draws: Floats) -> Floats:
-    """Return the terms (n, 2 + d) of flights: one, the wind relative to `WIND_ORIGIN_MPS`, and the draws.
+    """Return the regressors of n flights, (n, 2 + d): a constant 1, the wind speed minus the origin, and the draws.
 
-    speeds: (n,) or one for all, m/s.  draws: (n, d) in standard deviations from their means.
+    speeds: wind speeds, (n,) or a single value for all flights, m/s; the origin is `WIND_ORIGIN_MPS`.
+    draws: (n, d) in standard deviations from their means.
     """
     terms = np.empty((len(draws), 2 + draws.shape[1]))
     terms[:, 0] = 1.0
