@@ -79,8 +79,8 @@ class NearMiss:
 
     @property
     def worst(self) -> float:
-        """Usable part of the worst photo line, %."""
-        return min(_usable_parts(self.verdict))
+        """Usable part of the worst photo line, %; 0 if the changed mission has no photo lines."""
+        return min(_usable_parts(self.verdict), default=0.0)
 
 
 @dataclass(frozen=True, slots=True)

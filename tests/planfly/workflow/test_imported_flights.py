@@ -264,7 +264,7 @@ def test_every_stretch_is_flown_again_the_longest_first(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("throttle", [None, 0.0])
 def test_a_throttle_that_never_moves_is_noted(tmp_path: Path, throttle: float | None) -> None:
-    """Where the log of a powered flight has two throttles, the log of a glider has 0 in all rows."""
+    """The log of a powered flight has two throttles, and the log of a glider has 0 in all rows."""
     changed = {} if throttle is None else {"thr": np.full(len(circle()["t"]), throttle)}
     table = write_log(tmp_path, **changed)
     plan = tmp_path / "plan.waypoints"
