@@ -31,8 +31,8 @@ _MACHINE_ERRORS = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.EIO)
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command, and return its exit code.
 
-    argv: arguments without the program's name; None for those of the process.  With None, SIGINT and
-    SIGTERM end the process.
+    argv: arguments without the program's name; None for those of the process.  With None, SIGINT and SIGTERM end the
+    process, and so does the end of the command: its exit code is the process's.
     """
     if argv is not None:
         return _run_and_report(argv)
@@ -48,10 +48,8 @@ def main(argv: Sequence[str] | None = None) -> int:
                 raise
             # An interrupted compiler may fail with any error.
             code = _report_error(128 + received_signals[0], "interrupted")
-    if received_signals:
-        # End the process directly, because the shutdown of an interpreter with compiled code takes a second.
-        end_process(code)
-    return code
+    # End the process directly, because the shutdown of an interpreter with compiled code takes up to a second.
+    end_process(code)
 
 
 def _run_and_report(argv: Sequence[str] | None) -> int:

@@ -10,6 +10,9 @@ from typing import TypeVar
 _Result = TypeVar("_Result")
 # Total number of values in all frames within `with_large_stack`; Numba recurses some 500 frames deep.
 _STACK_VALUES = 2**17
+# Number of new objects after which garbage is collected.  The imports of a command leave some 300,000, and nothing to
+# collect; a flight allocates few more.
+_MIN_OBJECTS_TO_COLLECT = 1_000_000
 # Environment variable of a process set up by `prepare_process`, inherited by its child processes.
 _OWN_PROCESS_VARIABLE = "PLANFLY_OWN_PROCESS"
 
@@ -32,7 +35,7 @@ def prepare_child() -> None:
     import only modules that fit (`world.address_space`).
     """
     if _OWN_PROCESS_VARIABLE in os.environ:
-        gc.set_threshold(200_000, 50, 50)
+        gc.set_threshold(_MIN_OBJECTS_TO_COLLECT, 50, 50)
         watch_address_space()
 
 
