@@ -5,6 +5,7 @@ read.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -24,7 +25,7 @@ from logs.verdict.judge_geometry import (
 )
 from logs.verdict.measures.flown_phases import flown_phases, leg_ends
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
-from logs.verdict.places import Disagreement, LevelAnswer, Place, ReferenceFlights
+from logs.verdict.places import AirframeAnswer, Disagreement, LevelAnswer, Place, ReferenceFlights
 from logs.verdict.summary import headline, summary_lines, undecided_text
 from logs.verdict.verdict import Verdict
 
@@ -69,13 +70,10 @@ def judge_flight(
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)
     findings = with_suggestions(air_requirements, aligned, findings)
-    findings = with_passing_suggestions(findings, None if reference is None else reference.tried)
-    levels = _level_answers(whole_requirements, findings, flyable, reference)
-    deciding = None if reference is None or flyable else reference.deciding
+    levels = _level_answers(whole_requirements, findings, flyable)
     conditions = judging_conditions(setup)
-    lines = summary_lines(findings, setup, "flown", levels, conditions, deciding)
-    return Verdict(
-        *(findings, flyable, complete, lines, "flown", levels, deciding),
+    verdict = Verdict(
+        *(findings, flyable, complete, summary_lines(findings, setup, "flown", levels, conditions), "flown", levels),
         notes=setup.notes,
         leg_ends=() if aligned is None else leg_ends(air_requirements, aligned),
         program=setup.autopilot.program,
@@ -83,18 +81,33 @@ def judge_flight(
         unjudged=unjudged,
         conditions=conditions,
     )
+    return verdict if reference is None else with_reference(verdict, whole_requirements, reference)
+
+
+def with_reference(verdict: Verdict, requirements: RouteRequirements, reference: ReferenceFlights) -> Verdict:
+    """Return a verdict with the results of reference flights: the airframe's answer and the suggestions that passed.
+
+    A verdict on a flight that never began is returned unchanged.
+    """
+    if verdict.level != "flown":
+        return verdict
+    setup = requirements.setup
+    findings = with_passing_suggestions(verdict.findings, reference.tried)
+    *other_levels, own_level = verdict.levels
+    if requirements.envelope and reference.airframe is not None:
+        other_levels.append(_airframe_level(reference.airframe, findings))
+    levels = (*other_levels, own_level)
+    deciding = None if verdict.flyable else reference.deciding
+    lines = summary_lines(findings, setup, "flown", levels, judging_conditions(setup), deciding)
+    return replace(verdict, findings=findings, lines=lines, levels=levels, deciding=deciding)
 
 
 def _level_answers(
-    requirements: RouteRequirements,
-    flight_findings: tuple[Finding, ...],
-    flyable: bool,
-    reference: ReferenceFlights | None,
+    requirements: RouteRequirements, flight_findings: tuple[Finding, ...], flyable: bool
 ) -> tuple[LevelAnswer, ...]:
-    """Return the answers of the judged levels: geometry, the airframe's reference flight, and the flight itself.
+    """Return the answers of geometry, with its disagreements with the flight, and of the flight itself.
 
-    The first two answers include their disagreements with the flight.  The answer of the airframe is missing without
-    its reference flight; if the envelope is not applied, only the flight's own answer is returned.
+    If the envelope is not applied, only the flight's own answer is returned.
     """
     levels, source = [], requirements.setup.envelope.source
     if requirements.envelope:
@@ -108,18 +121,6 @@ def _level_answers(
         levels.append(
             LevelAnswer("geometry", passes, headline_text, disagreements, undecided=not passes and not has_failed)
         )
-    if requirements.envelope and reference is not None and reference.airframe is not None:
-        airframe = reference.airframe
-        failed = frozenset(airframe.failed)
-        passes_by_place = {
-            (finding.rule, finding.place): (finding.rule, finding.place) not in failed for finding in flight_findings
-        }
-        disagreements = _disagreements("airframe", passes_by_place, flight_findings)
-        # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
-        is_undecided = not airframe.flyable and not airframe.failed
-        levels.append(
-            LevelAnswer("airframe", airframe.flyable, airframe.headline, disagreements, undecided=is_undecided)
-        )
     undecided = bool(undecided_findings(flight_findings)) and not any(
         finding.ok is False for finding in flight_findings
     )
@@ -127,6 +128,18 @@ def _level_answers(
         flown_level(requirements.setup), flyable, headline(flight_findings, flyable, source), undecided=undecided
     )
     return (*levels, own_answer)
+
+
+def _airframe_level(airframe: AirframeAnswer, flight_findings: tuple[Finding, ...]) -> LevelAnswer:
+    """Return the answer of the reference flight with planfly's guidance, with its disagreements with the flight."""
+    failed = frozenset(airframe.failed)
+    passes_by_place = {
+        (finding.rule, finding.place): (finding.rule, finding.place) not in failed for finding in flight_findings
+    }
+    disagreements = _disagreements("airframe", passes_by_place, flight_findings)
+    # If the answer is not "flyable" although no finding failed, the airframe's flight was undecided.
+    is_undecided = not airframe.flyable and not airframe.failed
+    return LevelAnswer("airframe", airframe.flyable, airframe.headline, disagreements, undecided=is_undecided)
 
 
 def _disagreements(

@@ -185,22 +185,32 @@ def worst_finding_per_stop(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(worst_by_stop.values())
 
 
+# Greatest number of findings for which suggestions are made; if more fail, no single change mends the mission.
+MAX_SUGGESTED_FINDINGS = 200
+
+
 def with_suggestions(
     requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Return the findings, with ``suggestions`` added to failed or undecided findings that a change could fix.
 
     Findings on the legs of a return to launch get no suggestions, because the autopilot chooses the path of a return.
+    None gets a suggestion if more than `MAX_SUGGESTED_FINDINGS` need one.
     """
-    results, first_leg = [], requirements.setup.route.rtl_start
+    first_leg = requirements.setup.route.rtl_start
     last_leg = min(requirements.legs, requirements.setup.route.rtl_end)
     return_legs = {requirements.leg(i) for i in range(first_leg, last_leg)} if first_leg >= 0 else set()
-    for finding in findings:
-        suggest = RULES[finding.rule].suggest
-        needs_suggestion = finding.ok is False or (finding.ok is None and finding.check == UNKNOWN_AIRCRAFT)
-        if needs_suggestion and suggest is not None and finding.place not in return_legs:
-            finding = replace(finding, suggestions=suggest(requirements, aligned, finding))
-        results.append(finding)
+    places = [
+        k
+        for k, finding in enumerate(findings)
+        if (finding.ok is False or (finding.ok is None and finding.check == UNKNOWN_AIRCRAFT))
+        and RULES[finding.rule].suggest is not None
+        and finding.place not in return_legs
+    ]
+    results = list(findings)
+    for k in places if len(places) <= MAX_SUGGESTED_FINDINGS else ():
+        if (suggest := RULES[results[k].rule].suggest) is not None:
+            results[k] = replace(results[k], suggestions=suggest(requirements, aligned, results[k]))
     return tuple(results)
 
 

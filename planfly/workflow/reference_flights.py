@@ -12,14 +12,14 @@ from flight.autopilots.planfly.autopilot import PlanflyGuidance
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding
-from logs.verdict.judge_flight import judge_flight
+from logs.verdict.judge_flight import judge_flight, with_reference
 from logs.verdict.measures.route_requirements import RouteRequirements, true_route
 from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import most_urgent_failure
 from logs.verdict.trials import least_change
 from logs.verdict.verdict import Verdict
 from planfly.workflow.mission_context import JudgedMission, MissionContext
-from planfly.workflow.suggestion_trials import SuggestionTrials, tried_suggestions
+from planfly.workflow.suggestion_trials import MAX_TRIED_LEGS, SuggestionTrials, tried_suggestions
 from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_explaining_flights, never_abort
 
 # ----------------------------------------------------------------------
@@ -213,7 +213,8 @@ def judge_with_reference_flights(
     track, end_reason: the flight, and the reason for its end.
     fly: cases in which reference flights are flown: "failed" if a finding of the flight fails, "always" also if all
     pass.  A flight of planfly's own guidance has no reference flight, but its suggestions are tried.  A failed flight
-    that is too long for `planfly.workflow.trial_flight.max_explaining_flights` has none either.
+    that is too long for `planfly.workflow.trial_flight.max_explaining_flights`, or has more than `MAX_TRIED_LEGS` legs,
+    has none either.
     should_abort: called throughout the reference flights; once it returns True, they are aborted, and the verdict
     contains the results up to that moment.
     """
@@ -225,7 +226,7 @@ def judge_with_reference_flights(
     with suppress(TrialAborted):
         # planfly's guidance does not return by itself, so that its flight does not explain such a return.
         is_only_return = bool(verdict.failed) and all(finding.rule == "return" for finding in verdict.failed)
-        is_affordable = fly == "always" or max_explaining_flights(setup) > 1
+        is_affordable = fly == "always" or (max_explaining_flights(setup) > 1 and requirements.legs <= MAX_TRIED_LEGS)
         if setup.autopilot.level != "airframe" and not is_only_return and is_affordable:
             reference = replace(reference, airframe=judge_airframe_flight(setup, aircraft, should_abort))
         is_affordable = max_explaining_flights(setup) >= _MAX_PARAMETER_FLIGHTS
@@ -239,4 +240,4 @@ def judge_with_reference_flights(
             reference = replace(reference, tried=tried_suggestions(passed_trials))
     if reference == ReferenceFlights():
         return verdict, None
-    return judge_flight(setup, track, end_reason, reference=reference, requirements=requirements), reference
+    return with_reference(verdict, requirements, reference), reference

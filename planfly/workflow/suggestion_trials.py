@@ -32,8 +32,8 @@ MAX_TRIAL_FLIGHTS = 4
 _MAX_STEPS = 10
 # Greatest number of failed findings with suggestions; if more fail, no single change is worth a trial.
 _MAX_FAILED_FINDINGS = 40
-# Greatest number of legs of a mission whose suggestions are tried: each trial judges all of them, 1 s for a thousand.
-_MAX_TRIED_LEGS = 5000
+# Greatest number of legs of a mission with trials and a reference flight: each judges all legs, 2 s for a thousand.
+MAX_TRIED_LEGS = 5000
 # Changes by a step, m, which are enlarged while the finding fails.
 _STEP_KINDS = frozenset(("height", "descent", "inset", "distance", "north", "east", "south", "west"))
 # Changes of the energy carried or needed, as a ratio or a percentage.
@@ -132,7 +132,7 @@ class SuggestionTrials:
             [finding for finding in rule.failed if finding.suggestions]
             for rule in self.judged.verdict.present().failed_rules
         ]
-        is_too_long = self.judged.requirements.legs > _MAX_TRIED_LEGS
+        is_too_long = self.judged.requirements.legs > MAX_TRIED_LEGS
         if is_too_long or sum(map(len, findings_by_rule)) > _MAX_FAILED_FINDINGS:
             return []
         ranked = [(rank, finding) for rule in findings_by_rule for rank, finding in enumerate(rule)]

@@ -1,9 +1,7 @@
 """Decide when a waypoint is reached, and how far from the legs a flight may be."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -151,25 +149,17 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 # both.  A step of a few metres in a level path is a cliff; a climb that begins a little early is within its height.
 
 
-# For the first and last waypoint of a gap: see `shortcut_distance`.
-ShortcutDistance = Callable[[int, int], float | None]
-
-
-def negligible_kink(
-    requirements: RouteRequirements, i: int, distance_of_shortcut: ShortcutDistance | None = None
-) -> float | None:
+def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
     """Return how far a flyable path without waypoint i passes from the waypoints that it omits, m, or None without one.
 
     The path omits the waypoint and up to `KINK_WAYPOINT_COUNT` - 1 of its neighbours.
-
-    distance_of_shortcut: `shortcut_distance` of these requirements, cached; consecutive waypoints have most gaps in
-        common.
     """
-    distance_of_shortcut = distance_of_shortcut or partial(shortcut_distance, requirements)
     for count in range(1, KINK_WAYPOINT_COUNT + 1):
         for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
-            distance = distance_of_shortcut(first, first + count - 1)
-            if distance is not None:
+            ends = first, first + count - 1
+            if ends not in requirements.shortcuts:
+                requirements.shortcuts[ends] = shortcut_distance(requirements, *ends)
+            if (distance := requirements.shortcuts[ends]) is not None:
                 return distance
     return None
 

@@ -1,7 +1,7 @@
 """Compute the requirements of a route and the aircraft's limits, which are the planned side of every finding."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -328,6 +328,8 @@ class RouteRequirements:
     zone_check_legs: for a quick answer, the first and last leg on which zones are checked; None to check all legs and
         all zones.
     ground_phases: take-off and landing of the flight, to whose airborne part the other fields belong; None without.
+    shortcuts: results of `logs.verdict.measures.acceptance.shortcut_distance` so far, by the first and last waypoint
+        that the shortcut omits; neighbouring waypoints have most shortcuts in common.
     """
 
     setup: FlightSetup
@@ -356,6 +358,7 @@ class RouteRequirements:
     surveys: tuple[Survey, ...]
     ground_phases: FlownGround | None = None
     zone_check_legs: tuple[int, int] | None = None
+    shortcuts: dict[tuple[int, int], float | None] = field(default_factory=dict, init=False, repr=False, compare=False)
 
     @property
     def limits(self) -> Limits:

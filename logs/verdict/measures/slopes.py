@@ -288,8 +288,7 @@ def _rows_at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows
     throttle = track.controls[rows, THROTTLE]
     is_full = throttle >= FULL_THROTTLE_FRACTION
     is_idle = throttle <= IDLE_THROTTLE_FRACTION
-    # An aircraft that burns fuel draws no current at all.
-    if not requirements.setup.envelope.motor_braking and track.current.any():
+    if not requirements.setup.envelope.motor_braking and aligned.draws_current:
         is_idle |= (track.current[rows] <= ZERO_CURRENT_A) & ~is_full
     return is_full, is_idle
 

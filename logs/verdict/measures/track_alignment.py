@@ -61,6 +61,7 @@ class AlignedTrack:
         segment at which it occurs, (t - 1,); the height is NaN outside the terrain data and without terrain.
     lift_gain: airspeed gained from rising air, m/s, (t,).
     tick: median time between rows, s.
+    draws_current: True if the motor drew current in any row; an aircraft that burns fuel draws none.
     """
 
     track: Track
@@ -75,6 +76,7 @@ class AlignedTrack:
     clearance_fraction: Floats
     lift_gain: Floats
     tick: float
+    draws_current: bool
 
     def leg_rows(self, leg: int) -> slice:
         """Return the rows between a leg's two waypoints, both included."""
@@ -152,6 +154,7 @@ def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack |
         clearance_fraction=clearance_fraction,
         lift_gain=lifted_speed(usable_track.time, usable_track.airspeed, usable_track.wind[:, 2]),
         tick=float(np.median(np.diff(usable_track.time))),
+        draws_current=bool(usable_track.current.any()),
     )
 
 

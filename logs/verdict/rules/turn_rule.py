@@ -1,19 +1,13 @@
 """The turn rule: judge whether each corner can be flown on its legs, and how it was flown."""
 
 import math
-from functools import cache, partial
 
 import numpy as np
 
 from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
-from logs.verdict.measures.acceptance import (
-    ShortcutDistance,
-    acceptance_condition,
-    negligible_kink,
-    shortcut_distance,
-)
+from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
@@ -47,25 +41,19 @@ def turn_findings(
     if aligned is not None:
         measures = [*measure_turns(requirements, aligned)]
     turnaround_waypoints = requirements.turnaround_waypoints()
-    distance_of_shortcut = cache(partial(shortcut_distance, requirements))
     return [
-        _turn_finding(requirements, i, measure, aligned, distance_of_shortcut)
+        _turn_finding(requirements, i, measure, aligned)
         for i, measure in enumerate(measures, 1)
         if i not in turnaround_waypoints
     ]
 
 
 def _turn_finding(
-    requirements: RouteRequirements,
-    i: int,
-    measure: TurnMeasure | None,
-    aligned: AlignedTrack | None,
-    distance_of_shortcut: ShortcutDistance,
+    requirements: RouteRequirements, i: int, measure: TurnMeasure | None, aligned: AlignedTrack | None
 ) -> Finding:
     """Return the finding for the turn at waypoint i.
 
     measure: measurements of the flown turn; None before a flight.
-    distance_of_shortcut: as for `negligible_kink`.
     """
     planned_turn = abs(float(requirements.turns[i]))
     limit, source = turn_limit(requirements, i)
@@ -77,7 +65,7 @@ def _turn_finding(
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     faults, facts = [], [turn_text + (f" (at most {math.degrees(limit):.1f}°)" if math.isfinite(limit) else "")]
     if planned_turn > limit + PLAN_TOLERANCE_RAD:
-        lateral = negligible_kink(requirements, i, distance_of_shortcut)
+        lateral = negligible_kink(requirements, i)
         if lateral is None:
             # The message already states the turn and its limit.
             faults, facts = [_sharp_turn_message(requirements, i, planned_turn, limit, source)], []

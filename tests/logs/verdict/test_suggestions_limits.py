@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from logs.verdict import judge_geometry as judge_geometry_module
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import leg, missile, of, suggested
@@ -65,3 +66,16 @@ def test_a_level_speed_is_three_per_cent_within_the_envelope(speed: float) -> No
     item = of(judge_geometry(make_setup([[0, 0, 300], [0, 6000, 300]], airspeed=speed)), "speed", leg(0))
     change = suggested(item, "airspeed")
     assert (change.wanted, change.most) == (16.5, 31.0)
+
+
+@pytest.mark.parametrize(("limit", "has_suggestions"), [(3, True), (2, False)])
+def test_no_suggestions_for_more_findings_than_one_change_can_mend(
+    limit: int, has_suggestions: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three legs climb at 16 degrees, and the aircraft at 13.7."""
+    monkeypatch.setattr(judge_geometry_module, "MAX_SUGGESTED_FINDINGS", limit)
+    rise = 4000.0 * math.tan(math.radians(16.0))
+    verdict = judge_geometry(make_setup([[0, 4000 * k, 300 + rise * k] for k in range(4)]))
+    slopes = [of(verdict, "slope", leg(k)) for k in range(3)]
+    assert [item.ok for item in verdict.findings].count(False) == 3
+    assert [bool(item.suggestions) for item in slopes] == [has_suggestions] * 3

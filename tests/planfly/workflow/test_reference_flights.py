@@ -266,6 +266,18 @@ def test_a_failed_flight_that_is_too_long_has_fewer_flights_beside_it(
     assert (reference.airframe is not None, reference.deciding is not None) == (has_airframe, has_deciding)
 
 
+@pytest.mark.parametrize(("legs", "has_airframe"), [(0, True), (-1, False)])
+def test_a_failed_flight_with_too_many_legs_has_no_reference_flight(
+    legs: int, has_airframe: bool, flown: tuple[JudgedFlight, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the greatest number of legs there is one, and none with a leg more: each judges all legs."""
+    judged, _ = flown
+    monkeypatch.setattr(reference_flights, "MAX_TRIED_LEGS", judged.requirements.legs + legs)
+    _, reference = judge_with_reference_flights(judged.requirements, AIRCRAFT, judged.track, judged.ended)
+    assert reference is not None
+    assert (reference.airframe is not None) is has_airframe
+
+
 def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:
     judged, path = flown
     log = read_log(path)

@@ -135,7 +135,7 @@ def test_of_a_long_flight_fewer_suggestions_are_flown(
 def test_no_suggestion_of_a_mission_of_thousands_of_legs_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
     legs = SESSION.judged.requirements.legs
     for max_legs, tried in ((legs, 1), (legs - 1, 0)):
-        monkeypatch.setattr(suggestion_trials, "_MAX_TRIED_LEGS", max_legs)
+        monkeypatch.setattr(suggestion_trials, "MAX_TRIED_LEGS", max_legs)
         trials, flights = trials_of(monkeypatch, [low(1, higher(1, 12.0))], lambda up: [])
         assert (len(trials.find_passing()), flights.count) == (tried, tried)
 

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from logs.verdict.measures import acceptance
 from logs.verdict.measures.acceptance import negligible_kink, step_height
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules import turn_rule
@@ -24,9 +25,11 @@ def test_eight_waypoints_in_a_row_are_left_out_at_most(count: int, found: bool) 
 
 def test_each_gap_of_a_long_zigzag_is_judged_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every gap of up to eight of 40 waypoints; each contains up to eight waypoints that ask for it."""
-    judged, judge = [], turn_rule.shortcut_distance
-    monkeypatch.setattr(turn_rule, "shortcut_distance", lambda *gap: judged.append(gap[1:]) or judge(*gap))
-    turn_rule.turn_findings(route_requirements(make_setup(zigzag(40))), None, geometric=True)
+    judged, judge = [], acceptance.shortcut_distance
+    monkeypatch.setattr(acceptance, "shortcut_distance", lambda *gap: judged.append(gap[1:]) or judge(*gap))
+    requirements = route_requirements(make_setup(zigzag(40)))
+    for _ in range(2):
+        turn_rule.turn_findings(requirements, None, geometric=True)
     assert len(judged) == len(set(judged)) > 40
 
 
