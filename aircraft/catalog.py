@@ -152,7 +152,7 @@ def load_aircraft(name: str) -> Aircraft:
 
 
 def find_aircraft(name: str) -> Aircraft:
-    """Return the embedded aircraft of a name, or the aircraft of a folder if the name contains a slash.
+    """Return the embedded aircraft with a name, or the aircraft in a folder if the name contains a slash.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -163,10 +163,10 @@ def find_aircraft(name: str) -> Aircraft:
 
 
 def find_logged_aircraft(name: str, stated_name: str) -> Aircraft:
-    """Return the aircraft of a setup or log.
+    """Return the aircraft that a setup or log names.
 
     name: name of the aircraft in the setup or log.
-    stated_name: name or folder in the scenario of the setup or log; it is used if it is a folder called `name`.
+    stated_name: name or folder of the aircraft in the scenario; it is used if it is a folder called `name`.
 
     Raises FlightError as `load_aircraft` does.
 
@@ -289,9 +289,9 @@ _SHIPPED_ENTRY = re.compile(r"^([ \t]*shipped_by_jsbsim\s*=\s*)\S.*\n", re.MULTI
 def make_own_folder(
     folder: Path, source: Aircraft, model: Mapping[str, bytes] | None = None, *, overwrite: bool = False
 ) -> tuple[str, ...]:
-    """Create a folder with a copy of an aircraft, which gets the folder's name; create it completely or not at all.
+    """Create a folder with a copy of an aircraft under the folder's name; create it completely or not at all.
 
-    model: contents of a model's files that JSBSim ships, by name, which are copied; None to only refer to the model.
+    model: contents of the files of a model that JSBSim ships, by name, to copy them; None to only refer to the model.
     overwrite: True to replace the folder of an aircraft.
 
     Returns the sorted names of the created files.  Raises FlightError as `check_new_folder` does, and OSError if the

@@ -98,7 +98,7 @@ def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """Return a model's XML with default contacts added; return a model that has contacts unchanged."""
+    """Return a model's XML with default contacts added; a model that has contacts is returned unchanged."""
     if _model_contacts(model):
         return model
     contacts = default_contacts(aircraft, gear)

@@ -18,8 +18,8 @@ from world.geometry import leg_courses, leg_slopes, wrap
 from world.kernels import compiled, compiled_inline, inlined
 from world.wind import W20, Wind, mean_wind_speed
 
-# Time to roll from one bank angle into the opposite one, s per rad by which the bank change exceeds the bank limit:
-# rolling in from level flight is part of every turn. Measured on the shortest S-turn legs that are flown within
+# Time to roll from a turn into an opposite turn, s per rad of the bank change beyond the bank limit: the roll from
+# level flight to the bank limit is part of every turn. Measured on the shortest S-turn legs that are flown within
 # tolerance (`benchmarks.limits`).
 ROLL_TIME = 0.8
 # Vertical acceleration in the blend between two slopes, m/s^2.
@@ -105,7 +105,12 @@ class Limits:
         return replace(self, envelope=self.envelope.with_margin())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
-        """Return the radius (m) of the arc at `max_bank` between two courses, for its highest ground speed."""
+        """Return the radius of the arc at `max_bank` between two courses, m, for the highest ground speed on the arc.
+
+        course_in, course_out: rad.
+        amsl: altitude, m.
+        airspeed: m/s; None for the airspeed of the limits.
+        """
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
     def rates(self, amsl: float) -> tuple[float, float]:
@@ -146,7 +151,7 @@ class Limits:
         return self._tables[airspeed]
 
     def _make_table(self, airspeed: float | None) -> PerformanceTable:
-        """Make the table of `performance`."""
+        """Make the performance table for a true airspeed, or for the airspeed of the limits if it is None."""
         cruise_airspeed, altitudes, wind = (
             self.airspeed if airspeed is None else airspeed,
             self.envelope.amsl,

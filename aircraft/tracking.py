@@ -170,9 +170,9 @@ CORRIDOR_RADII = 2.0
 def corridor_half_width(stated_half_width: float | None, acceptance_radius: float | None) -> float:
     """Return the half-width of the corridor around the legs of a path, m.
 
-    The scenario states it, or it follows from the autopilot's acceptance radius.
+    It is the scenario's value if there is one; otherwise it is computed from the autopilot's acceptance radius.
 
-    stated_half_width: `[limits] corridor_m`, None if not stated.
+    stated_half_width: the scenario's `[limits] corridor_m`; None if not stated.
     acceptance_radius: default acceptance radius of the autopilot, m; None for guidance that flies corners as planned.
 
     >>> corridor_half_width(None, None), corridor_half_width(None, 90.0), corridor_half_width(12.0, 90.0)

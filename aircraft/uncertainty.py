@@ -157,7 +157,7 @@ def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, 
 
 
 def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
-    """Read one [[quantity]] table."""
+    """Return the uncertain quantity in a [[quantity]] table.  Raises FlightError for an invalid entry."""
     name = entry.get("property")
     _check_name(name, str(file), "property")
     estimate, sd = (
@@ -167,14 +167,14 @@ def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
 
 
 def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:
-    """Raise `error` for a name that is not a property ``ident/NAME``."""
+    """Raise `error` if a name is not the name of a property, ``ident/NAME``."""
     # JSBSim aborts the process on a name with a space in it.
     if not isinstance(name, str) or not name.startswith(_PREFIX) or not name.isascii() or len(name.split()) != 1:
         raise error.at(file, key, name, f"expected a property {_PREFIX}NAME", shown=repr(name))
 
 
 def uncertainty_text(uncertainty: Uncertainty) -> str:
-    """Return the text of an ``uncertainty.toml``."""
+    """Write an uncertainty as the text of an ``uncertainty.toml``."""
     lines = [
         "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
         "",
@@ -221,7 +221,7 @@ class Draws:
     source: str = ""
 
     def row(self, seed: int) -> int:
-        """Return the number of the draw that a flight with this seed uses."""
+        """Return the row of the draw that a flight with this seed uses."""
         return seed % len(self.values)
 
     def properties(self, seed: int) -> tuple[tuple[str, float], ...]:
@@ -248,7 +248,7 @@ def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW
 
 
 def draws_text(draws: Draws) -> str:
-    """Return the text of a ``draws.csv``."""
+    """Write draws as the text of a ``draws.csv``."""
     lines = [",".join(draws.names), *(",".join(f"{value:.9g}" for value in row) for row in draws.values.tolist())]
     return "\n".join(lines) + "\n"
 

@@ -35,7 +35,7 @@ from planfly.workflow.open_flight import make_setup
 from planner.evaluation.problem import SLOPE_FRACTION_BY_TURBULENCE
 from world.arrays import Floats
 from world.errors import ScenarioError
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 # Program of a real ArduPlane; without the variable, the one in the working folder.
 BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", "arduplane"))
@@ -112,7 +112,7 @@ def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airfra
         }
         spec["flight"] = {"autopilot": "ardupilot", "nav": "perfect"}
         try:
-            scenario = from_spec(spec, f"random {seed}")
+            scenario = scenario_from_spec(spec, f"random {seed}")
             airframe = load_airframe(scenario)
             plan = make_plan(scenario, _climbing(airframe, scenario) if steep else airframe, seed)
         except ScenarioError:  # an end within a missile's reach

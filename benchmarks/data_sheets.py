@@ -164,7 +164,7 @@ def performance(aircraft: Aircraft, variation: Variation | None = None) -> Perfo
     level = steady_flight(fdm, speed, AMSL)
     power = math.nan
     if level is not None:
-        fdm.balance(level.vector())
+        fdm.apply_trim(level.vector())
         power = float(fdm.read().power)
     up, down = full_throttle_climb(fdm, speed, AMSL, level), idle_descent(fdm, speed, AMSL, level)
     return Performance(

@@ -70,7 +70,7 @@ def flown_like(aircraft: Aircraft) -> tuple[float, float, float] | None:
     up, down = (steepest(fdm, aircraft.airspeed, AMSL, level) for steepest in (full_throttle_climb, idle_descent))
     if level is None or up is None or down is None:
         return None
-    fdm.balance(level.vector())
+    fdm.apply_trim(level.vector())
     return math.degrees(up.climb), -math.degrees(down.climb), float(fdm.read().power)
 
 

@@ -19,7 +19,7 @@ from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track
 from logs.verdict.measures.route_requirements import route_requirements
 from world.arrays import Floats
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 # Course of the flights, rad.
 COURSE = 0.5
@@ -99,7 +99,7 @@ def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: fl
     speeds = np.full(count - 1, aircraft.airspeed)
     route = Route(waypoints, speeds, np.zeros(count), np.zeros(count, dtype=bool), np.arange(count), "")
     battery = aircraft.battery_energy / 3600.0
-    scenario = from_spec(spec, "limits", external=True)
+    scenario = scenario_from_spec(spec, "limits", external=True)
     return FlightSetup(
         scenario=scenario,
         mission=Mission(None, (), source="limits"),

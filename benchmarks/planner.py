@@ -22,7 +22,7 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 EQUAL = 1e-12
 LEVELS = (Level((0, 1, 2, 3), (0.0,) * 4), Level((4, 5), (NO_GOAL,) * 2), Level((6, 7), (NO_GOAL,) * 2))
@@ -126,7 +126,7 @@ def scaled(threats: int) -> Scenario:
             for key in ("kill_radius_m", "kill_scale_m", "detection_radius_m", "detection_scale_m")
         }
         units.append(unit.model_copy(update={"name": f"unit {k}", "east_m": east, "north_m": north} | sizes))
-    return from_spec(spec.model_copy(update={"threats": units}), f"{threats} threats")
+    return scenario_from_spec(spec.model_copy(update={"threats": units}), f"{threats} threats")
 
 
 def scale() -> dict[str, Any]:

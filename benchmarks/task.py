@@ -17,7 +17,7 @@ from planner.seeding.first_samples import bridge_basis, bridge_modes
 from planner.seeding.grids import grid_routes
 from planner.seeding.waypoint_fitting import fit_waypoints
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 PROBLEMS = (7, 15, 30, 60)
 # Numbers of stages of the grids that seed a peer.
@@ -91,7 +91,9 @@ def all_known() -> list[str]:
 def with_planner(scenario: Scenario, **changes: object) -> Scenario:
     """Return the same scenario with other keys in ``[planner]``."""
     spec = scenario.spec
-    return from_spec(spec.model_copy(update={"planner": spec.planner.model_copy(update=changes)}), scenario.name)
+    return scenario_from_spec(
+        spec.model_copy(update={"planner": spec.planner.model_copy(update=changes)}), scenario.name
+    )
 
 
 def seed_vectors(task: Task) -> Floats:

@@ -17,7 +17,7 @@ import numpy as np
 import planfly
 from logs.verdict.returns.drawn_returns import drawn_returns
 from logs.verdict.returns.judge_glides import judge_glides
-from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts
 from logs.verdict.returns.returns_text import headline
 from logs.verdict.returns.suggest_returns import suggest_rally_points
@@ -72,7 +72,7 @@ def main() -> None:
     parser.add_argument("--whole", type=int, default=20, help="of these, flown in JSBSim")
     args = parser.parse_args()
     flown = planfly.fly(planfly.plan("jacksboro-air", seed=1), wind=(5, 250))
-    world, starts = return_world(flown.setup), flown_starts(flown.setup, flown.track, args.every)
+    world, starts = make_return_world(flown.setup), flown_starts(flown.setup, flown.track, args.every)
     returns, alone = timed(
         f"{len(starts)} returns, the least sure in JSBSim", lambda: judge_returns(world, starts, args.every, fly_return)
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from flight.simulation.track import Track
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 SEED = 2024
 TERRAINS = ("tile", "hills", "plain")
@@ -76,7 +76,7 @@ def plan_scenario(number: int, autopilot: str = "ardupilot") -> Scenario:
             "north_m": float(place[1]),
             "height_m": float(rng.uniform(90.0, 200.0)),
         }
-    return from_spec(spec, spec["name"])
+    return scenario_from_spec(spec, spec["name"])
 
 
 def _ceiling(kind: str) -> dict[str, float]:

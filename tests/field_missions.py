@@ -16,7 +16,7 @@ from flight.mission.items import Command, Frame, Mission, MissionItem, round_to_
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
 from world.arrays import Floats
 from world.frames import to_geo
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 GROUND, AIRSPEED = 200.0, 25.0
 LEGS, RUNS, MAX_TURN, MAX_SLOPE = (6, 9), (600.0, 1600.0), math.radians(60.0), math.radians(4.0)
@@ -144,7 +144,7 @@ def _made(name: str, way: Floats, tables: dict[str, Any], close_to: str, *, exce
         key: {"east_m": float(point[0]), "north_m": float(point[1]), "amsl_m": float(point[2])}
         for key, point in (("start", way[0]), ("destination", way[-1]))
     }
-    scenario = from_spec({"name": name} | ends | tables, name)
+    scenario = scenario_from_spec({"name": name} | ends | tables, name)
     lat, lon = to_geo(scenario.origin, way[:, 0], way[:, 1])
     items = [
         MissionItem(

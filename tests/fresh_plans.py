@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 SEED = 39
 AIRCRAFT = ("aerosonde", "x8", "zagi", "ultrastick25e")
@@ -55,7 +55,7 @@ def fresh_scenario(number: int) -> Scenario:
             "north_m": float(place[1]),
             "height_m": float(rng.uniform(90.0, 200.0)),
         }
-    return from_spec(spec, spec["name"])
+    return scenario_from_spec(spec, spec["name"])
 
 
 def _terrain(rng: np.random.Generator, base: float, half: float) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 from world.terrain import Terrain
 
 SEED = 3535
@@ -52,12 +52,12 @@ def draw_field(number: int, launch: str = "catapult", flight: dict[str, str] | N
         "start": {"east_m": 0, "north_m": 0, "amsl_m": 3000},
         "destination": {"east_m": 50, "north_m": 0, "amsl_m": 3000},
     }
-    ground = from_spec(
+    ground = scenario_from_spec(
         spec | {"area": spec["area"] | {"ceiling_amsl_m": 9000.0}} | _around(ends, middle), "ground"
     ).terrain
     assert ground is not None
     places = _places(rng, ground, middle, math.radians(from_deg))
-    return from_spec(spec | places | {"launch": {"method": launch}}, f"field-{number}")
+    return scenario_from_spec(spec | places | {"launch": {"method": launch}}, f"field-{number}")
 
 
 def _hill(rng: np.random.Generator) -> dict[str, float]:

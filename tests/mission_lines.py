@@ -16,7 +16,7 @@ from planner.plan import Certificate, Plan
 from tests.setups import route_along, setup_along, spec_around
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo
-from world.scenario import from_spec, load_scenario, with_wind
+from world.scenario import load_scenario, scenario_from_spec, with_wind
 from world.terrain import Terrain, make_flat_terrain
 
 ORIGIN = GeoOrigin(36.5, -84.2)
@@ -60,7 +60,10 @@ def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> Flight
         "area": {"east_m": [-6000, 6000], "north_m": [-6000, 6000], "ceiling_amsl_m": 3000.0},
     }
     spec = spec_around(ends, name="loiters", buffer=0.0, ceiling=3000.0, **made)
-    scenario, envelope = from_spec(spec | tables, "loiters", external=True), load_envelope(load_aircraft("aerosonde"))
+    scenario, envelope = (
+        scenario_from_spec(spec | tables, "loiters", external=True),
+        load_envelope(load_aircraft("aerosonde")),
+    )
     setup = setup_along(scenario, route_along(ends, 25.0), envelope, airspeed=25.0, battery=888.0)
     flown = make_route(read, ORIGIN, scenario.terrain, 25.0, False, setup.limits)
     return replace(setup, mission=read, route=flown)

@@ -23,7 +23,7 @@ from planfly.workflow.open_flight import make_setup
 from tests.mission_draft import Draft, draw_heights, draw_runs, draw_turns
 from tests.setups import spec_around, waypoint_mission
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 from world.wind import Wind
 
 SEED = 2014
@@ -166,7 +166,7 @@ def _scenario(draft: Draft, points: Floats, numbers: dict[str, float | None], na
             "turbulence": limits.wind.turbulence,
         },
     )
-    return from_spec(spec, name)
+    return scenario_from_spec(spec, name)
 
 
 def _peak(points: Floats, leg: int, over: float, rng: np.random.Generator) -> dict[str, float]:

@@ -21,7 +21,7 @@ from flight.simulation.setup import FlightSetup, make_limits
 from planner.plan import Plan
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 MakeSetup = Callable[..., FlightSetup]
 
@@ -116,7 +116,9 @@ def setup_maker(aircraft: Aircraft) -> MakeSetup:
             "terrain": {"kind": "flat", "amsl_m": 100.0},
             "wind": {"speed_mps": wind[0], "from_deg": wind[1], "turbulence": turbulence},
         }
-        scenario = from_spec(spec_around(points, buffer=2000.0, ceiling=9000.0, **made | tables), "made", external=True)
+        scenario = scenario_from_spec(
+            spec_around(points, buffer=2000.0, ceiling=9000.0, **made | tables), "made", external=True
+        )
         route = route_along(points, speeds, fly_over=fly_over)
         return setup_along(
             scenario,
@@ -184,7 +186,7 @@ def small_scenario(**changes: Any) -> Scenario:
         ],
         planner={"waypoints": 8, "population": 60, "generations": 25},
     )
-    return from_spec(spec | changes, "small")
+    return scenario_from_spec(spec | changes, "small")
 
 
 def with_path(plan: Plan, waypoints: ArrayLike) -> Plan:

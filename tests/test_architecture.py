@@ -60,7 +60,7 @@ LONGER = {
     "planner/seeding/airspace_grids.py:_relax_stage": 62,
     "planner/seeding/pattern_search.py:_continue_search": 67,
     "tests/instrumented_flights.py:px4_topics": 70,
-    "world/scenario.py:from_spec": 64,
+    "world/scenario.py:scenario_from_spec": 64,
 }
 KERNELS = set(DECORATORS)
 INNER = {"inner", "inlined"}

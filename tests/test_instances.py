@@ -14,7 +14,7 @@ from tests.instances import (
     random_scenario,
 )
 from tests.soak import some
-from world.scenario import from_spec, load_scenario
+from world.scenario import load_scenario, scenario_from_spec
 from world.scenario_file import parse_scenario
 
 
@@ -37,7 +37,7 @@ def test_the_hard_files_are_what_the_generator_makes(threats: int) -> None:
 
 def test_random_instances_are_scenarios_that_differ() -> None:
     texts = [random_scenario(seed) for seed in (1, 2, 1)]
-    one, two = (from_spec(parse_scenario(text, f"{k}"), f"{k}") for k, text in enumerate(texts[:2]))
+    one, two = (scenario_from_spec(parse_scenario(text, f"{k}"), f"{k}") for k, text in enumerate(texts[:2]))
     assert not np.array_equal(one.threats.position, two.threats.position)
     assert texts[2] == texts[0]
 

@@ -76,9 +76,9 @@ _PREFIX = "kernels-"
 
 
 def versioned_folder(base: Path, root: Path) -> Path:
-    """Return the folder in `base` for the kernels of the sources below a root.
+    """Return the subfolder of `base` for the kernels compiled from the sources below `root`.
 
-    Return `base` itself if it is already such a folder, or a temporary folder of this process.
+    If `base` is already such a subfolder, or this process's temporary folder, it is returned unchanged.
 
     >>> versioned_folder(Path("/tmp/kernels-mine"), Path(__file__).parents[1]).as_posix()
     '/tmp/kernels-mine'

@@ -45,7 +45,7 @@ class _CompileListener(event.Listener):
         announce_compilation()
 
     def on_end(self, event: Any) -> None:
-        """Count the time of a compilation."""
+        """Stop the timer at the end of a compilation."""
         COMPILE_TIMER.end()
 
 

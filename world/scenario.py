@@ -89,7 +89,7 @@ def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
 class Scenario:
     """Environment of one mission, in map axes (m) and radians.
 
-    spec: the checked file, from which `from_spec` makes the same scenario again.
+    spec: the checked file, from which `scenario_from_spec` makes the same scenario again.
     origin: geographic position of east = north = 0.
     bounds: (2, 2) [[east0, east1], [north0, north1]].
     floor, ceiling: m AMSL.
@@ -194,7 +194,7 @@ class Scenario:
         return html_table(f"Scenario {self.name}", rows)
 
     def to_json(self) -> dict[str, Any]:
-        """Return the scenario as plain JSON data, from which `from_spec` makes it again."""
+        """Return the scenario as plain JSON data, from which `scenario_from_spec` makes it again."""
         stated_spec = self.spec.model_copy(update={"flight": self.spec.flight.with_stated_defaults()})
         return stated_spec.model_dump(mode="json", exclude_none=True)
 
@@ -227,7 +227,9 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     names = embedded_names()
     if name_or_path in names:
         entry = resources.files("world") / "scenarios" / f"{name_or_path}.toml"
-        return from_spec(parse_scenario(entry.read_text(encoding="utf-8"), name_or_path), name_or_path, terrain=terrain)
+        return scenario_from_spec(
+            parse_scenario(entry.read_text(encoding="utf-8"), name_or_path), name_or_path, terrain=terrain
+        )
     path = Path(name_or_path)
     try:
         is_missing = not path.exists()
@@ -238,7 +240,7 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
         message = f"{name_or_path}: no such file, and not a built-in scenario ({', '.join(names)}){suggestion}"
         raise ScenarioError(message, file=name_or_path)
     spec = parse_scenario(read_scenario_text(path), str(path))
-    return from_spec(spec, str(path), base=path.parent, terrain=terrain)
+    return scenario_from_spec(spec, str(path), base=path.parent, terrain=terrain)
 
 
 def _sibling_toml_files(missing_file: Path) -> list[str]:
@@ -260,7 +262,7 @@ def embedded_names() -> list[str]:
     return sorted(names, key=lambda name: name != "jacksboro")
 
 
-def from_spec(
+def scenario_from_spec(
     spec: ScenarioFile | dict[str, Any],
     source: str,
     *,
@@ -278,7 +280,7 @@ def from_spec(
     external: see `Scenario`.
     Raises ScenarioError and TerrainError as `load_scenario` does.
 
-    >>> again = from_spec(load_scenario("tight").to_json(), "a plan")
+    >>> again = scenario_from_spec(load_scenario("tight").to_json(), "a plan")
     >>> again.name, again.bounds.tolist()
     ('tight', [[-300.0, 2900.0], [-150.0, 150.0]])
     """
@@ -485,7 +487,7 @@ def with_terrain(scenario: Scenario, terrain: str) -> Scenario:
     'jacksboro'
     """
     spec = with_absolute_ends(scenario.to_json(), scenario.start, scenario.destination)
-    return from_spec(spec, scenario.name, terrain=terrain, external=scenario.external)
+    return scenario_from_spec(spec, scenario.name, terrain=terrain, external=scenario.external)
 
 
 def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:

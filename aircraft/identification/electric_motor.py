@@ -92,8 +92,8 @@ class ElectricMotor:
         current = np.maximum(0.0, (volts * throttle - self.back_voltage * speed) / self.resistance)
         return thrust, self.power_ratio * throttle * current + self.avionics / volts
 
-    def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller's torque (n,), N m, whose reaction rolls the aircraft left."""
+    def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
+        """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
         speed = self.speed(airspeed, throttle, density, self.voltage)
         q2, q1, q0 = self._torques(airspeed, density)
         return np.asarray(q2 * speed * speed + q1 * speed + q0)

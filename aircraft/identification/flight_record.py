@@ -134,5 +134,8 @@ def apply_lag(values: Floats, time_constant: float) -> Floats:
 
 
 def derivative(values: Floats) -> Floats:
-    """Return the rate of change of (n,) or (n, k) per second, by central differences."""
+    """Return the time derivative, per second, of samples taken at `GRID_HZ`, by central differences.
+
+    values: (n,) or (n, k).
+    """
     return np.asarray(np.gradient(values, 1.0 / GRID_HZ, axis=0))

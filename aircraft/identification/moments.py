@@ -83,7 +83,7 @@ def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Gr
     ixx, iyy, izz, ixz = base.inertia
     p, q, r = signals.rates.T
     dp, dq, dr = signals.rate_changes.T
-    torque = motor.reaction(signals.airspeed, signals.throttle, signals.density) if base.reacts else 0.0
+    torque = motor.propeller_torque(signals.airspeed, signals.throttle, signals.density) if base.reacts else 0.0
     return {
         "pitch": iyy * dq + (ixx - izz) * p * r + ixz * (p * p - r * r),
         "roll": ixx * dp - ixz * (dr + p * q) + (izz - iyy) * q * r + torque,

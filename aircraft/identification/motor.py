@@ -32,5 +32,5 @@ class Motor(Protocol):
     ) -> tuple[Floats, Floats]:
         """Return thrust (n,), N, and current from the battery (n,), A."""
 
-    def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller's torque (n,), N m, whose reaction rolls the aircraft left."""
+    def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
+        """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""

@@ -73,8 +73,8 @@ class MotorTable:
         current = self.load * ratio * speed**3 * power / np.maximum(volts, _MIN_VOLTS)
         return np.asarray(self.pull * ratio * speed**2 * thrust), np.asarray(np.maximum(0.0, current))
 
-    def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
-        """Return the propeller's torque (n,), N m, whose reaction rolls the aircraft left."""
+    def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
+        """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
         torque = self._interpolate(self.torques, airspeed / self.speed, throttle)
         return np.asarray(self.load * density / self.density * self.speed**2 * torque)
 

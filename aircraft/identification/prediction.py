@@ -225,7 +225,11 @@ class Predictor:
         moments = self._accelerations(flow, state[:, 3:6], airspeed, rows) + self.trims[rows] + disturbances
         forces = self._specific_forces(flow, state[:, 3:6], airspeed, rows)
         ixx, iyy, izz, ixz = base.inertia
-        torque = self._motor.reaction(airspeed, signals.throttle[rows], signals.density[rows]) if base.reacts else 0.0
+        torque = (
+            self._motor.propeller_torque(airspeed, signals.throttle[rows], signals.density[rows])
+            if base.reacts
+            else 0.0
+        )
         # Euler's equations with a product of inertia, solved for the accelerations.
         roll_moment = ixx * moments[:, 0] - torque + ixz * p * q - (izz - iyy) * q * r
         yaw_moment = izz * moments[:, 2] - ixz * q * r - (iyy - ixx) * p * q

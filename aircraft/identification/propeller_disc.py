@@ -72,7 +72,7 @@ class PropellerDisc:
         power = self.power * (1.0 + self.losses) * 0.5 * thrust * (exit_speed + airspeed)
         return thrust, np.asarray(power / volts)
 
-    def reaction(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
+    def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
         """Return the torque (n,), N m, which is zero for a disc."""
         del throttle, density
         return np.zeros_like(airspeed)

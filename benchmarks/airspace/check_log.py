@@ -21,7 +21,7 @@ from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
 from tests.synthetic import fly_path, make_setup
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 # Seed of zones and hills.
 SEED = 12
@@ -74,7 +74,7 @@ def setup_of(hours: float, zones: list[dict[str, Any]], points: np.ndarray) -> F
     peaks = [{"east_m": float(e), "north_m": float(n), "height_m": 200.0, "sigma_m": 600.0} for e, n in spots]
     setup = make_setup(points, terrain={"kind": "peaks", "peak": peaks}, area_margin=3000.0)
     spec = setup.scenario.to_json() | ({"zones": zones} if zones else {})
-    return replace(setup, scenario=from_spec(spec, "bench", ground=setup.scenario.terrain))
+    return replace(setup, scenario=scenario_from_spec(spec, "bench", ground=setup.scenario.terrain))
 
 
 def run(count: int = ZONES, corners: int = CORNERS, hours: float = 1.0) -> dict[str, float]:

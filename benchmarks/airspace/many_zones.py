@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.airspace.scenarios import HALF, SEED, star
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.make_plan import make_plan
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 
 def crowded_scenario(zones: int, corners: int) -> Scenario:
@@ -38,7 +38,7 @@ def crowded_scenario(zones: int, corners: int) -> Scenario:
     }
     for name, place in zip(("start", "destination"), ends, strict=True):
         spec[name] = {"east_m": float(place[0]), "north_m": float(place[1]), "height_m": 150.0}
-    return from_spec(spec, spec["name"])
+    return scenario_from_spec(spec, spec["name"])
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from planfly.workflow.airframe import load_airframe
 from world.arrays import Flags, Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # Seed of all scenarios.
 SEED = 2026
@@ -80,7 +80,7 @@ def draw_scenario(number: int, draw: int) -> Scenario | None:
             "north_m": float(place[1]),
             "height_m": float(rng.uniform(135.0, 165.0)),
         }
-    return from_spec(spec, spec["name"])
+    return scenario_from_spec(spec, spec["name"])
 
 
 def _zones(rng: np.random.Generator, ends: Floats) -> list[dict[str, Any]]:

@@ -27,7 +27,7 @@ from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from tests.instances import SEED, Instance, draw_threats, random_scenario, scenario_text
 from world.arrays import Floats
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 from world.scenario_file import parse_scenario
 
 # Default file of the stored references.
@@ -48,7 +48,7 @@ def random_task(seed: int, threats: int = THREATS, family: str = "passable", aut
     else:
         text = random_scenario(seed, threats) if family == "passable" else _drawn(seed, threats)
         flown = text.replace("[flight]\n", f'[flight]\nautopilot = "{autopilot}"\n')
-        scenario = from_spec(parse_scenario(flown, "random"), "random")
+        scenario = scenario_from_spec(parse_scenario(flown, "random"), "random")
     airframe = load_airframe(scenario)
     problem = make_problem(scenario, airframe.limits)
     return Task(scenario, airframe, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))

@@ -30,7 +30,7 @@ from planfly.workflow.pipeline import fly_and_judge
 from planner.evaluation.travel_cost import make_energy_cost, make_time_cost, path_cost
 from tests.autopilot_plans import plan_scenario
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # Number of the first mission; no other benchmark or test uses numbers this high.
 FIRST = 3900
@@ -71,7 +71,7 @@ def mission(number: int, aircraft: str, gradient: float, objective: str) -> Scen
     }
     spec["flight"]["aircraft"] = aircraft
     spec["planner"]["objective"] = objective
-    return from_spec(spec, spec["name"])
+    return scenario_from_spec(spec, spec["name"])
 
 
 def fly(scenario: Scenario, seed: int, *, planned: bool) -> Flown:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # Seed of all instances.
 SEED = 3901
@@ -49,7 +49,7 @@ def wild_scenario(number: int, autopilot: str) -> Scenario:
     }
     for name, end, height in zip(("start", "destination"), ends, heights, strict=True):
         spec[name] = {"east_m": float(end[0]), "north_m": float(end[1]), "amsl_m": float(height)}
-    return from_spec(spec, spec["name"])
+    return scenario_from_spec(spec, spec["name"])
 
 
 def _ground(peaks: Floats, places: Floats) -> Floats:

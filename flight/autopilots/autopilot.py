@@ -54,17 +54,17 @@ class ParameterValue(NamedTuple):
 _SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraft", "default": "the defaults"}
 
 
-def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
+def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
     """Return a text for each pair of values in the wrong order of which at least one is from the user's file.
 
     orders: groups of parameter names; within a group the values must not decrease from one name to the next.
 
     >>> made = [ParameterValue("THR_MIN", 74.0, "aircraft"), ParameterValue("TRIM_THROTTLE", 60.0, "file")]
-    >>> find_misfits(made, [("THR_MIN", "TRIM_THROTTLE")])
+    >>> find_contradictions(made, [("THR_MIN", "TRIM_THROTTLE")])
     ('TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft',)
     """
     value_by_name = {value.name: value for value in values}
-    misfits = []
+    contradictions = []
     for order in orders:
         for lower, higher in pairwise(value_by_name[name] for name in order if name in value_by_name):
             if lower.value <= higher.value or "file" not in (lower.origin, higher.origin):
@@ -76,8 +76,8 @@ def find_misfits(values: Iterable[ParameterValue], orders: Iterable[tuple[str, .
                 f"{parameter.name} {parameter.value:g} of {_SOURCE_NAMES[parameter.origin]}"
                 for parameter in (file_value, other_value)
             )
-            misfits.append(f" is {relation} ".join(texts))
-    return tuple(misfits)
+            contradictions.append(f" is {relation} ".join(texts))
+    return tuple(contradictions)
 
 
 class Parameters(Protocol):
@@ -86,12 +86,12 @@ class Parameters(Protocol):
     values: every parameter that the control law uses.
     unused: names in the file that the control law does not use.
     source: the user's file, "" if there is no file.
-    not_flown: parameters that are read but have no effect on the simulated flight.
-    beyond: values of the file outside their documented ranges, with those ranges; they are used nevertheless.
-    misfits: texts on values of the file that contradict another parameter; they are used nevertheless.
+    not_simulated: parameters that are read but have no effect on the simulated flight.
+    outside_documented_ranges: texts on values of the file outside their documented ranges, which are used nevertheless.
+    contradictions: texts on values of the file that contradict another parameter; they are used nevertheless.
     """
 
-    not_flown: ClassVar[tuple[str, ...]]
+    not_simulated: ClassVar[tuple[str, ...]]
 
     @property
     def values(self) -> tuple[ParameterValue, ...]:
@@ -106,11 +106,11 @@ class Parameters(Protocol):
         """The user's file; "" if there is none."""
 
     @property
-    def beyond(self) -> tuple[str, ...]:
+    def outside_documented_ranges(self) -> tuple[str, ...]:
         """Texts on values of the user's file that are outside their documented ranges."""
 
     @property
-    def misfits(self) -> tuple[str, ...]:
+    def contradictions(self) -> tuple[str, ...]:
         """Texts on values of the user's file that contradict another parameter."""
 
     def changed(self, **values: float) -> Self:

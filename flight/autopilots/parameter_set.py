@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 from aircraft.catalog import Aircraft
-from flight.autopilots.autopilot import Origin, ParameterValue, StoredParameters, find_misfits
+from flight.autopilots.autopilot import Origin, ParameterValue, StoredParameters, find_contradictions
 from flight.autopilots.parameter_files import Entry, parse_parameters, read_parameter_file
 from flight.autopilots.parameter_origin import read_parameters_for, refuse_unknown
 from world.errors import ParameterError
@@ -80,7 +80,7 @@ class ParameterTable:
         }
 
     def read(self, entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
-        """Return the values of a file by present name and in present units, and the names that no control law reads.
+        """Return the values of a file by present name and in present units, and the names that the table lacks.
 
         Raises ParameterError if a value is not accepted, or if one parameter has two values.
         """
@@ -134,17 +134,17 @@ class ParameterTable:
 
 @dataclass(frozen=True, slots=True)
 class ParameterSet:
-    """The parameters that an autopilot flies with; each autopilot has a subclass with its own `table`.
+    """The parameters of an autopilot; each autopilot has a subclass with its own `table`.
 
-    values: every parameter that the law reads, in the order of the table's definitions, and after these the stated
-        parameters of the table's ``when_stated``.
-    unused: names in the file that the law does not read.
+    values: every parameter that the control law uses, in the order of the table's definitions, and after these the
+        stated parameters of the table's ``when_stated``.
+    unused: names in the file that the control law does not use.
     source: the user's file, "" if there is no file.
     """
 
     table: ClassVar[ParameterTable]
-    # Names of parameters that are read, but whose effect no flight shows.
-    not_flown: ClassVar[tuple[str, ...]]
+    # Names of parameters that are read, but have no effect on the simulated flight.
+    not_simulated: ClassVar[tuple[str, ...]]
     values: tuple[ParameterValue, ...]
     unused: tuple[str, ...] = ()
     source: str = ""
@@ -180,7 +180,10 @@ class ParameterSet:
 
     @classmethod
     def of_text(cls, text: str, source: str, *fields: Any) -> Self:
-        """Return the parameters in a file's text, completed with defaults.  Raises ParameterError."""
+        """Return the parameters in a file's text, completed with defaults.
+
+        Raises ParameterError if the text is invalid or contains a value that is not allowed.
+        """
         values, unused = cls.table.read(parse_parameters(text, source))
         return cls._build([("file", values)], source, unused, *fields)
 
@@ -220,7 +223,7 @@ class ParameterSet:
 
     @classmethod
     def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values in the aircraft's file that the control law reads."""
+        """Return the values in the aircraft's file that the control law uses, by name."""
         return cls.table.read(entries)[0]
 
     @classmethod
@@ -230,7 +233,10 @@ class ParameterSet:
 
     @classmethod
     def _without_unknown(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Remove parameters that the release lacks; return the remaining sources, and the removed names of the file."""
+        """Return the sources without the parameters that the release lacks, and the names removed from the file.
+
+        An autopilot without such parameters, as here, returns all sources and no names.
+        """
         return sources, ()
 
     @classmethod
@@ -242,7 +248,8 @@ class ParameterSet:
         known_sources, unknown_names = cls._without_unknown(sources, *fields)
         unused = (*unused, *unknown_names)
 
-        def find(definition: Definition) -> ParameterValue:
+        def find_value(definition: Definition) -> ParameterValue:
+            """Return the value from the first source that states it on purpose, or the default."""
             for origin, values in known_sources:
                 value = values.get(definition.name)
                 if value is not None and cls._is_set_on_purpose(definition, value):
@@ -250,9 +257,9 @@ class ParameterSet:
             return ParameterValue(definition.name, definition.default, "default")
 
         stated_extras = [
-            parameter for parameter in map(find, cls.table.when_stated.values()) if parameter.origin != "default"
+            parameter for parameter in map(find_value, cls.table.when_stated.values()) if parameter.origin != "default"
         ]
-        parameter_set = cls((*map(find, cls.table.definitions), *stated_extras), unused, source, *fields)
+        parameter_set = cls((*map(find_value, cls.table.definitions), *stated_extras), unused, source, *fields)
         value_by_name = {name: value for name, value, _ in parameter_set.values}
         for minimum, maximum in cls.table.pairs:
             if value_by_name[minimum] >= value_by_name[maximum]:
@@ -283,7 +290,7 @@ class ParameterSet:
         return {name: value for name, value, value_origin in self.values if value_origin == origin}
 
     @property
-    def beyond(self) -> tuple[str, ...]:
+    def outside_documented_ranges(self) -> tuple[str, ...]:
         """Texts on values of the file outside their documented ranges; the autopilot flies with these values."""
         texts = []
         for name, value in self.by_origin("file").items():
@@ -293,9 +300,9 @@ class ParameterSet:
         return tuple(texts)
 
     @property
-    def misfits(self) -> tuple[str, ...]:
+    def contradictions(self) -> tuple[str, ...]:
         """Texts on values of the file that contradict another parameter; the autopilot flies with these values."""
-        return find_misfits(self.values, self.table.orders)
+        return find_contradictions(self.values, self.table.orders)
 
 
 def _value_error(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:

@@ -350,7 +350,8 @@ PX4_DEFAULT_LIMITS = FeasibilityLimits()
 MissionDialect = Literal["planfly", "ardupilot", "px4"]
 
 
-def _all_settings_flown(mission: MissionParts) -> list[str]:
+def _no_unsimulated_settings(mission: MissionParts) -> list[str]:
+    """Return no sentence: all settings are simulated."""
     return []
 
 
@@ -368,8 +369,8 @@ class MissionChecks:
     unites_inclusions: True if a position inside any inclusion of the mission's fence is inside the fence; False if a
         position must be inside all of them.
     battery_failsafes: failsafes that leave the mission at a state of the battery.
-    settings_not_flown: returns a sentence, without a full stop, for each setting that changes the flight path of a
-        mission but is not simulated.
+    describe_unsimulated_settings: function that returns a sentence, without a full stop, for each setting that changes
+        the flight path of a mission but is not simulated.
     parameter_notes: notes on the parameter file, for the verdict.
     """
 
@@ -379,7 +380,7 @@ class MissionChecks:
     follows_terrain: bool = True
     unites_inclusions: bool = False
     battery_failsafes: tuple[BatteryFailsafe, ...] = ()
-    settings_not_flown: Callable[[MissionParts], list[str]] = _all_settings_flown
+    describe_unsimulated_settings: Callable[[MissionParts], list[str]] = _no_unsimulated_settings
     parameter_notes: tuple[str, ...] = ()
 
 

@@ -57,15 +57,19 @@ class ProgramAutopilot(Autopilot):
 
     @property
     def checks(self) -> MissionChecks:
-        """Checks of the simulated autopilot, with the settings that a program does not fly.
+        """Checks of the simulated autopilot, with the settings that have no effect in the program's flight.
 
         Heights above terrain are sent to a program as altitudes above sea level.
         """
-        return replace(super().checks, follows_terrain=False, settings_not_flown=self.settings_not_flown_by_program)
+        return replace(
+            super().checks,
+            follows_terrain=False,
+            describe_unsimulated_settings=self.describe_settings_ignored_by_program,
+        )
 
     @abstractmethod
-    def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
-        """Describe the settings that change the flight path but are not flown by the program."""
+    def describe_settings_ignored_by_program(self, mission: MissionParts) -> list[str]:
+        """Describe the settings that would change the flight path, but have no effect in the program's flight."""
 
     def describe(self, aircraft: str) -> str:
         """Describe the program and the parameters that the user changed; before the flight, the simulated autopilot."""

@@ -102,7 +102,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
         trim = steady_flight(fdm, float(airspeed), TRIM_AMSL)
         if trim is None:
             continue
-        fdm.balance(trim.vector())
+        fdm.apply_trim(trim.vector())
         power = float(fdm.read().power)
         rows.append(TrimRow(trim, power, 0.8 * aircraft.battery_energy / power if power > 0.0 else math.nan))
     return tuple(rows)
@@ -204,6 +204,6 @@ def _step_response(
 
 
 def _unwrap_states(states: NDArray[np.record], name: str) -> Floats:
-    """Return one quantity of the states, (t,); yaw is returned without jumps by 2 pi."""
+    """Return one quantity of the states, (t,); jumps of the yaw by 2 pi are removed."""
     values: Floats = states[name]
     return np.unwrap(values) if name == "yaw" else values

@@ -65,7 +65,7 @@ FRAME = record_dtype(
     "earth_angle",  # rad, from inertial axes to axes fixed to the earth (ECEF)
     "earth_sin",
     "earth_cos",
-    ("place", *_VECTOR),  # ft, ECEF
+    ("earth_position", *_VECTOR),  # ft, ECEF
     "radius",  # ft
     "geocentric_latitude",  # rad
     "latitude",  # rad, geodetic
@@ -132,7 +132,7 @@ WRITES_START = 6
 CODE_END = 7
 # Length of this header.
 CODE_HEADER = 8
-# Numbers in the code for an external force or moment: register of its magnitude, and first register of its axes.
+# Count of numbers in the code for an external force or moment: register of its magnitude, first register of its axes.
 FORCE_NUMBERS = 2
 # Offsets of the directions of an external force and of an external moment among its registers.
 FORCE_DIRECTION = 0
@@ -234,7 +234,7 @@ def _update_position(frame: Record) -> None:
     cos, sin = math.cos(frame.earth_angle), math.sin(frame.earth_angle)
     frame.earth_cos, frame.earth_sin = cos, sin
     earth_position = transform(rotation(cos, sin), vector_of(frame.position))
-    set_vector(frame.place, earth_position)
+    set_vector(frame.earth_position, earth_position)
     x, y, z = earth_position
     radius = math.sqrt(x * x + y * y + z * z)
     axis_distance = math.sqrt(x * x + y * y)
@@ -294,10 +294,10 @@ def _update_gravity(frame: Record) -> None:
     equatorial_factor = 1.0 - 5.0 * (sin_lat * sin_lat)
     polar_factor = 3.0 - 5.0 * (sin_lat * sin_lat)
     central_gravity = GRAVITY_PARAMETER / (radius * radius)
-    place, gravity = frame.place, frame.gravity
-    gravity[0] = -central_gravity * ((1.0 + (j2_term * equatorial_factor)) * place[0] / radius)
-    gravity[1] = -central_gravity * ((1.0 + (j2_term * equatorial_factor)) * place[1] / radius)
-    gravity[2] = -central_gravity * ((1.0 + (j2_term * polar_factor)) * place[2] / radius)
+    earth_position, gravity = frame.earth_position, frame.gravity
+    gravity[0] = -central_gravity * ((1.0 + (j2_term * equatorial_factor)) * earth_position[0] / radius)
+    gravity[1] = -central_gravity * ((1.0 + (j2_term * equatorial_factor)) * earth_position[1] / radius)
+    gravity[2] = -central_gravity * ((1.0 + (j2_term * polar_factor)) * earth_position[2] / radius)
 
 
 @inner

@@ -27,7 +27,7 @@ from world.kernels import Record, Records
 
 # Steps for which both engines are compared.
 PROOF_STEPS = 240
-# Steps between two comparisons, after which the commands move.
+# Steps between two comparisons; the commands change after each comparison.
 _PROOF_STRIDE = 10
 # Movement of the surfaces to either side of their trimmed position, rad: their rate limits act.
 _PROOF_SURFACE_RAD = 0.15
@@ -37,9 +37,9 @@ _PROOF_THROTTLE = 0.2
 _PROOF_GUST_FPS = 3.0
 # Number of the first comparison with contacts on the ground.
 _PROOF_GROUND_ROUND = 16
-# Depth to which the lowest contact is then pressed into the ground, ft.
+# Depth to which the lowest contact is pressed into the ground in these comparisons, ft.
 _PROOF_DEPTH_FT = 0.05
-# Height above the reach of the contacts in which they are still computed, ft.
+# Contacts are computed up to this height above their reach, ft.
 _REACH_MARGIN_FT = 1.0
 # Properties of a contact by its fields.
 _CONTACT_FIELDS = {"compression": "compression-ft", "compression_speed": "compression-velocity-fps"}
@@ -77,12 +77,12 @@ class CompiledModel:
     numbers: registers.
     frames: (1,) of `flight.dynamics.compiled_frame.FRAME`, the first registers.
     code: sections as `flight.dynamics.compiled_frame` describes them.
-    contacts, frictions: of `flight.dynamics.ground_contact`.
-    properties: register of each property of JSBSim that has one.
+    contacts, frictions: records of `flight.dynamics.ground_contact`.
+    properties: register of each JSBSim property that has a register, by name.
     """
 
     def __init__(self, fdm: Fdm, reads: Sequence[str], steps: int, *, gusts: bool, terrain: bool) -> None:
-        """Take over the state of an aircraft at the start of its flight, before the first step.
+        """Copy the state of an aircraft at the start of its flight, before the first step.
 
         reads: fields of `flight.dynamics.state.STATE` that are read each tick.
         steps: steps in a tick.
@@ -198,8 +198,8 @@ class CompiledModel:
         for contact, data in zip(self.contacts, self._program.contacts, strict=True):
             if read(f"{data.base}/WOW"):
                 raise UnsupportedModel("a start on the ground")
-            contact.place = [read(f"{data.base}/{axis}-position") for axis in "xyz"]
-            contact.arm = _arm_about_center(contact.place, centre)
+            contact.position = [read(f"{data.base}/{axis}-position") for axis in "xyz"]
+            contact.arm = _arm_about_center(contact.position, centre)
             for field in data._fields[1:]:
                 contact[field] = getattr(data, field)
         arms = np.linalg.norm(self.contacts["arm"], axis=1)

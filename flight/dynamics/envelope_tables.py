@@ -133,11 +133,11 @@ def _check_commands(fdm: Fdm) -> None:
         accelerations = []
         for command in (0.5 * limit, limit):
             values[index] = command
-            accelerations.append(fdm.balance(values))
+            accelerations.append(fdm.apply_trim(values))
         if float(np.abs(accelerations[1] - accelerations[0]).max()) < _MIN_RESPONSE:
             property_name = fdm.aircraft.model.commands[index - QUANTITIES.index("elevator")].name
             raise FlightError(
-                f"{fdm.aircraft.model_file}: {property_name}, the {name}'s command, moves nothing: no force and no"
+                f"{fdm.aircraft.model_file}: {property_name}, the {name}'s command, has no effect: no force and no"
                 " moment changes with it, so there is no level flight",
                 file=fdm.aircraft.model_file,
                 field=f"model.command.{name}",
@@ -165,7 +165,7 @@ def _level_speed_range(fdm: Fdm, amsl: float, level_trims: Sequence[Trim]) -> tu
 
 def _power(fdm: Fdm, trim: Trim) -> float:
     """Return the battery power, or the heat of the fuel, in a trim, W."""
-    fdm.balance(trim.vector())
+    fdm.apply_trim(trim.vector())
     return float(fdm.read().power)
 
 

@@ -325,7 +325,7 @@ class Fdm:
         amsl, terrain_amsl: m.
         course, climb_angle: course and slope of the path over the ground, rad.
         airspeed: m/s, true.
-        wind_ned: (3,) m/s, direction of air motion; it stays as the steady wind.
+        wind_ned: velocity of the air, north, east, down, m/s, (3,); it stays as the steady wind.
 
         Surfaces and motor start at their trimmed values, so that holding the trim's commands causes no transient. Raise
         FlightError for values out of range, for a wind stronger than the airspeed along the path, and for a flight that
@@ -351,7 +351,7 @@ class Fdm:
                 field="airspeed",
                 value=airspeed,
             )
-        self.balance(trim.vector())
+        self.apply_trim(trim.vector())
         self._release_motion()
         return trim
 
@@ -370,7 +370,7 @@ class Fdm:
         attitude: roll, pitch, yaw, rad.
         velocity: north, east, down over the ground, m/s.
         rates: p, q, r, rad/s.
-        wind: north, east, down, direction of air motion, m/s; it stays as the steady wind.
+        wind: velocity of the air, north, east, down, m/s; it stays as the steady wind.
         amsl: m.
         """
         self._wind = np.array(wind, dtype=np.float64)
@@ -393,7 +393,7 @@ class Fdm:
         position: lat_deg, lon_deg (geodetic) and amsl (m).
         attitude: roll, pitch, yaw (true), rad.
         velocity: north, east, down over the ground, m/s.
-        wind: (3,) m/s, direction of air motion; it stays as the steady wind.
+        wind: velocity of the air, north, east, down, m/s, (3,); it stays as the steady wind.
         terrain_amsl: m.
         commands: (4,) commands at which surfaces and motor start.
 
@@ -439,12 +439,12 @@ class Fdm:
             setter(value)
 
     def set_wind(self, north: float, east: float, down: float) -> None:
-        """Set the steady wind, m/s, direction of air motion."""
+        """Set the velocity of the air in the steady wind, m/s."""
         for setter, value in zip(self._wind_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 
     def set_gust(self, north: float, east: float, down: float) -> None:
-        """Set the gust that is added to the steady wind, m/s, direction of air motion."""
+        """Set the velocity of the air in the gust, which is added to the steady wind, m/s."""
         for setter, value in zip(self._gust_setters, (north, east, down), strict=True):
             setter(value / FOOT)
 
@@ -495,7 +495,7 @@ class Fdm:
         return first_guess(self.aircraft.airspeed)
 
     def move_to(self, amsl: float) -> None:
-        """Move the point of evaluation of `balance` and `derivatives` to an altitude, m; this ends any flight."""
+        """Move the point of evaluation of `apply_trim` and `derivatives` to an altitude, m; this ends any flight."""
         lat_deg, lon_deg, terrain = self._start_position
         for setter, value in zip(self._ic_position, (lat_deg, lon_deg, terrain / FOOT, amsl / FOOT), strict=True):
             setter(value)
@@ -504,8 +504,11 @@ class Fdm:
         if self._engine:
             self._engine.hold()
 
-    def balance(self, values: Floats) -> Floats:
-        """Return the body accelerations (6,), m/s^2 and rad/s^2, of a flight with this trim vector (8,)."""
+    def apply_trim(self, values: Floats) -> Floats:
+        """Set the state that a trim vector (8,) describes; return its body accelerations (6,), m/s^2 and rad/s^2.
+
+        The state is the one in which a flight starts, or from which `derivatives` takes the engine speed.
+        """
         airspeed, climb, alpha, bank, *commands = values.tolist()
         axes = body_axes(self._heading, climb, bank, alpha)
         # Sums written out give the same result on every machine: see `world.least_squares`.
@@ -515,7 +518,7 @@ class Fdm:
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
         """Return the rates (8,) of the states (u, v, w, p, q, r, roll, pitch) with these commands (4,).
 
-        Surfaces and motor are at their commanded values. An engine keeps the speed of the last `balance`.
+        Surfaces and motor are at their commanded values. An engine keeps the speed of the last `apply_trim`.
         """
         roll, pitch = states[6], states[7]
         axes = body_axes(self._heading, pitch, roll, 0.0)

@@ -32,7 +32,7 @@ MAX_CONTACTS = 16
 # A contact, its memory and its friction.
 CONTACT = record_dtype(
     ("arm", np.float64, (3,)),  # ft, along the body's axes from the center of gravity
-    ("place", np.float64, (3,)),  # in, position in JSBSim's structural frame
+    ("position", np.float64, (3,)),  # in, position in JSBSim's structural frame
     "spring",  # lbf/ft
     "damping",  # lbf s/ft
     "static_friction",
@@ -90,7 +90,9 @@ def contact_forces(frame: Record, contacts: Records, frictions: Records) -> tupl
     for k in range(contacts.size):
         contact = contacts[k]
         local_arm = transform_back(matrix_of(frame.local_to_body), vector_of(contact.arm))
-        contact_position = add(transform_back(matrix_of(frame.earth_to_local), local_arm), vector_of(frame.place))
+        contact_position = add(
+            transform_back(matrix_of(frame.earth_to_local), local_arm), vector_of(frame.earth_position)
+        )
         latitude, altitude, _, _ = geodetic(contact_position)
         height = altitude - frame.terrain
         if height >= 0.0:
@@ -124,7 +126,7 @@ def _contact_force(
 ) -> tuple[Vector, Vector, int]:
     """Return the force (lbf) and moment (lbf ft) of a contact below the ground, and the new number of friction records.
 
-    Force and moment are in body axes and exclude friction.  Also update the compression in the contact's memory.
+    Force and moment are in body axes and exclude friction.  Also store the compression and its rate in `contact`.
 
     height_above_ground: height of the uncompressed contact, ft, negative.
     normal: normal of the ground, in axes fixed to the earth.
@@ -178,7 +180,7 @@ def _moment_arm(frame: Record, contact: Record, displacement: Vector) -> Vector:
 
     displacement: displacement of the contact by its compression, ft, in body axes.
     """
-    position, centre, inches_per_foot = contact.place, frame.centre, 1.0 / _INCH
+    position, centre, inches_per_foot = contact.position, frame.centre, 1.0 / _INCH
     x, y = position[0] + -inches_per_foot * displacement[0], position[1] + inches_per_foot * displacement[1]
     z = position[2] + -inches_per_foot * displacement[2]
     return _INCH * (centre[0] - x), _INCH * (y - centre[1]), _INCH * (centre[2] - z)

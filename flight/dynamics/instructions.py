@@ -1,7 +1,7 @@
 """Interpret the instructions of a compiled model: arithmetic, tables and actuators on numbered registers.
 
 An instruction is four or more unsigned numbers in a row: operation, target register, number of operands, and the
-operands, which are registers. Every operation rounds as JSBSim's function of this name does.
+operands, which are registers. Every operation rounds like JSBSim's function of the same name.
 """
 
 import math
@@ -39,7 +39,8 @@ class Operation(IntEnum):
     CLIP = 13
 
 
-# Offsets from an actuator's first register: last input of its lag.
+# Offsets of an actuator's values from its first register.
+# Last input of its lag.
 LAG_INPUT = 0
 # Last output of its lag.
 LAG_OUTPUT = 1

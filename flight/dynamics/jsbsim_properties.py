@@ -16,7 +16,7 @@ SLUG_FT3 = 515.3788183931961
 # Kilograms in one pound.
 POUND = 0.45359237
 
-# Property of each field of the state that is the same for all models, and its factor to SI.
+# Properties that are the same for all models, with their factors to SI, by the fields of the state.
 STATE_PROPERTIES = {
     "time": ("simulation/sim-time-sec", 1.0),
     "latitude": ("position/lat-geod-rad", 1.0),
@@ -103,6 +103,7 @@ class PropertyAccess:
         self._manager, self._model_file = manager, model_file
 
     def _node(self, name: str) -> Any:
+        """Return JSBSim's node of a property.  Raises FlightError if the property is undefined."""
         # Reading a missing node would create it, so check for it first.
         node = self._manager.get_node(name) if self._manager.hasNode(name) else None
         if node is None:

@@ -89,11 +89,13 @@ class _Reader:
         raise FlightError(f"{location}: {reason}; the model is refused", file=self.file)
 
     def _check_doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
+        """Refuse a document type with internal declarations, unless the model is JSBSim's own."""
         # A declaration that only names a document type is never read; JSBSim's own files hold a few harmless entities.
         if internal and not self._remove_channels:
             self._refuse_model("a document type declaration may expand without end")
 
     def _start_element(self, name: str, attributes: dict[str, str]) -> None:
+        """Note the files and the properties that an element names; refuse a forbidden element."""
         depth = len(self._path)
         self._path.append(name)
         self._text = []
@@ -119,6 +121,7 @@ class _Reader:
         self._declares = name == "property" and depth == (2 if self._main else 1)
 
     def _end_element(self, name: str) -> None:
+        """Note the property that the element's text names, or the end of a channel that is being removed."""
         self._path.pop()
         match = _PROPERTY_NAME.fullmatch("".join(self._text).strip())
         self._text = []
@@ -137,6 +140,7 @@ class _Reader:
             self.used_names.setdefault(match[1], self._parser.CurrentLineNumber)
 
     def _collect_text(self, text: str) -> None:
+        """Keep a piece of an element's text until the element ends."""
         self._text.append(text)
 
 
@@ -227,7 +231,7 @@ loading.silence = lambda: contextlib.nullcontext(str)
 try:
     fdm = loading.Fdm(read_aircraft(Path(sys.argv[1])), is_tested=True)
     fdm.move_to(500.0)
-    fdm.balance(fdm.first_guess())
+    fdm.apply_trim(fdm.first_guess())
     fdm.step(10)
     del fdm
 except FlightError:
@@ -252,7 +256,10 @@ def try_model(aircraft: Aircraft) -> None:
 
 @cache
 def _run_trial(folder: str, _version: str) -> tuple[int | None, str]:
-    """Return the exit code of the process, or None on timeout, and the reason that JSBSim prints."""
+    """Load and step a model in another process; return the exit code, or None on timeout, and JSBSim's printed reason.
+
+    _version: hash of the model, which only belongs to the cache key.
+    """
     # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])

@@ -95,9 +95,9 @@ class ExternalForce(NamedTuple):
 
 
 class ContactData(NamedTuple):
-    """Properties of a contact.
+    """Properties of a ground contact.
 
-    base: path of its properties.
+    base: path of the contact's JSBSim properties.
     spring: lbf/ft.
     damping: lbf s/ft.
     """
@@ -165,7 +165,7 @@ def translate(model: bytes) -> ModelProgram:
     contacts = [_parse_contact(element, index) for index, element in enumerate(sections.get("ground_reactions", ()))]
     if len(contacts) > MAX_CONTACTS:
         raise UnsupportedModel(f"{len(contacts)} contacts")
-    return _Translator([sections[name] for name in _SECTIONS], contacts).program()
+    return _Translator([sections[name] for name in _SECTIONS], contacts).make_program()
 
 
 # Sections with instructions.
@@ -188,7 +188,7 @@ class _Translator:
     _constants: dict[str, int] = field(default_factory=dict)
     _code: list[int] = field(default_factory=list)
 
-    def program(self) -> ModelProgram:
+    def make_program(self) -> ModelProgram:
         """Translate all sections, and return the program."""
         self.properties = {
             name: frame_register(*field_and_element) for name, field_and_element in FRAME_PROPERTIES.items()
@@ -247,7 +247,10 @@ class _Translator:
     # Functions.
 
     def _translate_value(self, element: Element, target: int | None = None) -> int:
-        """Translate an operand or operation, and return the register of its value, which is ``target`` unless None."""
+        """Translate an operand or operation, and return the register that holds the value.
+
+        target: register to use; None for the register of the operand itself, or for a new register.
+        """
         tag = element.tag
         if tag in ("p", "property", "v", "value"):
             _check_element(element)
@@ -449,6 +452,7 @@ def _check_element(element: Element, *, attributes: Iterable[str] = (), children
 
 
 def _element_text(element: Element) -> str:
+    """Return the text of an element without surrounding blanks; "" if there is none."""
     return (element.text or "").strip()
 
 

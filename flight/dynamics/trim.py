@@ -41,7 +41,7 @@ class Engine:
 
     fdm: the JSBSim instance.
     dt: time step of the flight, s.
-    getter, setter: access to its properties.
+    getter, setter: functions that return the getter and the setter of a JSBSim property, by name.
     """
 
     def __init__(self, fdm: Any, dt: float, getter: Callable[[str], Any], setter: Callable[[str], Any]) -> None:
@@ -181,8 +181,8 @@ class Simulator(Protocol):
     def move_to(self, amsl: float) -> None:
         """Move the point of evaluation to an altitude, m."""
 
-    def balance(self, values: Floats) -> Floats:
-        """Return the body accelerations (6,), m/s^2 and rad/s^2, of a trim vector (8,)."""
+    def apply_trim(self, values: Floats) -> Floats:
+        """Set the state that a trim vector (8,) describes; return its body accelerations (6,), m/s^2 and rad/s^2."""
 
     def surface_limits(self) -> tuple[float, float, float]:
         """Return the elevator, aileron and rudder limits, rad, in either direction."""
@@ -195,15 +195,15 @@ class Simulator(Protocol):
 
 
 def solve_trim(
-    balance: Callable[[Floats], Floats],
+    apply_trim: Callable[[Floats], Floats],
     fixed_values: Mapping[TrimQuantity, float],
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
     """Find a trim vector with two quantities fixed, (8,); return None if the iteration does not converge.
 
-    balance: function from a trim vector to its accelerations, (6,).
-    fixed_values: values of the fixed quantities.
+    apply_trim: function from a trim vector (8,) to the body accelerations (6,) in that state.
+    fixed_values: values of the two fixed quantities.
     limits: elevator, aileron and rudder limits, rad.
     start: first guess, (8,); None for level flight at 25 m/s.
 
@@ -215,7 +215,7 @@ def solve_trim(
         values[QUANTITIES.index(quantity)] = value
     free_indices = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in fixed_values])
     lower_bounds, upper_bounds = _trim_bounds(limits)
-    residual = balance(values)
+    residual = apply_trim(values)
     min_residual, stalled_steps, failed_steps = math.inf, 0, 0
     for _ in range(_MAX_ITERATIONS):
         residual_size = float(np.abs(residual).max())
@@ -234,14 +234,14 @@ def solve_trim(
             # Difference away from the stops: a surface beyond its stop does not move, and its column would be zero.
             difference = _DIFFERENCE_RATIO * _MAX_NEWTON_STEP[k] * (-1.0 if values[k] >= 0.0 else 1.0)
             shifted[k] += difference
-            columns.append((balance(shifted) - residual) / difference)
+            columns.append((apply_trim(shifted) - residual) / difference)
         step = least_squares(np.stack(columns, axis=1), -residual)
         step /= max(1.0, float(np.abs(step / _MAX_NEWTON_STEP[free_indices]).max()))
         for _ in range(6):
             trial = values.copy()
             trial[free_indices] += step
             trial = np.clip(trial, lower_bounds, upper_bounds)
-            trial_residual = balance(trial)
+            trial_residual = apply_trim(trial)
             if np.abs(trial_residual).max() < residual_size:
                 break
             step = 0.5 * step
@@ -267,11 +267,11 @@ def trim(
 ) -> Trim | None:
     """Return the steady flight at an altitude with two quantities fixed, or None if no trim is found.
 
-    near: trim from which the iteration starts.
+    near: trim from which the iteration starts; None to start from the simulator's initial guess.
     """
     simulator.move_to(amsl)
     start = near.vector() if near else simulator.first_guess()
-    values = solve_trim(simulator.balance, fixed_values, simulator.surface_limits(), start)
+    values = solve_trim(simulator.apply_trim, fixed_values, simulator.surface_limits(), start)
     return None if values is None else from_vector(values, amsl)
 
 
@@ -311,7 +311,7 @@ def full_throttle_climb(simulator: Simulator, airspeed: float, amsl: float, near
 
 
 def idle_descent(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
-    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m), or None."""
+    """Return the steady descent with closed throttle at an airspeed (m/s) and altitude (m), or None if not found."""
     return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
@@ -347,14 +347,17 @@ def linearise(simulator: Simulator, trim_point: Trim) -> tuple[Floats, Floats]:
     )
     commands = np.array(trim_point.commands())
 
-    def column(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
+    def difference_quotient(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
         lower, upper = vector.copy(), vector.copy()
         lower[index] -= 1e-4
         upper[index] += 1e-4
         return (rate(upper) - rate(lower)) / 2e-4
 
-    a = [column(i, states, lambda shifted: simulator.derivatives(shifted, commands)) for i in range(8)]
-    b = [column(i, commands, lambda shifted: simulator.derivatives(states, shifted)) for i in range(len(commands))]
+    a = [difference_quotient(i, states, lambda shifted: simulator.derivatives(shifted, commands)) for i in range(8)]
+    b = [
+        difference_quotient(i, commands, lambda shifted: simulator.derivatives(states, shifted))
+        for i in range(len(commands))
+    ]
     return np.array(a).T, np.array(b).T
 
 
@@ -400,7 +403,9 @@ def euler(axes: Floats) -> tuple[float, float, float]:
 
 
 def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> Floats:
-    """Return the velocity relative to the air that flies a path over the ground: north, east and down, m/s, (3,).
+    """Return the velocity relative to the air with which an aircraft follows a path over the ground, m/s, (3,).
+
+    The components are north, east and down.
 
     course, climb: course and slope angle of the path, rad.
     airspeed: m/s.

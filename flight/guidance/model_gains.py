@@ -133,7 +133,7 @@ def idle_throttle(aircraft: Aircraft, fdm: Fdm, level: Trim) -> float:
     """
     fdm.move_to(level.amsl)
     for throttle in np.arange(0.0, level.throttle, _THROTTLE_STEP).tolist():
-        fdm.balance(replace(level, throttle=throttle).vector())
+        fdm.apply_trim(replace(level, throttle=throttle).vector())
         if float(fdm.read().power) > 0.0 and aircraft.battery_voltage:
             return float(max(0.0, throttle - _THROTTLE_STEP))
     return 0.0

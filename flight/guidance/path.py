@@ -20,7 +20,7 @@ from flight.mission.items import LANDINGS, PLACES, TAKEOFFS, Command, Mission, M
 from flight.mission.itinerary import pass_by_distance, stated_loiter
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
+from world.geometry import leg_courses, leg_lengths_2d, signed_turns, tangent_length, wrap
 from world.kernels import Record, compiled, inner, record_dtype
 from world.terrain import Terrain
 
@@ -45,7 +45,7 @@ PIECE = record_dtype(
 # A corner of the altitude profile and the parabola that blends it.
 NODE = record_dtype(
     "distance",  # m along the path
-    "height",  # m
+    "altitude",  # m AMSL
     "slope",  # tangent of the slope after the corner
     "half_length",  # m, of the parabola
 )
@@ -174,14 +174,14 @@ def profile_at(nodes: Records, distance: float) -> tuple[float, float, float]:
             slope_rate = (node.slope - previous_slope) / (2.0 * half_length)
             blend_distance = distance - node.distance + half_length
             return (
-                node.height
+                node.altitude
                 + previous_slope * (blend_distance - half_length)
                 + 0.5 * slope_rate * blend_distance * blend_distance,
                 previous_slope + slope_rate * blend_distance,
                 slope_rate,
             )
     node = nodes[index]
-    return node.height + node.slope * (distance - node.distance), node.slope, 0.0
+    return node.altitude + node.slope * (distance - node.distance), node.slope, 0.0
 
 
 # Maximum turn per chord of an arc, rad.
@@ -243,7 +243,7 @@ def fly_by_path(
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
-    courses, leg_lengths, turns = leg_courses(points), leg_runs(points), _turn_angles(route, fly_over_turn)
+    courses, leg_lengths, turns = leg_courses(points), leg_lengths_2d(points), _turn_angles(route, fly_over_turn)
     tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, leg_lengths, turns)
     return_lengths *= fly_over_turn != "none"
     pieces: list[tuple[float, ...]] = []
@@ -432,7 +432,7 @@ def _altitude_profile(corners: list[tuple[float, float]], limits: Limits, route:
     gaps = np.diff(distances)
     max_half_lengths = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
     nodes: Records = np.empty(distances.size, NODE)
-    nodes["distance"], nodes["height"], nodes["slope"] = distances, altitudes, next_slopes
+    nodes["distance"], nodes["altitude"], nodes["slope"] = distances, altitudes, next_slopes
     nodes["half_length"] = np.minimum(half_lengths, max_half_lengths)
     return nodes
 

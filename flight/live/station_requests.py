@@ -157,7 +157,7 @@ def vehicle_parameters(
     system: int,
     speed: float,
     autopilot_values: Callable[[Mapping[str, float]], Mapping[str, float]] = _empty_parameters,
-    not_flown: Iterable[str] = (),
+    not_simulated: Iterable[str] = (),
 ) -> Parameters:
     """Return the parameters of a vehicle and of its simulated autopilot, sorted by name.
 
@@ -166,12 +166,12 @@ def vehicle_parameters(
     system: the vehicle's MAVLink system id.
     speed: speed of the flight relative to real time.
     autopilot_values: function as in `Parameters`; its names replace the vehicle's own.
-    not_flown: parameters that are read but not simulated; they cannot be set.
+    not_simulated: parameters that are read but not simulated; they cannot be set.
 
     >>> parameters = vehicle_parameters(
     ...     airspeed=25.0, min_airspeed=18.0, max_airspeed=31.0, max_bank_deg=30.0, system=1, speed=1.0,
     ...     autopilot_values=lambda stated: {"WP_RADIUS": 90.0, "TRIM_PITCH_CD": 2.0} | stated,
-    ...     not_flown=["TRIM_PITCH_CD"],
+    ...     not_simulated=["TRIM_PITCH_CD"],
     ... )
     >>> parameters["AIRSPEED_CRUISE"]
     25.0
@@ -197,7 +197,7 @@ def vehicle_parameters(
         Parameter("SYSID_THISMAV", float(system)),
     ]
     entries = {entry.name: entry for entry in vehicle_entries}
-    unflown_names = set(not_flown)
+    unflown_names = set(not_simulated)
     for name, value in autopilot_values({}).items():
         entries[name] = Parameter(
             name, value, fixed_reason="is read, but has no effect on a flight", is_simulated=name not in unflown_names

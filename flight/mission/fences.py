@@ -315,7 +315,7 @@ def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north:
 
 
 def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str = "fence") -> tuple[Zone, ...]:
-    """Return the zones of fence items 5001..5004, which have no floor and no ceiling.
+    """Return the zones of fence items (MAV_CMD 5001..5004); the zones have no floor and no ceiling.
 
     source: name of the mission in messages.
 

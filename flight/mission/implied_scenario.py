@@ -14,7 +14,7 @@ from world.arrays import Floats
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
-from world.scenario import GROUND_BUFFER, Scenario, from_spec
+from world.scenario import GROUND_BUFFER, Scenario, scenario_from_spec
 from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
 
@@ -82,7 +82,7 @@ def implied_scenario(
         destination=_raised_above_ground(placed_mission.stops[-1].map_position, terrain),
         flight=flight,
     )
-    return ImpliedScenario(from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
+    return ImpliedScenario(scenario_from_spec(spec, mission.source, ground=terrain, external=True), placed_mission)
 
 
 def mission_origin(mission: Mission, stops: tuple[RoutePoint, ...]) -> GeoOrigin:

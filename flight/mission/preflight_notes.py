@@ -154,9 +154,9 @@ def _slope_text(slope: float) -> str:
 
 
 def landing_slopes(mission: Mission, route: Route, scenario: Scenario) -> tuple[float, float] | None:
-    """Return the ground slopes along and across a landing for which the scenario has no strip, m per m.
+    """Return the ground slopes along and across the final landing, m per m; NaN if the ground is unknown.
 
-    The slopes are NaN if the ground is unknown.  Returns None if the mission has no such landing.
+    Returns None if the mission does not end with a landing, or if the scenario defines a landing strip.
     """
     last_item = int(route.items[-1])
     has_landing = any(item.seq == last_item and item.command == Command.NAV_LAND for item in mission.items)

@@ -14,7 +14,7 @@ from logs.recording.recorder import Recorder
 from logs.recording.setup_attachments import package_versions
 from world.arrays import Floats
 from world.frames import to_geo
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # Waypoints of two legs with a turn of 14 degrees between them; east, north, up in m.
 _WAYPOINTS = np.array([[-500.0, 0.0, 200.0], [0.0, 0.0, 200.0], [400.0, 100.0, 220.0]])
@@ -44,7 +44,7 @@ def example_log() -> FlightLog:
     >>> log.ended, log.complete
     ('completed', True)
     """
-    scenario = from_spec(dict(_SCENARIO), "example")
+    scenario = scenario_from_spec(dict(_SCENARIO), "example")
     mission = _mission(scenario)
     setup = FlightSetup(
         scenario=scenario,

@@ -38,7 +38,7 @@ from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, ParameterError, PlanflyError
 from world.frames import MAX_TERMS, PolyMap
 from world.raster import MAX_PIXELS
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 from world.scenario_file import first_fault
 from world.scenario_tables import Guidance, Navigation
 from world.terrain import Terrain
@@ -422,7 +422,7 @@ def _read_scenario(attachments: dict[str, bytes], source: str, terrain: Terrain 
         raise LogError(f"{file_name}: not valid JSON: {error}", file=file_name) from error
     _check_terrain_is_stored(spec, terrain, file_name)
     try:
-        return from_spec(spec, file_name, ground=terrain, external=external)
+        return scenario_from_spec(spec, file_name, ground=terrain, external=external)
     except PlanflyError as error:
         raise LogError.from_error(error) from error
 

@@ -151,5 +151,5 @@ def parameters_document(parameters: Parameters) -> ParametersDocument:
         file=parameters.source,
         values=tuple(ParameterDocument(**value._asdict()) for value in parameters.values),
         unused=tuple(parameters.unused),
-        not_flown=tuple(parameters.not_flown),
+        not_flown=tuple(parameters.not_simulated),
     )

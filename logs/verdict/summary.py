@@ -267,9 +267,11 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     parameters = setup.autopilot.parameters
     if parameters is None or not parameters.source:
         return []
-    misfits = [f"Parameters that do not fit: {'; '.join(parameters.misfits)}"] if parameters.misfits else []
+    contradictions = (
+        [f"Parameters that do not fit: {'; '.join(parameters.contradictions)}"] if parameters.contradictions else []
+    )
     if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
-        return misfits
+        return contradictions
     counts = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
     # A name that is too long is a mistake in the file; other unused names belong to other hardware.
     unused_by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
@@ -283,15 +285,14 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
         if unused_names
         else ""
     )
-    not_flown = [name for name in parameters.not_flown if name in parameters.by_origin("file")]
-    notes += f"; read but not simulated: {', '.join(not_flown)}" if not_flown else ""
-    notes += f"; outside {setup.autopilot.title}'s documented ranges, but used: {', '.join(parameters.beyond)}" * bool(
-        parameters.beyond
-    )
+    not_simulated = [name for name in parameters.not_simulated if name in parameters.by_origin("file")]
+    notes += f"; read but not simulated: {', '.join(not_simulated)}" if not_simulated else ""
+    if undocumented_texts := parameters.outside_documented_ranges:
+        notes += f"; outside {setup.autopilot.title}'s documented ranges, but used: {', '.join(undocumented_texts)}"
     return [
         f"Parameters: {counts['file']} from the file, {counts['aircraft']} from the aircraft,"
         f" {counts['default']} from {setup.autopilot.title}'s defaults{notes}",
-        *misfits,
+        *contradictions,
     ]
 
 

@@ -1,7 +1,7 @@
-"""Define every tolerance and threshold of the verdict: its unit, its reason, its source.
+"""Define every tolerance and threshold of the verdict, with unit, reason and source.
 
-If no source is named, the value is our own judgement of what matters to a flight.  Limits of scenario and aircraft are
-not here: they come with the flight.
+If no source is named, the value is our own judgement of what matters to a flight.  The limits of the scenario and the
+aircraft are not defined here; they are part of the flight's setup.
 """
 
 import math
@@ -10,7 +10,7 @@ from aircraft import envelope
 
 # Precision of a plan's numbers
 
-# rad.  A planned angle: 1e-7 degrees of latitude (1 cm) on a 130 m leg, and rounding.
+# rad.  Tolerance of a planned angle: 1e-7 degrees of latitude (1 cm) on a 130 m leg, and rounding.
 PLAN_TOLERANCE_RAD = math.radians(0.01)
 # m.  The 1e-7 degrees of a mission file move a waypoint by up to 1 cm in each direction.
 ROUNDING_M = 0.02
@@ -30,11 +30,12 @@ LOITER_RADIUS_TOLERANCE_M = 0.02
 # Fraction.  The mean radius of a flown loiter may exceed its stated radius by this, in addition to
 # `WAYPOINT_PASS_MARGIN_M`.
 LOITER_WIDENING_FRACTION = 0.25
-# Radii of the bank limit's arc.  Distance from its center that an autopilot that steers to it may reach on a loiter too
-# tight for its bank: up to 2.09 on 20 flights of ArduPlane's law with loiters of 10 to 100 m, in up to 12 m/s of wind.
-# Also the distance from a mission's last waypoint that PX4, which loiters there, may reach, in radii of the wider of
-# that loiter and the bank limit: up to 2.06 in 54 ends of missions by its law, with loiters of 80 and 200 m, in up to
-# 12 m/s of wind.
+# Radii of the arc at the bank limit.  Distance from the center of a loiter too tight for the bank limit that an
+# autopilot which steers to the center may reach: up to 2.09 on 20 flights of ArduPlane's law with loiters of 10 to
+# 100 m, in up to 12 m/s of wind.
+# Also the distance from a mission's last waypoint that PX4, which loiters there, may reach, in radii of this loiter or
+# of the arc at the bank limit, whichever is wider: up to 2.06 in 54 ends of missions by PX4's law, with loiters of 80
+# and 200 m, in up to 12 m/s of wind.
 LOITER_SWING_RADII = 2.25
 # m.  A leg shorter than this is a vertical climb, with no course of its own.
 MIN_LEG_LENGTH_M = 0.5
@@ -42,12 +43,12 @@ MIN_LEG_LENGTH_M = 0.5
 # that are too short, guidance omits the arc of a turn beyond its own smaller limit, SHARPEST_FLY_BY in
 # flight/mission/route.py, which the turn rule imports from there.
 U_TURN_RAD = math.pi - 1e-6
-# Radii.  Largest fly-by offset of a turn that is used, which is the offset of a turn of about 176 degrees.
+# Turn radii.  Maximum fly-by offset of a turn; a larger offset, of a turn beyond about 176 degrees, is reduced to it.
 MAX_FLY_BY_OFFSET_RADII = 30.0
 
 # The turn rule
 
-# rad.  Tolerance for the mean bank over a second beyond the limit: roll in gusts is not part of the turn.
+# rad.  Excess of the mean bank over a second beyond the limit that is tolerated: roll in gusts is not part of the turn.
 BANK_TOLERANCE_RAD = math.radians(5.0)
 # m.  Tolerance for a turn flown outside its arc.
 OVERSHOOT_TOLERANCE_M = 5.0
@@ -59,7 +60,7 @@ GUST_OFFSET_M = {"none": 0.0, "light": 0.5, "moderate": 1.0}
 # limit by the sum of both; the second is the cross-track error of an aircraft with good guidance.
 CORNER_CUT_FRACTION = 0.01
 CORNER_CUT_TOLERANCE_M = {"none": 0.6, "light": 0.8, "moderate": 1.0}
-# Standard deviations.  Largest navigation error that is allowed for.
+# Standard deviations.  Largest navigation error that the rules take into account.
 NAVIGATION_SIGMAS = 3.0
 # s.  A turn is measured for at most this long after its arc.
 SETTLING_WATCH_TIME_S = 10.0
@@ -75,8 +76,8 @@ KINK_WAYPOINT_COUNT = 8
 
 # The slope rule
 
-# m.  A leg beyond its slope limit is a negligible step if it and its neighbours that are too steep as well rise or
-# descend by no more than this in all: an aircraft that begins the step early or late is within this height of it.
+# m.  A leg beyond its slope limit is a negligible step if the leg, together with its too steep neighbours, rises or
+# descends by no more than this: an aircraft that begins the step early or late is within this height of the step.
 # ArduPlane itself flies altitude changes below ALT_SLOPE_MIN, 15 m by default, as a step (ArduPilot's parameter
 # reference).
 NEGLIGIBLE_STEP_M = 10.0
@@ -90,8 +91,8 @@ SHORT_LEG_HEIGHT_ERROR_LIMIT_M = 15.0
 LEVEL_SLOPE_RAD = math.radians(0.5)
 # m/s.  Less wind than this is called calm air in a reason about the wind's effect on a slope.
 CALM_WIND_MPS = 0.5
-# m/s.  Error of the mean airspeed while the throttle is at a limit, or of the airspeed on an arc; in turbulence a
-# gust's standard deviation more.
+# m/s.  Tolerance of the mean airspeed while the throttle is at a limit, or of the airspeed on an arc; in turbulence the
+# standard deviation of the gusts is added.
 SPEED_TOLERANCE_MPS = 1.0
 # Fraction of the wind at 6 m.  Standard deviation of the gust along the track: MIL-F-8785C has 0.1 at altitude and up
 # to 0.2 at the ground.
@@ -99,12 +100,12 @@ GUST_SPEED_FRACTION = 0.15
 # Standard deviations.  A slope is undecided if it is closer than this to the limit of an uncertain aircraft model: 95 %
 # one-sided, of a normal distribution.  Plans keep the same distance, so the value is the envelope's.
 UNDECIDED_FRACTION = envelope.UNDECIDED_SIGMAS
-# s.  A climb at full throttle, or a glide without throttle, of this length shows the aircraft's ability: the speed
-# settles in 5 s, and the gusts of 15 s average out.
+# s.  Minimum duration of a climb at full throttle, or of a glide with closed throttle, that shows the aircraft's
+# ability: the speed settles in 5 s, and the gusts of 15 s average out.
 MIN_EVIDENCE_FLIGHT_S = 20.0
-# rad.  A shown ability may be less than a leg's slope by this and `ABILITY_SIGMAS` standard errors.
+# rad.  A measured ability may be less than a leg's slope by the sum of this and `ABILITY_SIGMAS` standard errors.
 ABILITY_TOLERANCE_RAD = math.radians(0.1)
-# Standard errors.  Largest error of a measured ability that is allowed for.
+# Standard errors.  Largest error of a measured ability that the rules take into account.
 ABILITY_SIGMAS = 3.0
 
 # Measured slopes
@@ -152,7 +153,7 @@ BLEND_EXCLUSION_M = 20.0
 MIN_COURSE_STRETCH_M = 60.0
 # m.  Shortest piece of a leg to which a slope is fitted.
 MIN_SLOPE_STRETCH_M = 100.0
-# s.  Shortest time over which a slope is measured: shorter ones over-read by degrees.
+# s.  Shortest time over which a slope is measured: over a shorter time the measured slope is too steep by degrees.
 MIN_STRETCH_TIME_S = 4.0
 # rad.  Resolution of a fitted course in calm air.
 COURSE_ERROR_FLOOR_RAD = math.radians(0.02)
@@ -192,11 +193,11 @@ MIN_GROUND_SPEED_MPS = 5.0
 # Fraction of a leg's duration at `MIN_CONTROLLED_AIRSPEED_MPS`.  Steady flight for this long is enough for the mean
 # airspeed of a leg too short for `SATURATED_TIME_S`.
 MEASURED_FRACTION = 0.5
-# m.  Taking up another slope may put the aircraft this far ahead or behind, which matters on a short leg.
+# m.  A change of slope may be flown this far before or after its waypoint, which matters on a short leg.
 SLOPE_CHANGE_LAG_M = 10.0
 # s.  Duration of a gust.
 GUST_DURATION_S = 10.0
-# Standard deviations.  Largest effect of gusts on a leg's mean airspeed that is allowed for.
+# Standard deviations.  Largest effect of gusts on a leg's mean airspeed that the rules take into account.
 GUST_SIGMAS = 2.0
 # rad.  Bank beyond this is a loss of control.  The simulation's own threshold (flight/simulation/tick.py).
 MAX_CONTROLLED_BANK_RAD = math.radians(75.0)
@@ -214,8 +215,8 @@ MAX_ROW_GAP_TICKS = 5.0
 MAX_VELOCITY_DISAGREEMENT_MPS = 10.0
 # s.  Airspeed, bank and load factor are averaged over this time for comparison with the stall.
 STALL_AVERAGING_TIME_S = 1.0
-# m/s.  A flown airspeed may be this far below the stall in a bank, and a gust's standard deviation more: guidance lets
-# the speed swing by as much when it rolls into a turn in calm air.
+# m/s.  A flown airspeed may be below the stall speed in a bank by this plus the standard deviation of the gusts:
+# guidance lets the airspeed vary by this when it rolls into a turn in calm air.
 STALL_TOLERANCE_MPS = 0.2
 # Fraction of the battery or the tank that must be left at the end: the reserve.
 ENERGY_RESERVE_FRACTION = 0.2
@@ -277,11 +278,11 @@ FLARE_HEIGHT_MARGIN_M = 15.0
 LANDING_POINT_ERROR_M = 10.0
 # m.  Least height above ground on a go-around: it turns on that path, and turns are not laid out.
 GO_AROUND_CLEARANCE_M = 20.0
-# m.  Within this distance of a place of the landing sequence that is lower itself, a go-around may be as low: slopes
-# down to a place that is 10 m lower need this length.
+# m.  Within this distance of a waypoint of the landing sequence that is below the required height, a go-around may be
+# as low as the waypoint: a slope down to a waypoint that is 10 m lower needs this length.
 LINE_UP_DISTANCE_M = 500.0
-# m.  A go-around that passes the ground beyond the landing point by less in its climb is undecided: the point mass
-# agreed within this in height with the one recorded go-around of ArduPlane, and that one did not have to climb.
+# m.  A go-around whose climb clears the ground beyond the landing point by less than this is undecided: the height of
+# the point mass was within this of the one recorded go-around of ArduPlane, which did not have to climb.
 GO_AROUND_MODEL_ERROR_M = 6.0
 
 # Flown take-offs and landings

@@ -162,9 +162,9 @@ def _exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Fl
 
 
 def exposure_chart(setup: FlightSetup, track: Track) -> Chart | None:
-    """Return strength and sum of kill and detection exposure along the flown distance (km).
+    """Return a chart of kill and detection exposure, their rate and their sum so far, over the flown distance (km).
 
-    Only exposure that occurred is shown; None if there was none.
+    Only exposure that occurred is shown; return None if there was no exposure.
     """
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:

@@ -14,7 +14,7 @@ from world.elevation_formats import EMBEDDED
 from world.errors import ArgumentError, PlanflyError
 from world.files import absolute_path, write_atomically
 from world.raster import open_raster
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 from world.scenario_draft import GeoPosition, draft_text, make_draft
 from world.scenario_file import parse_scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, names_folder
@@ -74,7 +74,7 @@ def new_scenario(
             version=version or None,
         )
         # Parse the text as it will be read from the file, so that a fault is found before anything is written.
-        from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
+        scenario_from_spec(parse_scenario(draft_text(draft), str(file)), str(file))
     relative_draft = replace(
         draft, terrain=raster_path and _relative_path(target, raster_path), aircraft=_relative_path(target, model_path)
     )

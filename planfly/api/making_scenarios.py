@@ -11,7 +11,7 @@ from planfly.flight_options import load_scenario_with_options
 from planfly.runtime.stages import report_line
 from planner.search.algorithms import find_algorithm
 from world.errors import ArgumentError
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 from world.scenario_tables import SCALE_RATIOS
 
 # Tables of a position, which replace another position as a whole.
@@ -57,7 +57,7 @@ def make_scenario(
     if threats is not None:
         spec["threats"] = _threat_tables(threats)
     terrain = base_scenario.terrain if _TERRAIN_TABLES.isdisjoint(tables) else None
-    scenario = from_spec(spec, "make_scenario", ground=terrain, external=base_scenario.external)
+    scenario = scenario_from_spec(spec, "make_scenario", ground=terrain, external=base_scenario.external)
     find_algorithm(scenario.planner.algorithm, "make_scenario")
     for note in scenario.notes:
         if note not in base_scenario.notes:

@@ -16,7 +16,7 @@ from logs.recording.recorder import Recorder
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import NO_GLIDES, Glides, judge_glides
-from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.returns.returns_text import (
     describe_causes,
@@ -268,7 +268,7 @@ def _judge_imported_flight(imported: "ImportedFlight", request: _ReturnsRequest)
 
 def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResult:
     """Fly a mission, and judge the returns of its flight."""
-    return_world(setup)  # Raises errors before the flight.
+    make_return_world(setup)  # Raises errors before the flight.
     with stage("flying the mission"):
         flight = fly_and_judge(setup, airframe_for_setup(setup), None, reference="never")
     return _judge_flight(flight.setup, flight.track, request, flight.ended)
@@ -276,7 +276,7 @@ def _judge_mission(setup: FlightSetup, request: _ReturnsRequest) -> ReturnsResul
 
 def _judge_flight(setup: FlightSetup, track: Track, request: _ReturnsRequest, end_reason: str) -> ReturnsResult:
     """Simulate and judge returns from points of a flight, look for remedies, and write the requested files."""
-    world = return_world(setup)
+    world = make_return_world(setup)
     starts = return_starts(setup, track, request.every)
     with stage(f"flying {len(starts)} returns", "flying returns"):
         judged_returns = judge_returns(world, starts, request.every, fly_return)

@@ -131,7 +131,7 @@ def replay(args: argparse.Namespace) -> int:
 
 
 def _json_answer(args: argparse.Namespace, log: "FlightLog", code: int) -> object:
-    """Return the timeline of the replayed part; if the flight is sent to ground stations, of the whole flight."""
+    """Return the timeline of the replayed part, or of the whole flight if it is sent to ground stations."""
     from planfly.terminal.answers import ReplayAnswer, TimelineEvent
 
     entries = planfly.timeline(log) if isinstance(args.to, str) else call_api(planfly.timeline, args, log=log)

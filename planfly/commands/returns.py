@@ -137,7 +137,7 @@ def _json_answer(source: str, result: "ReturnsResult", code: int) -> object:
         every_s=judged_returns.interval,
         least_clearance_m=judged_returns.limit,
         causes=[
-            CauseEntry(name=cause.name, does=cause.does, parameter=cause.parameter, value=cause.value)
+            CauseEntry(name=cause.name, does=cause.action, parameter=cause.parameter, value=cause.value)
             for cause in judged_returns.causes
         ],
         rtl_autoland=judged_returns.autoland,

@@ -81,7 +81,7 @@ class _Probe:
             raise FlightError(f"{aircraft.name}: no level flight at cruise to begin with", file=aircraft.name)
         self._airspeed = aircraft.airspeed
         self._trim = trim.vector()
-        fdm.balance(self._trim)
+        fdm.apply_trim(self._trim)
         self.mass = read("inertia/mass-slugs")() * 14.593902937206364
         ixx, iyy, izz, ixz = (read(f"inertia/i{axes}-slugs_ft2")() * _SLUG_FT2 for axes in ("xx", "yy", "zz", "xz"))
         # JSBSim's product of inertia has the opposite sign.
@@ -120,7 +120,7 @@ class _Probe:
             for throttle in throttles.tolist():
                 values = self._trim.copy()
                 values[0], values[-1] = airspeed, throttle
-                fdm.balance(values)
+                fdm.apply_trim(values)
                 rows.append((thrust() * _POUND_N, float(fdm.read().power), -torque() * _POUND_FOOT_NM))
         thrusts, powers, torques = np.array(rows).reshape(_TABLE_ROWS, _TABLE_ROWS, 3).transpose(2, 0, 1)
         volts = aircraft.battery_voltage

@@ -26,7 +26,7 @@ from planner.evaluation.problem import make_problem
 from planner.search.kernel_calls import FRONT, PARTS, SAMPLE_COUNT, call_kernels
 from planner.search.search_state import SCORE_COLUMNS, best_first
 from world.compile_events import notify_before_compiling
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # ----------------------------------------------------------------------
 # Units of work: each calls kernels that no other unit calls, with the argument types that all commands use.
@@ -74,7 +74,7 @@ MISSION_TEXT = """QGC WPL 110
 
 def _make_scenario() -> Scenario:
     """Return a small scenario whose only purpose is to compile kernels."""
-    return from_spec(tomllib.loads(SCENARIO_TEXT), "field")
+    return scenario_from_spec(tomllib.loads(SCENARIO_TEXT), "field")
 
 
 def _make_world() -> tuple[Scenario, Airframe]:

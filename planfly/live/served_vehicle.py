@@ -60,7 +60,7 @@ def _make_vehicle(
     autopilot_settings = airframe.autopilot.parameters
     parameters = vehicle_parameters(
         autopilot_values=partial(autopilot_parameters, served_scenario.scenario),
-        not_flown=() if autopilot_settings is None else autopilot_settings.not_flown,
+        not_simulated=() if autopilot_settings is None else autopilot_settings.not_simulated,
         airspeed=airframe.airspeed,
         min_airspeed=airframe.aircraft.airspeed_min,
         max_airspeed=airframe.aircraft.airspeed_max,

@@ -6,7 +6,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.returns.drawn_returns import DrawnReturns, drawn_returns, drawn_returns_without_glides
 from logs.verdict.returns.judge_glides import judge_glides
-from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.judge_returns import Returns, ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
 from logs.verdict.returns.returns_text import headline
 from world.errors import PlanflyError
@@ -57,7 +57,7 @@ def return_summary(setup: FlightSetup, track: Track | None) -> ReturnSummary:
     if setup.mission.home is None or setup.scenario.terrain is None:
         return ReturnSummary()
     try:
-        world = return_world(setup)
+        world = make_return_world(setup)
         duration = setup.path.length / max(1.0, setup.airspeed)
         if track is not None and len(track):
             duration = float(track.time[-1] - track.time[0])

@@ -19,7 +19,7 @@ from planfly.studio.view_model import Json
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import PlanflyError
 from world.files import read_small_file, utf8_text
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 _SCHEMA = "planfly.studio/1"
 # Maximum size of an autosave with two missions, a plan and the settings, bytes.
@@ -108,7 +108,7 @@ def _restore_settings(context: EditContext, data: Json) -> EditContext:
         new_context = context
     else:
         new_context = context.with_settings(
-            from_spec(new_spec, scenario.name, ground=scenario.terrain, external=scenario.external), parameters
+            scenario_from_spec(new_spec, scenario.name, ground=scenario.terrain, external=scenario.external), parameters
         )
     return new_context if new_context.planned or not data.get("planned") else replace(new_context, planned=True)
 

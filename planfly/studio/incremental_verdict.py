@@ -18,7 +18,7 @@ from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.studio.edit_context import EditContext
 from planfly.studio.moved_route import update_moved_route
-from world.geometry import leg_runs
+from world.geometry import leg_lengths_2d
 
 # Distance along the legs within which a move can change the verdict, m.  The route is judged for twice this distance,
 # and the outer half is discarded, because the end of the part is not the end of the route.
@@ -194,7 +194,7 @@ def _consecutive_runs(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
     """Return a span extended by at least `REACH` and `LEGS` on both sides, without cutting a loiter."""
-    distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.waypoints))])
+    distance = np.concatenate([[0.0], np.cumsum(leg_lengths_2d(route.waypoints))])
     start = min(first - LEGS, int(np.searchsorted(distance, distance[first] - REACH, side="right")) - 1)
     end = max(last + LEGS, int(np.searchsorted(distance, distance[last] + REACH)))
     start, end = max(0, start), min(route.legs, end)

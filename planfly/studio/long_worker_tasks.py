@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from flight.mission.items import Mission
-from logs.verdict.returns.judge_returns import judge_returns, return_world
+from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.returns_text import headline, point_of_no_return_text, range_text
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import default_dispersions
@@ -33,7 +33,7 @@ def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str,
         missing_input = "home" if mission.home is None else "terrain"
         reason = f"returns cannot be judged without {missing_input}"
         raise MissionError(f"{mission.source}: {reason}", field=missing_input)
-    world = return_world(setup)
+    world = make_return_world(setup)
     flight = fly_and_judge(
         setup, context.airframe, None, lambda done, total, remark: advance(0.5 * done, total, remark), reference="never"
     )

@@ -308,7 +308,10 @@ class Server:
             page.send({"kind": "fault", "text": internal_text(error)})
 
     async def _dispatch(self, page: Page, message: messages.Message) -> None:
-        """Carry out a message of a page.  Raises StaleEdit for an edit of an outdated mission, and PlanflyError."""
+        """Handle a message from a page.
+
+        Raises StaleEdit if the page edited an outdated mission, and PlanflyError if the action fails.
+        """
         session = self.session
         match message:
             case messages.Ask(kind="stop"):

@@ -16,7 +16,7 @@ from planfly.studio.messages import LIMITS, Settings
 from planfly.workflow.airframe import Airframe, find_airframe, load_airframe
 from world.errors import PlanflyError
 from world.files import did_you_mean, temporary_folder
-from world.scenario import Scenario, from_spec, with_flight
+from world.scenario import Scenario, scenario_from_spec, with_flight
 
 # Suffixes of parameter files.
 PARAMETER_FILES = (".parm", ".param", ".params")
@@ -79,7 +79,7 @@ def apply_scenario_settings(scenario: Scenario, settings: Settings) -> Scenario:
         if scenario.external:
             raise PlanflyError("ceiling: only a scenario has an area with a ceiling", field="ceiling")
         spec["area"]["ceiling_amsl_m"] = settings.ceiling
-    return from_spec(spec, new_scenario.name, ground=new_scenario.terrain, external=new_scenario.external)
+    return scenario_from_spec(spec, new_scenario.name, ground=new_scenario.terrain, external=new_scenario.external)
 
 
 def apply_parameter_settings(current: SetParameters, scenario: Scenario, settings: Settings) -> SetParameters:

@@ -32,7 +32,7 @@ from planfly.workflow.pipeline import fly_and_judge
 from planfly.workflow.suggestion_trials import MAX_TRIAL_FLIGHTS, SuggestionTrials, tried_suggestions
 from planner.search.plan_front import FrontPlan
 from world.arrays import Floats
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # Maximum duration of a search for one path, for which a user waits, s.
 MAX_SEARCH_SECONDS = 25.0
@@ -166,4 +166,4 @@ def with_ends(scenario: Scenario, start: tuple[float, ...], destination: tuple[f
         spec[key] = {"east_m": east, "north_m": north, "amsl_m": altitude}
     for key in ("launch", "landing"):
         spec.pop(key, None)
-    return from_spec(spec, scenario.name, ground=scenario.terrain, external=scenario.external)
+    return scenario_from_spec(spec, scenario.name, ground=scenario.terrain, external=scenario.external)

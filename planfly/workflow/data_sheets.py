@@ -329,7 +329,7 @@ def _performance_vector(aircraft: Aircraft, properties: tuple[tuple[str, float],
     max_speed_trim = fastest_level_flight(fdm, AMSL)
     level = steady_flight(fdm, aircraft.airspeed, AMSL)
     if level is not None:
-        fdm.balance(level.vector())
+        fdm.apply_trim(level.vector())
     return np.array(
         [
             *(math.nan if trim is None else trim.climb for trim in angles),
@@ -445,7 +445,7 @@ def _make_files(
     aircraft = read_aircraft(folder)
     draft_fdm = Fdm(aircraft, is_tested=True)
     performance = measure_performance(draft_fdm, aircraft)
-    draft_fdm.balance(performance.level.vector())
+    draft_fdm.apply_trim(performance.level.vector())
     _check_endurance(aircraft, float(draft_fdm.read().power))
     # At the stall the propeller carries part of the weight.  If the model could fly slower, the sheet's stall speed
     # applies.

@@ -13,7 +13,7 @@ from logs.verdict.tolerances import ROUNDING_M, SUGGESTION_LENGTH_MARGIN_M
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import threat_text
 from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN_M
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # Content of a scenario file.
 Spec = dict[str, Any]
@@ -91,7 +91,7 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
         )
     if not changes:
         return scenario, []
-    return from_spec(spec, scenario.name, ground=scenario.terrain), changes
+    return scenario_from_spec(spec, scenario.name, ground=scenario.terrain), changes
 
 
 def _limits_table(spec: Spec) -> Spec:

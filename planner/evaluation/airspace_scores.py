@@ -141,9 +141,14 @@ def add_airspace_violations(
     lags: Records,
     violations: Record,
 ) -> None:
-    """Add zone penetration (bounds) and excess height (terrain) of a path (w, 3) to a `VIOLATIONS` record, m x km.
+    """Add the violations of zones and of the maximum height by a path (w, 3) to a `VIOLATIONS` record, m x km.
 
-    legs, corners, flown_corners, lags: measurements of the path.
+    Zone penetration is added to the field `bounds`, and height above the maximum height to the field `terrain`.
+
+    legs: measurements of the path's legs.
+    corners: its corners as planned.
+    flown_corners: its corners as flown.
+    lags: altitude lags on its legs.
     """
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)

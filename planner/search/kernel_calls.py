@@ -73,8 +73,8 @@ def _call_scores(task: _Task) -> None:
     search_patterns(task.problem.search, task.encoding, vector, SAMPLE_COUNT)
 
 
-def _call_certificates(task: _Task) -> None:
-    """Certify a path."""
+def _call_certify(task: _Task) -> None:
+    """Call the kernel that certifies a path; the certificate is not used."""
     certify(task.problem, task.path)
 
 
@@ -116,5 +116,5 @@ def _call_front(task: _Task) -> None:
     covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)
 
 
-_PART_CALLS = (_call_scores, _call_certificates, _call_shortening, _call_routes, _call_side_routes, _call_paper_scores)
+_PART_CALLS = (_call_scores, _call_certify, _call_shortening, _call_routes, _call_side_routes, _call_paper_scores)
 _CALLS = {**dict(zip(PARTS, _PART_CALLS, strict=True)), FRONT: _call_front}

@@ -35,7 +35,7 @@ from planner.search.pose_chains import (
 )
 from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip, Launch, strip_slopes
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_runs
+from world.geometry import leg_courses, leg_lengths_2d
 from world.scenario import Scenario
 from world.terrain import Terrain
 
@@ -194,11 +194,11 @@ class _Site:
         max_slope = max(self.slopes(course, altitude)[is_descent] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
-    def certify_chain(self, chain: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
-        """Return the certificate of a path (n, 3), with a lower required height near two points.
+    def certify_path(self, path: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
+        """Return the certificate of a path, (n, 3) m.
 
-        end_points: two points, (3,) m; if a point is closer to the ground than required, the required height is lower
-            near the point.
+        end_points: two points, (3,) m; near a point that is itself closer to the ground than required, the required
+            height is lower.
         """
         data = self.problem.certified
         start_buffer, end_buffer = (
@@ -213,7 +213,7 @@ class _Site:
             start_course=math.nan,
             destination_course=math.nan,
         )
-        return certify(replace(self.problem, certified=relaxed_data), np.ascontiguousarray(chain))
+        return certify(replace(self.problem, certified=relaxed_data), np.ascontiguousarray(path))
 
     def height_above_ground(self, point: Floats) -> float:
         """Return the height of a point (3,) above ground, m."""
@@ -362,7 +362,7 @@ def _make_departure(
         if altitudes[-1] < goal_altitude - 1e-6:
             break
         chain = np.concatenate([_join_altitudes(points, altitudes), next_waypoints])
-        certificate = site.certify_chain(chain, (first_waypoint, chain[0]))
+        certificate = site.certify_path(chain, (first_waypoint, chain[0]))
         if certificate.ok and certificate.kill_distance > 0.0:
             return ClimbOut(
                 site.home, course, takeoff_altitude, chain[1 : len(points) - 1], site.slopes(course, top_altitude)[0]
@@ -601,7 +601,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
         return -math.inf, f"is {obstacle}"
     point_above = np.array([point[0], point[1], glide_start[2]])
     chain = np.concatenate([final.final_waypoints, point_above[None]])
-    certificate = site.certify_chain(chain, (chain[0], chain[0]))
+    certificate = site.certify_path(chain, (chain[0], chain[0]))
     if not certificate.ok:
         return min(certificate.clearance, 0.0) - 1.0, f"is not clear: {certificate.problems[0]}"
     return 0.0, "" if certificate.kill_distance > 0.0 else "is inside a missile's reach"
@@ -646,7 +646,7 @@ def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, st
                     break
                 path = _join_altitudes(points, altitudes)
                 chain = np.concatenate([previous_waypoints, path, final.final_waypoints[1:], point_above[None]])
-                certificate = site.certify_chain(chain, (last_waypoint, last_waypoint))
+                certificate = site.certify_path(chain, (last_waypoint, last_waypoint))
                 if certificate.ok and certificate.kill_distance > 0.0:
                     return chain[len(previous_waypoints) + 1 : len(previous_waypoints) + len(points) - 1], ""
                 best_rejected.add(certificate)
@@ -724,7 +724,7 @@ def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> 
 
     turn_point: end of the go-around's climb, (3,) m.  Returns -inf if the ground is unknown.
     """
-    length = float(leg_runs(np.stack([turn_point, line_up]))[0])
+    length = float(leg_lengths_2d(np.stack([turn_point, line_up]))[0])
     fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
     east, north = (turn_point[axis] + fractions * (line_up[axis] - turn_point[axis]) for axis in range(2))
     if line_up[2] > turn_point[2]:

@@ -96,7 +96,10 @@ def _cost_or_inf(evaluation_data: ProblemArrays, path: Floats) -> float:
 
 
 def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
-    """Yield start paths (w, 3): the shortest path, also with equal legs, the straight line, and other routes.
+    """Yield paths (w, 3) from which the search starts.
+
+    They are the shortest path, the same path resampled to equal legs, the straight line and, for the encoding "rotated"
+    without limits of the airspace, other routes.
 
     Raises SearchEnded if the search must stop.
     """

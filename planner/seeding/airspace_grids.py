@@ -24,8 +24,8 @@ from planner.seeding.grids import (
     GridRoute,
     fill_goal_distances,
     find_obstacles,
-    position_of,
     proximity_cost,
+    to_world_position,
 )
 from world.arrays import Codes, Floats
 from world.kernels import Record, Records, compiled, inner
@@ -70,7 +70,7 @@ def _fill_column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
 ) -> None:
     """Fill the `COLUMN` record of a grid position."""
-    east, north = position_of(frame, along, across)
+    east, north = to_world_position(frame, along, across)
     column.lowest, column.highest = math.inf, -math.inf
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
         return
@@ -129,7 +129,7 @@ def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: fl
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
     for side in range(-MAX_SIDE, MAX_SIDE + 1):
-        b[0], b[1] = position_of(frame, step, side * step)
+        b[0], b[1] = to_world_position(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
         slopes[side + MAX_SIDE, 0], slopes[side + MAX_SIDE, 1] = (
             fraction * math.tan(climb),
@@ -208,7 +208,7 @@ def _relax_stage(
     for y in range(width):
         if not np.isfinite(cost[y]).any():
             continue
-        east, north = position_of(frame, (stage - 1) * step, grid.across[y])
+        east, north = to_world_position(frame, (stage - 1) * step, grid.across[y])
         first_height = previous_columns[y].lowest if grid.follows else grid.floor
         for side in range(-MAX_SIDE, MAX_SIDE + 1):
             target = y + side
@@ -216,7 +216,7 @@ def _relax_stage(
                 continue
             target_first_height = columns[target].lowest if grid.follows else grid.floor
             horizontal_length = step * math.sqrt(1.0 + side * side)
-            end_east, end_north = position_of(frame, stage * step, grid.across[target])
+            end_east, end_north = to_world_position(frame, stage * step, grid.across[target])
             closed_heights = _ClosedHeights(math.inf, -math.inf)
             if zones.required.shape[0] > 0:
                 leg = segment_between(east, north, end_east, end_north)

@@ -70,8 +70,8 @@ class _PixelSteps(NamedTuple):
 
 
 @inner
-def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:
-    """Return the east and north coordinates of a point (along, across) in the rotated frame, m."""
+def to_world_position(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:
+    """Convert a point (along, across) of the rotated frame to map coordinates; return east and north, m."""
     return (
         frame.east + frame.cosine * along - frame.sine * across,
         frame.north + frame.sine * along + frame.cosine * across,
@@ -92,7 +92,7 @@ def _min_height(
     The result is inf outside the map or without data.
     steps: steps between the samples; a step of 0 along the frame leaves only the middle sample.
     """
-    east, north = position_of(frame, along, across)
+    east, north = to_world_position(frame, along, across)
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
         return math.inf
     column, row = polymap(data.to_pixel, east, north)
@@ -117,11 +117,11 @@ def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, pitch: 
 
     along: position in the frame at which the steps are computed, m.
     """
-    east, north = position_of(frame, along, 0.0)
+    east, north = to_world_position(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
-    east, north = position_of(frame, along + pitch, 0.0)
+    east, north = to_world_position(frame, along + pitch, 0.0)
     column_along, row_along = polymap(data.to_pixel, east, north)
-    east, north = position_of(frame, along, pitch)
+    east, north = to_world_position(frame, along, pitch)
     column_across, row_across = polymap(data.to_pixel, east, north)
     return _PixelSteps(column_along - column, row_along - row, column_across - column, row_across - row)
 
@@ -235,7 +235,7 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
     a, b = np.zeros(3), np.zeros(3)
     for side in range(-MAX_SIDE, MAX_SIDE + 1):
         horizontal_length = step * math.sqrt(1.0 + (side * ratio) ** 2)
-        b[0], b[1] = position_of(frame, step, side * ratio * step)
+        b[0], b[1] = to_world_position(frame, step, side * ratio * step)
         a[0], a[1] = frame.east, frame.north
         for z in range(layers.size):
             a[2] = layers[z]

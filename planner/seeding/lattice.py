@@ -19,7 +19,7 @@ from planner.evaluation.corners import settling_length
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_limits
 from planner.evaluation.problem import ProblemArrays
-from planner.seeding.grids import position_of
+from planner.seeding.grids import to_world_position
 from planner.seeding.waypoint_fitting import leg_cost
 from world.arrays import Flags, Floats
 from world.by_reference import by_reference
@@ -76,7 +76,7 @@ class Lattice(NamedTuple):
 @inner
 def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats) -> None:
     """Fill the world position (3,) of a lattice point and layer."""
-    out[0], out[1] = position_of(
+    out[0], out[1] = to_world_position(
         frame, (along - lattice.behind) * lattice.step, (across - lattice.right) * lattice.step
     )
     out[2] = lattice.low + layer * lattice.pitch

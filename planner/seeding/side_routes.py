@@ -245,7 +245,7 @@ def continue_grid_costs(
 
 
 @inlined
-def side_of(lateral_offset: float, vertical_offset: float) -> int:
+def passing_side(lateral_offset: float, vertical_offset: float) -> int:
     """Return the side of a point, given its offsets to the left of an obstacle's centre and above it, m."""
     if abs(lateral_offset) >= abs(vertical_offset):
         return LEFT if lateral_offset >= 0.0 else RIGHT
@@ -254,9 +254,10 @@ def side_of(lateral_offset: float, vertical_offset: float) -> int:
 
 @compiled
 def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: float) -> Records:
-    """Return `PASSING` records (obstacles, 4) of the cheapest route past each `OBSTACLE` on each side, by `side_of`.
+    """Return the cheapest route past each `OBSTACLE` on each side, as `PASSING` records (obstacles, 4).
 
-    A route passes an obstacle at the stage nearest to its centre; obstacles beyond the ends have none.
+    The sides are those of `passing_side`.  A route passes an obstacle at the stage nearest to the obstacle's centre; an
+    obstacle beyond the ends of the grid has no routes, which is a cost of inf.
     """
     passings = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
     for k in range(obstacles.shape[0]):
@@ -270,7 +271,7 @@ def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: fl
                 cost = costs.start_costs[stage, z, y] + costs.goal_costs[stage, z, y]
                 if cost == math.inf:
                     continue
-                passing = passings[k, side_of(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
+                passing = passings[k, passing_side(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
                 if cost < passing.cost:
                     passing.cost, passing.stage, passing.layer, passing.across = cost, stage, z, y
     return passings

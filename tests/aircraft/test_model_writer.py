@@ -79,7 +79,7 @@ def test_power_is_the_aerosondes(tmp_path: Path) -> None:
     found = []
     for fdm in (theirs, ours):
         fdm.move_to(0.0)
-        fdm.balance(np.array([25.0, 0.0, 0.05, 0.0, -0.1, 0.0, 0.0, 0.8]))
+        fdm.apply_trim(np.array([25.0, 0.0, 0.05, 0.0, -0.1, 0.0, 0.0, 0.8]))
         state = fdm.read()
         found.append((state.power, state.current))
     assert found[0] == pytest.approx(found[1], rel=1e-9)
@@ -128,7 +128,7 @@ def test_elevons_mix_and_stop(tmp_path: Path) -> None:
         # The right one stops at 1.3 x 0.4: (-0.3 - 0.52) / 2 and (-0.3 + 0.52) / 2.
         (-0.45, 0.15, (-0.41, 0.11)),
     ):
-        fdm.balance(np.array([25.0, 0.0, 0.05, 0.0, elevator, aileron, 0.0, 0.8]))
+        fdm.apply_trim(np.array([25.0, 0.0, 0.05, 0.0, elevator, aileron, 0.0, 0.8]))
         state = fdm.read()
         assert (float(state.elevator), float(state.aileron)) == pytest.approx(expected, abs=1e-9)
 
@@ -136,7 +136,7 @@ def test_elevons_mix_and_stop(tmp_path: Path) -> None:
 def test_a_v_tail_mixes_elevator_and_rudder(tmp_path: Path) -> None:
     fdm = Fdm(_made(tmp_path, replace(BOOK, layout="vtail")), is_tested=True)
     fdm.move_to(500.0)
-    fdm.balance(np.array([25.0, 0.0, 0.05, 0.0, -0.2, 0.05, 0.1, 0.8]))
+    fdm.apply_trim(np.array([25.0, 0.0, 0.05, 0.0, -0.2, 0.05, 0.1, 0.8]))
     state = fdm.read()
     found = (float(state.elevator), float(state.aileron), float(state.rudder))
     assert found == pytest.approx((-0.2, 0.05, 0.1), abs=1e-9)

@@ -12,7 +12,7 @@ import pytest
 
 import planfly
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.px4.parameters import NOT_FLOWN, Px4Parameters
+from flight.autopilots.px4.parameters import NOT_SIMULATED, Px4Parameters
 from logs.recording.reader import read_log
 from logs.verdict import tolerances
 from logs.verdict.rule_words import RULE_WORDS
@@ -119,7 +119,7 @@ def test_every_setting_that_leaves_the_verdict_open_stands_on_its_page() -> None
 
 def test_every_parameter_of_px4_that_is_not_flown_stands_on_its_page() -> None:
     text = text_of("px4-branches.md")
-    assert [name for name in NOT_FLOWN if f"`{name}`" not in text] == []
+    assert [name for name in NOT_SIMULATED if f"`{name}`" not in text] == []
 
 
 def test_every_scale_that_ranks_flights_stands_on_its_page() -> None:

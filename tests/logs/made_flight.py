@@ -15,7 +15,7 @@ from logs.verdict.findings import Finding
 from logs.verdict.places import Place
 from logs.verdict.verdict import Verdict
 from planner.plan import Certificate, Plan
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 WAYPOINTS = np.array([[-900.0, -900.0, 420.0], [0.0, -200.0, 430.0], [300.0, 700.0, 460.0], [900.0, 900.0, 440.0]])
 
@@ -41,7 +41,7 @@ def scenario_spec(**changes: object) -> dict[str, object]:
 
 
 def make_setup(*, with_plan: bool = True, **changes: object) -> FlightSetup:
-    scenario = from_spec(scenario_spec(**changes), "test")
+    scenario = scenario_from_spec(scenario_spec(**changes), "test")
     items = tuple(
         MissionItem(k + 1, 16, 0, (0.0, 25.0, math.nan, math.nan), 46.0 + k / 300, 8.0 + k / 700, float(up), k != 2)
         for k, up in enumerate(WAYPOINTS[:, 2])

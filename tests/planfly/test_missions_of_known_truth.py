@@ -18,7 +18,7 @@ from planfly.workflow.pipeline import fly_and_judge
 from tests.mission_lines import ORIGIN, mission, wp
 from tests.setups import spec_around
 from tests.soak import some
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 # Home and ground in metres AMSL, unless a mission says otherwise.
 GROUND = 300.0
@@ -154,7 +154,7 @@ def setup_of(case: Case, autopilot: str = "planfly") -> FlightSetup:
     ends = [[0.0, 0.0, case.ground + 100.0], [500.0, 0.0, case.ground + 100.0]]
     tables = made | case.tables | {"flight": {"autopilot": autopilot, **case.tables.get("flight", {})}}
     spec = spec_around(ends, name="known", buffer=0.0, ceiling=9000.0, **tables)
-    scenario = from_spec(spec, "known", external=True)
+    scenario = scenario_from_spec(spec, "known", external=True)
     return make_setup(scenario, load_airframe(scenario), mission(*case.lines, home=case.home), 1)
 
 

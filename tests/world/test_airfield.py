@@ -11,7 +11,7 @@ import pytest
 from tests.world.made.made_scenario import made_spec, refused, same_scenario, with_fault
 from world.airfield import LandingStrip, Launch
 from world.errors import ScenarioError
-from world.scenario import Scenario, from_spec, with_wind
+from world.scenario import Scenario, scenario_from_spec, with_wind
 from world.scenario_file import parse_scenario
 from world.terrain import make_gridded_terrain
 from world.wind import Wind
@@ -46,7 +46,7 @@ def hill(east: float, north: float) -> float:
 
 
 def field(**changes: Any) -> Scenario:
-    return from_spec(made_spec(**(FIELD | changes)), "made")
+    return scenario_from_spec(made_spec(**(FIELD | changes)), "made")
 
 
 def test_the_tables_become_places_courses_and_heights() -> None:
@@ -94,7 +94,7 @@ def test_what_is_not_stated_is_left_to_the_method() -> None:
 
 
 def test_a_scenario_without_the_tables_has_none_of_them() -> None:
-    scenario = from_spec(made_spec(), "made")
+    scenario = scenario_from_spec(made_spec(), "made")
     assert (scenario.home, scenario.launch, scenario.landing, scenario.returns) == (None,) * 4
     assert not {"home", "launch", "landing", "returns"} & set(scenario.to_json())
 
@@ -102,7 +102,7 @@ def test_a_scenario_without_the_tables_has_none_of_them() -> None:
 def test_the_tables_come_back_through_json_and_stay_in_another_wind() -> None:
     scenario = field()
     text = json.dumps(scenario.to_json(), allow_nan=False)
-    again = from_spec(json.loads(text), "again")
+    again = scenario_from_spec(json.loads(text), "again")
     assert same_scenario(scenario, again)
     assert json.dumps(again.to_json()) == text
     assert {key: json.loads(text)[key] for key in FIELD} == FIELD
@@ -194,12 +194,12 @@ def test_where_the_ground_is_not_known(key: str) -> None:
     east, north = np.linspace(-3000.0, 0.0, 7), np.linspace(-2000.0, 2000.0, 5)
     ground = make_gridded_terrain(np.full((5, 7), 100.0), east, north, source="west", sha256="", datum="mean sea level")
     spec = made_spec(threats=[], home={"place": "start"})
-    assert from_spec(spec, "x", ground=ground).home is not None
+    assert scenario_from_spec(spec, "x", ground=ground).home is not None
     beyond = {key: {"east_m": 500.0, "north_m": 0.0}}
     with pytest.raises(
         ScenarioError, match=rf"^x: {key}: east 500 m, north 0 m: the elevation file has no data there$"
     ):
-        from_spec(spec | beyond, "x", ground=ground)
+        scenario_from_spec(spec | beyond, "x", ground=ground)
 
 
 def test_the_tables_are_read_from_a_file() -> None:

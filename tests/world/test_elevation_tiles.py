@@ -23,7 +23,7 @@ from tests.world.made.elevation_files import (
 )
 from world.errors import PlanflyError, ScenarioError
 from world.raster import open_raster, read_terrain, tile_bounds
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 
 def cut(folder: Path, name: str, rows: slice, cols: slice, shift: float = 0.0, crs: str = "EPSG:4326") -> Path:
@@ -249,10 +249,10 @@ def test_a_scenario_lists_its_tiles(tmp_path: Path) -> None:
     # Written down with whole paths, and made again from there; a tile that has changed is told.
     written = listed.to_json()
     assert written["terrain"]["path"][3] == str(tmp_path / "dem" / "11.tif")
-    assert from_spec(written, "a plan").terrain.sha256 == listed.terrain.sha256  # type: ignore[union-attr]
+    assert scenario_from_spec(written, "a plan").terrain.sha256 == listed.terrain.sha256  # type: ignore[union-attr]
     cut(tmp_path / "dem", "11.tif", slice(ROWS // 2, ROWS), slice(COLS // 2, COLS - 1))
     with pytest.raises(ScenarioError, match="has changed since"):
-        from_spec(written, "a plan")
+        scenario_from_spec(written, "a plan")
 
 
 def test_of_listed_tiles_the_first_counts(tmp_path: Path) -> None:

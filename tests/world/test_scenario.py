@@ -16,8 +16,8 @@ from world.scenario import (
     Scenario,
     embedded_names,
     embedded_scenarios,
-    from_spec,
     load_scenario,
+    scenario_from_spec,
     with_absolute_ends,
     with_flight,
     with_planner,
@@ -63,7 +63,7 @@ def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
 
 
 def test_positions_and_heights() -> None:
-    scenario = from_spec(made_spec(), "made")
+    scenario = scenario_from_spec(made_spec(), "made")
 
     def hill(east: float, north: float) -> float:
         return 500.0 * math.exp(-(east**2 + north**2) / (2 * 600.0**2))
@@ -86,16 +86,16 @@ def test_positions_and_heights() -> None:
 
 @pytest.mark.parametrize("name", ["jacksboro", "made"])
 def test_to_json_and_back_is_the_same_scenario(name: str) -> None:
-    scenario = load_scenario(name) if name == "jacksboro" else from_spec(made_spec(), "made")
+    scenario = load_scenario(name) if name == "jacksboro" else scenario_from_spec(made_spec(), "made")
     text = json.dumps(scenario.to_json(), allow_nan=False)
-    again = from_spec(json.loads(text), "again")
+    again = scenario_from_spec(json.loads(text), "again")
     assert same_scenario(scenario, again)
     assert json.dumps(again.to_json()) == text
     # With the ground at hand, as from a log, no file is opened.
     data = json.loads(text)
     if name == "jacksboro":
         data["terrain"]["path"] = "/nowhere/at/all.npz"
-    assert np.array_equal(from_spec(data, "log", ground=scenario.terrain).start, scenario.start)
+    assert np.array_equal(scenario_from_spec(data, "log", ground=scenario.terrain).start, scenario.start)
 
 
 def test_embedded_scenarios() -> None:
@@ -143,7 +143,7 @@ def _dem(folder: Path, **changes: Any) -> dict[str, Any]:
 def test_origin_and_area_come_from_the_tile(tmp_path: Path) -> None:
     spec = _dem(tmp_path)
     del spec["area"]
-    scenario = from_spec(spec, "x", base=tmp_path)
+    scenario = scenario_from_spec(spec, "x", base=tmp_path)
     assert scenario.origin.lat_deg == pytest.approx(47.0 - 120 / 3600, abs=1e-9)
     assert scenario.origin.lon_deg == pytest.approx(9.0 + 150 / 3600, abs=1e-9)
     assert np.ptp(scenario.bounds, axis=1) == pytest.approx([299 * 21.1, 239 * 30.9], rel=0.03)
@@ -155,14 +155,14 @@ def test_origin_and_area_come_from_the_tile(tmp_path: Path) -> None:
     data = scenario.to_json()
     assert data["origin"] == {"lat_deg": scenario.origin.lat_deg, "lon_deg": scenario.origin.lon_deg}
     assert data["terrain"]["path"] == str(tmp_path / "tile.npz")
-    assert same_scenario(from_spec(data, "again"), scenario)
+    assert same_scenario(scenario_from_spec(data, "again"), scenario)
 
 
 def test_a_tile_that_changed_is_noticed(tmp_path: Path) -> None:
-    data = from_spec(_dem(tmp_path), "x", base=tmp_path).to_json()
+    data = scenario_from_spec(_dem(tmp_path), "x", base=tmp_path).to_json()
     np.savez(tmp_path / "tile.npz", elevation=np.ones((240, 300)), xmin=9, xmax=9.1, ymin=46.9, ymax=47)
     with pytest.raises(ScenarioError, match="the file has changed since"):
-        from_spec(data, "plan.json")
+        scenario_from_spec(data, "plan.json")
 
 
 def test_relative_paths_count_from_the_scenario_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,11 +188,11 @@ def test_relative_paths_count_from_the_scenario_file(tmp_path: Path, monkeypatch
 
 def test_another_terrain_does_not_move_the_map(tmp_path: Path) -> None:
     spec = _dem(tmp_path)
-    before = from_spec(spec, "x", base=tmp_path)
+    before = scenario_from_spec(spec, "x", base=tmp_path)
     rows, cols = 400, 500  # a larger tile, whose middle is elsewhere
     edges = {"xmin": 8.98, "xmax": 8.98 + cols / 3600, "ymin": 47.02 - rows / 3600, "ymax": 47.02}
     np.savez(tmp_path / "other.npz", elevation=np.full((rows, cols), 300.0), **edges)
-    after = from_spec(spec, "x", base=tmp_path, terrain=str(tmp_path / "other.npz"))
+    after = scenario_from_spec(spec, "x", base=tmp_path, terrain=str(tmp_path / "other.npz"))
     assert after.origin == before.origin
     assert after.start[:2].tolist() == before.start[:2].tolist()
     assert after.start[2] == pytest.approx(400.0)
@@ -211,7 +211,7 @@ def test_tiles_that_no_map_can_hold(tmp_path: Path) -> None:
         np.savez(tmp_path / f"{name}.npz", elevation=np.ones((100, 100)), **keys)
         spec = {"name": name, "terrain": {"kind": "dem", "path": f"{name}.npz"}, **ends}
         with pytest.raises((ScenarioError, TerrainError), match=match):
-            from_spec(spec, "x", base=tmp_path)
+            scenario_from_spec(spec, "x", base=tmp_path)
 
 
 # ----------------------------------------------------------------------
@@ -220,14 +220,14 @@ def test_tiles_that_no_map_can_hold(tmp_path: Path) -> None:
 
 @pytest.fixture
 def scenario() -> Scenario:
-    return from_spec(made_spec(), "made")
+    return scenario_from_spec(made_spec(), "made")
 
 
 def test_another_wind_is_one_that_a_file_may_have(scenario: Scenario) -> None:
     windy = with_wind(scenario, 11.0, math.radians(30.0), "moderate")
     assert (windy.wind.speed, windy.wind.turbulence, windy.wind.gradient) == (11.0, "moderate", 0.01)
     assert windy.wind.from_course == pytest.approx(math.radians(30.0))
-    assert same_scenario(from_spec(windy.to_json(), "again"), windy)
+    assert same_scenario(scenario_from_spec(windy.to_json(), "again"), windy)
     assert same_scenario(with_wind(scenario, None, None, None), scenario)
     assert with_wind(scenario, None, None, "none").wind.speed == 6.0
     # What a file may not say, an option may not either: the log could not be read back.
@@ -244,10 +244,10 @@ def test_another_wind_is_one_that_a_file_may_have(scenario: Scenario) -> None:
 def test_other_entries_of_flight_and_planner(scenario: Scenario) -> None:
     fast = with_flight(scenario, airspeed_mps=30.0, guidance=None)
     assert fast.flight == scenario.flight.model_copy(update={"airspeed_mps": 30.0})
-    assert same_scenario(from_spec(fast.to_json(), "again"), fast)
+    assert same_scenario(scenario_from_spec(fast.to_json(), "again"), fast)
     seeded = with_planner(scenario, "--seed", seed=9)
     assert seeded.planner == scenario.planner.model_copy(update={"seed": 9})
-    assert same_scenario(from_spec(seeded.to_json(), "again"), seeded)
+    assert same_scenario(scenario_from_spec(seeded.to_json(), "again"), seeded)
     with pytest.raises(ScenarioError, match=r"made: flight: airspeed_mps: 7\.0: allowed 15\.\.60"):
         with_flight(scenario, airspeed_mps=7.0)
     with pytest.raises(ScenarioError, match=r"--seed: seed: -1: allowed 0\.\."):
@@ -263,7 +263,7 @@ def test_more_threats_stand_on_the_ground_with_the_scales_of_the_others(scenario
     # The medians of 100 / 400 and 2 / 1, and of 2 / 1.
     assert more.threats.kill_scale[-2:].tolist() == pytest.approx([250.0 * 1.125, 0.0])
     assert more.threats.detection_scale[-2:].tolist() == pytest.approx([0.0, 1800.0])
-    assert same_scenario(from_spec(more.to_json(), "again"), more)
+    assert same_scenario(scenario_from_spec(more.to_json(), "again"), more)
     with pytest.raises(ScenarioError, match=r"--threat: kill_radius_m: -5\.0: allowed above 0"):
         with_threats(scenario, [(0.0, 0.0, -5.0, 0.0)], "--threat")
 
@@ -289,7 +289,7 @@ def test_more_zones_hold_no_end_but_of_a_scenario_made_around_a_mission(
     external = replace(scenario, external=True)
     made = with_zones(external, tables, "mills.geojson")
     assert [zone.name for zone in made.zones] == ["mill"]
-    again = from_spec(made.to_json(), "a log", ground=made.terrain, external=True)
+    again = scenario_from_spec(made.to_json(), "a log", ground=made.terrain, external=True)
     assert again.zones == made.zones
     if held:
         with pytest.raises(ScenarioError, match=r"mills\.geojson: zones: mill: start lies inside"):

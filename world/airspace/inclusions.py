@@ -13,9 +13,9 @@ _CIRCLE_CORNERS = 256
 
 
 def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
-    """Return zones with all inclusions united into one, as for an autopilot that stays inside any of them.
+    """Return the zones with all inclusions merged into one, for an autopilot that must be inside at least one of them.
 
-    A circle becomes a polygon inside it.
+    Circles are approximated by inscribed polygons.  Exclusions, and a single inclusion, are returned unchanged.
 
     >>> from world.airspace.zones import make_cylinder
     >>> circles = [Zone(f"fence item {k}", "inclusion", make_cylinder(800.0 * k, 0.0, 500.0)) for k in range(2)]

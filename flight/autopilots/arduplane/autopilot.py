@@ -182,7 +182,7 @@ class ArduPlane(Autopilot):
             follows_terrain=parameters.terrain_enable == 1.0,
             unites_inclusions=bool(int(self._stated_values.get("FENCE_OPTIONS", 0.0)) & _UNION_OF_INCLUSIONS_BIT),
             battery_failsafes=battery_failsafes(parameters),
-            settings_not_flown=partial(self.settings_not_flown, by_program=False),
+            describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
             parameter_notes=(*parameters.notes, *_mission_notes(parameters)),
         )
 
@@ -191,10 +191,10 @@ class ArduPlane(Autopilot):
         """Values of all parameters of the set, by name."""
         return {name: value for name, value, _ in self.parameters.values}
 
-    def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
+    def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:
         """Describe settings that change the flight of a mission but are not simulated.
 
-        by_program: True for a flight of ArduPlane's own program, which flies more settings.
+        by_program: True for a flight of ArduPlane's own program, in which more settings have an effect.
         """
         parameters, values = self.parameters, self._stated_values
         texts = [
@@ -203,7 +203,7 @@ class ArduPlane(Autopilot):
             if values[name] != neutral
         ]
         fence_parameters = parameters.changed(FENCE_ENABLE=1.0) if mission.enables_fence else parameters
-        if fence_parameters.has_fence_of_its_own:
+        if fence_parameters.has_own_fence:
             texts.append(f"the circle and the altitudes of FENCE_TYPE {parameters.fence_type:g} are not judged")
         if mission.returns and parameters.rtl_follows_terrain:
             texts.append(

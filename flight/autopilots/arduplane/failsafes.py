@@ -1,4 +1,4 @@
-"""List the causes that end ArduPlane's mission, and its reactions according to its parameters.
+"""List the events that can end a mission of ArduPlane, and ArduPlane's reactions according to its parameters.
 
 Read from ArduPlane's sources, not triggered: `Plane::rc_failsafe_short_on_event`, `failsafe_long_on_event` and
 `handle_battery_failsafe` in ArduPlane/events.cpp, `Plane::fence_check` in fence.cpp; AP_BattMonitor for the thresholds.
@@ -29,22 +29,22 @@ FailsafeAction = Literal[
 
 
 class Cause(NamedTuple):
-    """A possible cause of leaving the mission.
+    """An event that can end the mission, and ArduPlane's reaction.
 
-    name: name in messages.
-    does: ArduPlane's reaction.
+    name: name of the event in messages.
+    action: ArduPlane's reaction.
     parameter, value: the parameter that decides the reaction, and its value; "" if no parameter decides.
     """
 
     name: str
-    does: FailsafeAction
+    action: FailsafeAction
     parameter: str = ""
     value: int = 0
 
     @property
-    def returns(self) -> bool:
+    def is_return(self) -> bool:
         """True if the reaction is an RTL; a landing is not an RTL."""
-        return self.does == "return"
+        return self.action == "return"
 
 
 _LONG_FAILSAFE: dict[int, FailsafeAction] = {0: "on", 1: "return", 2: "glide", 3: "parachute", 4: "on", 5: "autoland"}
@@ -61,7 +61,7 @@ _BATTERY_FAILSAFE: dict[int, FailsafeAction] = {
     6: "land",
     7: "autoland",
 }
-# Values of BATT_MONITOR that measure only the voltage: an analog one, and that of the Bebop (`has_current`).
+# Values of BATT_MONITOR that measure only the voltage: an analog monitor, and the Bebop's monitor (`has_current`).
 _MONITORS_WITHOUT_CURRENT = (3, 6)
 _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided", 7: "guided", 8: "autoland"}
 
@@ -69,7 +69,7 @@ _FENCE_REACTION: dict[int, FailsafeAction] = {0: "on", 1: "return", 6: "guided",
 def failsafe_causes(
     parameters: ArduPilotParameters, *, has_fence: bool, has_landing: bool = False, ends_landed: bool = False
 ) -> tuple[Cause, ...]:
-    """Return the causes that can end a mission in AUTO, with ArduPlane's reaction to each, in a fixed order.
+    """Return the events that can end a mission in AUTO, with ArduPlane's reaction to each, in a fixed order.
 
     has_fence: True if the mission carries a fence.
     has_landing: True if the mission has a landing sequence; without one the reaction "land" is an RTL.
@@ -78,7 +78,7 @@ def failsafe_causes(
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
     >>> made = ArduPilotParameters.defaults().changed(FS_LONG_ACTN=1, BATT_FS_LOW_ACT=1, BATT_LOW_VOLT=14)
     >>> for cause in failsafe_causes(made, has_fence=False):
-    ...     print(cause.name, cause.parameter, cause.value, cause.does)
+    ...     print(cause.name, cause.parameter, cause.value, cause.action)
     the pilot's RTL  0 return
     the mission's end  0 return
     RC lost FS_LONG_ACTN 1 return

@@ -40,13 +40,13 @@ from world.wind import mean_wind_speed
 class GoArounds:
     """Simulated go-arounds.
 
-    flown: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
-    ways: n arrays (t, 3) of positions at intervals of 1 s, m.
-    landings: n landing sequences, one that each go-around joins.
+    results: outcomes, (n,) of dtype `flight.autopilots.arduplane.rtl_point_mass.RETURN_RESULT`.
+    tracks: n arrays (t, 3) of positions at intervals of 1 s, m.
+    landings: the landing sequence that each go-around joins, n in all.
     """
 
-    flown: Records
-    ways: tuple[Floats, ...]
+    results: Records
+    tracks: tuple[Floats, ...]
     landings: tuple[LandingStart, ...]
 
 
@@ -100,28 +100,30 @@ def fly_go_arounds(
     """Simulate n go-arounds, each from a start on a landing glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    end_altitude, pitch: altitude above which the climb ends, m AMSL, and its pitch, rad.
-    landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  A
-        loiter in a sequence is its last stop: the go-around ends after one circle.
+    end_altitude: altitude above which the climb ends, m AMSL.
+    pitch: pitch angle during the climb, rad.
+    landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  If the
+        sequence contains a loiter, the go-around ends there, after one circle.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> from flight.autopilots.arduplane.point_mass import point_mass
-    >>> from flight.autopilots.arduplane.rtl_point_mass import surroundings
+    >>> from flight.autopilots.arduplane.point_mass import make_point_mass
+    >>> from flight.autopilots.arduplane.rtl_point_mass import make_return_environment
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from world.scenario import load_scenario
     >>> from world.wind import Wind
     >>> aerosonde = load_aircraft("aerosonde")
-    >>> made = point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
-    >>> start = make_abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, made)
-    >>> behind = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
-    >>> world, law = surroundings(load_scenario("jacksboro")), ArduPilotParameters.load(aerosonde)
-    >>> (way,) = fly_go_arounds(start, 840.0, 0.17, behind, law, made, world).ways
-    >>> k = count_climb_rows(way, 840.0)
-    >>> bool(abs(way[k, 0]) < 1.0), bool(abs(way[-1, 0] - 800.0) < 100.0), bool(way[:, 2].min() > 797.0)
+    >>> aircraft = make_point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
+    >>> start = make_abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, aircraft)
+    >>> landings = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
+    >>> environment = make_return_environment(load_scenario("jacksboro"))
+    >>> parameters = ArduPilotParameters.load(aerosonde)
+    >>> (track,) = fly_go_arounds(start, 840.0, 0.17, landings, parameters, aircraft, environment).tracks
+    >>> k = count_climb_rows(track, 840.0)
+    >>> bool(abs(track[k, 0]) < 1.0), bool(abs(track[-1, 0] - 800.0) < 100.0), bool(track[:, 2].min() > 797.0)
     (True, True, True)
     """
-    flown = np.zeros(len(starts), RETURN_RESULT)
+    results = np.zeros(len(starts), RETURN_RESULT)
     record, climb_parameters, climb = parameters.record(), _climb_parameters(parameters, pitch), np.zeros(1, CLIMB)[0]
     climb.is_required, climb.top, climb.slew = True, end_altitude, parameters.throttle_slew or math.inf
     climb.throttle = parameters.takeoff_throttle or parameters.throttle_max
@@ -150,9 +152,9 @@ def fly_go_arounds(
             -math.inf,
             False,
             track,
-            flown[k],
+            results[k],
         )
-        return track[: int(flown[k]["rows"])].copy()
+        return track[: int(results[k]["position_count"])].copy()
 
     flights = []
     for k in range(len(starts)):
@@ -163,7 +165,7 @@ def fly_go_arounds(
         if nearest_sequence is not None and nearest_sequence != landing:
             track, landing = fly(k, nearest_sequence), nearest_sequence
         flights.append((track, landing))
-    return GoArounds(flown, tuple(track for track, _ in flights), tuple(landing for _, landing in flights))
+    return GoArounds(results, tuple(track for track, _ in flights), tuple(landing for _, landing in flights))
 
 
 def _climb_parameters(parameters: ArduPilotParameters, pitch: float) -> Record:

@@ -1,9 +1,9 @@
-"""ArduPlane's parameters for a mission, in SI units and radians.
+"""Define ArduPlane's parameters for a mission, in SI units and radians.
 
 Names, units, ranges and defaults are from ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.7); an
 older name stands next to the present name, with the factor to the present unit.  A parameter is taken from the first
 source that states it: the user's file, the file `ardupilot.parm` of the aircraft, ArduPlane's defaults.  Parameters
-that 4.6 does not have are not read for 4.6, which flies a fixed value instead.
+that 4.6 does not have are not read for 4.6, which uses a fixed value instead.
 """
 
 import math
@@ -28,7 +28,7 @@ _PER_CENTI = 0.01
 _M_PER_KM = 1000.0
 
 
-# By the field of `ArduPilotParameters`.
+# Definitions of the parameters, by the field of `ArduPilotParameters`.
 DEFINITIONS = {
     "navl1_period": Definition("NAVL1_PERIOD", 17.0, 1.0, 60.0),
     "navl1_damping": Definition("NAVL1_DAMPING", 0.75, 0.3, 2.0),
@@ -130,7 +130,7 @@ DEFINITIONS = {
     "pitch_rate_p": Definition("PTCH_RATE_P", 0.04, 0.0, 100.0),
     "pitch_rate_ff": Definition("PTCH_RATE_FF", 0.345, 0.0, 100.0),
 }
-# Parameters that 4.6 does not have, with the values that it flies: heights in m.
+# Parameters that 4.6 does not have, with the fixed values that it uses: heights in m.
 _FIXED_IN_4_6 = {"CLIMB_SLOPE_HGT": 20.0}
 # Bit of MIS_OPTIONS: counters of jumps are not reset when they are exhausted.
 _KEEPS_JUMP_COUNTERS = 1 << 3
@@ -148,14 +148,14 @@ _FOLLOW_HOME_BIT = 1 << 4
 OWN_FENCE_BITS = 0b1011
 # Radius of a loiter whose radius is stated as 1 m or less, m (ArduPlane's `LOITER_RADIUS_DEFAULT`).
 _DEFAULT_LOITER_RADIUS_M = 60.0
-# Parameters that are read but not flown: an RTL is flown on a slope where this would make it follow the terrain.
-NOT_FLOWN = ("TERRAIN_FOLLOW",)
+# Parameters that are read but not simulated: an RTL is simulated on a slope even if this makes it follow the terrain.
+NOT_SIMULATED = ("TERRAIN_FOLLOW",)
 ARDUPILOT_PARAMETERS = record_dtype(
     *DEFINITIONS,
     "roll_rate_max",  # rad/s, infinite without a limit
     ("is_4_7", np.bool_),
 )
-# Parameters that should not fall from one to the next; ArduPlane does not compare them.
+# Parameters whose values should not decrease from one to the next; ArduPlane does not compare them.
 _ORDERS = (
     ("THR_MIN", "TRIM_THROTTLE", "THR_MAX"),
     ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX"),
@@ -171,7 +171,7 @@ _BATTERY_THRESHOLDS = ("LOW_VOLT", "LOW_MAH", "FS_LOW_ACT", "CRT_VOLT", "CRT_MAH
 RADIO_CHANNEL_COUNT = 16
 # Defaults of the pulses of radio channels and servo outputs, us (`RC_Channel::var_info`, `SRV_Channel::var_info`).
 _PULSES_US = {"MIN": 1100.0, "TRIM": 1500.0, "MAX": 1900.0}
-# Parameters without a part in the control law that decide verdicts (`flight.autopilots.arduplane.open_settings`,
+# Parameters that the control law does not use, but that decide verdicts (`flight.autopilots.arduplane.open_settings`,
 # `flight.autopilots.arduplane.arming_checks` and `flight.autopilots.arduplane.failsafes`), with their defaults.
 _WHEN_STATED = {
     **dict.fromkeys(("KFF_THR2PTCH", "BATT_WATT_MAX", "FWD_BAT_THR_CUT", "TECS_OPTIONS", "AFS_ENABLE"), 0.0),
@@ -213,7 +213,7 @@ _WHEN_STATED = {
     "TKOFF_ACCEL_CNT": 1.0,
     "TKOFF_ALT": 50.0,
     "USE_REV_THRUST": 2.0,
-    # Read for the checks before arming alone.
+    # Used only by the checks before arming.
     **{f"SERVO{output}_{name}": pulse for output in range(1, 33) for name, pulse in _PULSES_US.items()},
     **{
         f"RC{channel}_{name}": value
@@ -230,7 +230,7 @@ _WHEN_STATED = {
     "FENCE_ALT_MAX": 100.0,
     "FENCE_ALT_MIN": -10.0,
     **{f"{monitor}_ARM_{unit}": 0.0 for monitor in ("BATT", *OTHER_BATTERY_MONITORS) for unit in ("VOLT", "MAH")},
-    # Read for the battery failsafes alone; `BATT_MONITOR` and its thresholds have definitions of their own.
+    # Used only by the battery failsafes; `BATT_MONITOR` and its thresholds are in `DEFINITIONS`.
     "BATT_CAPACITY": 3300.0,
     "BATT_LOW_TIMER": 10.0,
     **{
@@ -244,9 +244,9 @@ _WHEN_STATED = {
         )
     },
 }
-# Names of some of them before 4.6, with the factor to the present unit.
+# Names before 4.6 of parameters of `_WHEN_STATED`, with the factor to the present unit.
 _OLD_NAMES = {"GPS1_TYPE": ("GPS_TYPE", 1.0), "GPS2_TYPE": ("GPS_TYPE2", 1.0)}
-# Parameters whose value in the aircraft's own file is what the aircraft needs, and no part of the set.
+# Parameters whose values in the aircraft's own file are not part of the set: the aircraft needs them in any case.
 _NEEDED_BY_AIRCRAFT = ("RLL_RATE_I", "RLL_RATE_D", "PTCH_RATE_I", "PTCH_RATE_D", "SCALING_SPEED")
 TABLE = ParameterTable(
     ARDUPILOT,
@@ -263,7 +263,7 @@ TABLE = ParameterTable(
 
 @dataclass(frozen=True, slots=True)
 class ArduPilotParameters(ParameterSet):
-    r"""Parameters with which ArduPlane flies; the fields of `DEFINITIONS` are computed from ``values``.
+    r"""Parameters of ArduPlane; the fields of `DEFINITIONS` are computed from ``values``.
 
     version: release of ArduPlane.
     notes: notes on a file that another release wrote; not stored in a log.
@@ -278,72 +278,88 @@ class ArduPilotParameters(ParameterSet):
     >>> made = ArduPilotParameters.of_text("GLIDE_SLOPE_MIN 20\nCLIMB_SLOPE_HGT 30\n", "mine.param", "4.6")
     >>> made.altitude_slope_min, made.climb_slope_height, made.unused
     (20.0, 20.0, ('CLIMB_SLOPE_HGT',))
-    >>> ArduPilotParameters.of_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").misfits
+    >>> ArduPilotParameters.of_text("TRIM_THROTTLE 60\nTHR_MAX 50", "mine.param").contradictions
     ('THR_MAX 50 of the file is below TRIM_THROTTLE 60 of the file',)
     >>> made, notes = ArduPilotParameters.of_log({"LIM_ROLL_CD": 4500.0, "WP_RADIUS": -5.0}, "a.BIN")
     >>> made.by_origin("file"), notes
     ({'ROLL_LIMIT_DEG': 45.0}, ('WP_RADIUS -5 of the log is not allowed: the default is used',))
 
-    navl1_period: s.  navl1_xtrack_i: 1/s.
-    wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for no limit.
-    wp_loiter_rad: m, of a loiter that states no radius, negative to the left.
+    navl1_period: period of the L1 controller, s.
+    navl1_xtrack_i: gain of the cross-track integrator, 1/s.
+    wp_radius: distance before a waypoint at which a right-angled turn begins, m.
+    wp_max_radius: maximum distance at which a waypoint is passed, m; 0 for no limit.
+    wp_loiter_rad: radius of a loiter that states no radius, m, negative to the left.
     roll_limit, pitch_limit_max, pitch_limit_min, pitch_trim: rad.
-    roll_time, pitch_time: s, in which an attitude is to follow its demand.
-    airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
-    airspeed_stall: m/s, at a load factor of 1; 0 if not stated.
-    stall_prevention: 1 if bank is limited, and minimum airspeed raised, for the load factor; 0 if not.
-    throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
-    altitude_slope_min: m, a leg that climbs or sinks less is flown as a step; inf, for a parameter of 0, for every
-        leg.
-    altitude_slope_threshold: m above a climbing slope at which the slope is redrawn, 0 for never.
-    climb_slope_height: m over home, below which 4.7 climbs to the leg's end at once; in 4.6 a climb that begins there
-        is a step.
-    tecs_climb_max, tecs_sink_min, tecs_sink_max: m/s.
-    tecs_time: s.  tecs_vertical_acceleration: m/s^2.  tecs_speed_frequency: rad/s.
-    tecs_roll_to_throttle: m/s of climb that a bank of 45 degrees costs.
-    tecs_pitch_max, tecs_pitch_min: rad, 0 for the pitch limits.
-    tecs_height_demand_time: s, lag of the altitude demand.
-    rtl_altitude: m over home, negative for the current altitude.  rtl_radius: m, 0 for wp_loiter_rad.
-    rtl_climb_min: m that an RTL climbs before it turns.  level_roll_limit: rad, its bank limit meanwhile.
+    roll_time, pitch_time: time constants with which roll and pitch follow their demands, s.
+    airspeed_cruise, airspeed_min, airspeed_max: equivalent airspeeds, m/s.
+    airspeed_stall: stall speed at a load factor of 1, m/s; 0 if not stated.
+    stall_prevention: 1 if the load factor limits the bank and raises the minimum airspeed; 0 if not.
+    throttle_min, throttle_max, throttle_cruise: 0..1.
+    throttle_slew: maximum change of the throttle, fraction of its range per second; 0 for no limit.
+    altitude_slope_min: minimum altitude change of a leg that is flown as a slope, m; a smaller change is flown as a
+        step.  The parameter's value 0, which makes every change a step, is stored as inf.
+    altitude_slope_threshold: height above a climbing slope at which the slope is redrawn, m; 0 for never.
+    climb_slope_height: height above home, m, below which 4.7 climbs to the altitude of the leg's end at once; in 4.6 a
+        climb that begins below it is a step.
+    tecs_climb_max, tecs_sink_min, tecs_sink_max: climb and sink rates, m/s.
+    tecs_time: time constant of TECS, s.
+    tecs_vertical_acceleration: m/s^2.
+    tecs_speed_frequency: bandwidth of the airspeed filter, rad/s.
+    tecs_roll_to_throttle: climb rate that a bank of 45 degrees costs, m/s.
+    tecs_pitch_max, tecs_pitch_min: rad; 0 for the pitch limits.
+    tecs_height_demand_time: lag of the altitude demand, s.
+    rtl_altitude: altitude of an RTL above home, m; negative for the current altitude.
+    rtl_radius: radius of the RTL loiter, m; 0 for ``wp_loiter_rad``.
+    rtl_climb_min: height that an RTL climbs before it turns, m.
+    level_roll_limit: bank limit during this climb, rad.
     flight_options: bits; with bit 4 an RTL climbs to its altitude before it turns, with bit 14 climbs are steps.
-    rally_limit: m, the nearest rally point is not flown to if it is further away; 0 for no limit.
+    rally_limit: maximum distance to the nearest rally point, m; an RTL ignores a rally point that is further away.  0
+        for no limit.
     rally_includes_home: 1 if an RTL goes home when home is nearer than any rally point; 0 if not.
     rtl_autoland: 0 if an RTL stays in its loiter; with 1 it continues to the mission's landing sequence, with 2 it goes
         straight there; with 3 the sequence is for go-arounds only; with 4 it uses the mission's return path.
-    terrain_enable: 1 if it has terrain data.  terrain_lookahead: m, distance of the lookahead for rising ground on a
-        leg above terrain; terrain_spacing: m, between its samples.
+    terrain_enable: 1 if ArduPlane has terrain data.
+    terrain_lookahead: distance over which ArduPlane looks ahead for rising ground on a leg above terrain, m.
+    terrain_spacing: distance between the samples of the terrain, m.
     terrain_follow: bits of the modes that follow the terrain.
-    low_voltage, critical_voltage: V.  low_charge, critical_charge: mAh; 0 or less triggers nothing.
-    flare_time: s before touchdown at which the glide aims to flare.  flare_height: m; half the maximum height of the
-        flare.  flare_weight: fraction of the flare that is flown with its final sink rate.
-    landing_sink: m/s, at the flare's end.  landing_airspeed: m/s, negative for the mean of cruise and minimum.
-    landing_head_wind: fraction of the head wind that is added to that, up to the cruise airspeed.
-    takeoff_acceleration: m/s^2 along the nose that starts the motor; 0 if none is needed.
-    takeoff_delay: s after that.
-    takeoff_ground_speed: m/s that is needed by then.  takeoff_rotation: m/s, up to which the nose is at
-        takeoff_ground_pitch (rad).  takeoff_level_height: m, up to which the bank of a take-off is level_roll_limit; it
-        is unrestricted at three times that.  takeoff_leveling: s before its end at which a take-off begins to level
-        off.
-    takeoff_slew: of the throttle's range in a take-off, 1/s; 0 for throttle_slew, negative for no limit.
-    takeoff_throttle: 0..1, 0 for throttle_max.
-    landing_pitch: rad, minimum in the flare.  landing_pitch_max: rad, maximum; 0 for pitch_limit_max.
-    landing_speed_weight: of TECS in a landing, negative for a weight that falls to 0 on the leg.
-    landing_time: s, of TECS.
+    low_voltage, critical_voltage: thresholds, V; 0 or less triggers nothing.
+    low_charge, critical_charge: thresholds, mAh; 0 or less triggers nothing.
+    flare_time: time before touchdown at which the flare begins, s.
+    flare_height: half the maximum height of the flare, m.
+    flare_weight: fraction of the flare that is flown with its final sink rate.
+    landing_sink: sink rate at the end of the flare, m/s.
+    landing_airspeed: airspeed of the landing approach, m/s; negative for the mean of cruise and minimum airspeed.
+    landing_head_wind: fraction of the headwind that is added to the landing airspeed, up to the cruise airspeed.
+    takeoff_acceleration: acceleration along the nose that starts the motor, m/s^2; 0 if none is needed.
+    takeoff_delay: time from this acceleration to the start of the motor, s.
+    takeoff_ground_speed: ground speed that is required at the start of the motor, m/s.
+    takeoff_rotation: airspeed up to which the pitch on the ground is ``takeoff_ground_pitch``, m/s.
+    takeoff_ground_pitch: rad.
+    takeoff_level_height: height, m, up to which the bank of a take-off is limited to ``level_roll_limit``; the bank is
+        not limited above three times this height.
+    takeoff_leveling: time before the end of the take-off at which the aircraft begins to level off, s.
+    takeoff_slew: as ``throttle_slew``, in a take-off; 0 for ``throttle_slew``, negative for no limit.
+    takeoff_throttle: 0..1; 0 for ``throttle_max``.
+    landing_pitch: minimum pitch in the flare, rad.
+    landing_pitch_max: maximum pitch in a landing, rad; 0 for ``pitch_limit_max``.
+    landing_speed_weight: speed weight of TECS in a landing; negative for a weight that falls to 0 on the last leg.
+    landing_time: time constant of TECS in a landing, s.
     flare_damping: gain of the pitch damping in the flare.
-    landing_sink_change: m/s of sink rate for each metre beyond the landing point.  flare_holdoff: m, height at which
-        the final sink rate is reached.
-    fence_type: bits of the limits that its fence has: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
-    altitude_offset: m, added to the altitudes of mission items.  soaring, quadplane, rudder_only: 1 if it soars, has
-        lift motors, or steers by the rudder alone; none of these four is flown.
-    ground_speed_min: m/s, for which the airspeed is raised; 0 for none.
-    airspeed_use: 1 with an airspeed sensor.  roll_rate_p to pitch_rate_ff: gains of the rate controllers.  None of
-        these is flown.
-    throttle_failsafe to fence_auto_enable: causes to leave the mission, and the reactions; see
+    landing_sink_change: increase of the sink rate for each meter beyond the landing point, 1/s.
+    flare_holdoff: height at which the final sink rate is reached, m.
+    fence_type: bits of ArduPlane's own limits: 1 and 8 altitudes, 2 a circle about home, 4 the mission's fence.
+    altitude_offset: altitude that is added to the altitudes of mission items, m; not simulated.
+    soaring, quadplane, rudder_only: 1 if the aircraft soars, has lift motors, or steers by the rudder alone; not
+        simulated.
+    ground_speed_min: minimum ground speed, for which the airspeed is raised, m/s; 0 for none.
+    airspeed_use: 1 with an airspeed sensor; not simulated.
+    roll_rate_p to pitch_rate_ff: gains of the rate controllers; not simulated.
+    throttle_failsafe to fence_auto_enable: events that end the mission, and ArduPlane's reactions; see
         `flight.autopilots.arduplane.failsafes`.
     """
 
     table: ClassVar[ParameterTable] = TABLE
-    not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
+    not_simulated: ClassVar[tuple[str, ...]] = NOT_SIMULATED
     version: ArduPlaneVersion = NEWEST_ARDUPLANE
     notes: tuple[str, ...] = field(default=(), compare=False)
     navl1_period: float = field(init=False)
@@ -447,7 +463,7 @@ class ArduPilotParameters(ParameterSet):
     pitch_rate_ff: float = field(init=False)
 
     def __post_init__(self) -> None:
-        """Convert the values to SI, and refuse a release that is not known."""
+        """Convert the values to SI. Raises ParameterError for an unknown release."""
         if self.version not in _VERSIONS:
             allowed = f"expected {' or '.join(_VERSIONS)}"
             message = f"arduplane_version: {self.version!r}: {allowed}"
@@ -461,13 +477,18 @@ class ArduPilotParameters(ParameterSet):
 
     @classmethod
     def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values in the aircraft's file that the control law reads, or that leave a verdict open."""
+        """Return the values in the aircraft's file that the control law uses, or that may leave a verdict undecided."""
         values, _ = cls.table.read(entries)
         return {name: value for name, value in values.items() if name not in _NEEDED_BY_AIRCRAFT}
 
     @classmethod
     def _without_unknown(cls, sources: list[Stated], *fields: Any) -> tuple[list[Stated], tuple[str, ...]]:
-        """Remove parameters that 4.6 lacks; return the remaining sources, and the removed names of the file."""
+        """Return the sources without the parameters that release 4.6 lacks, and the names removed from the file.
+
+        For 4.6 a further source states the fixed values that 4.6 uses; other releases have all parameters.
+
+        fields: the further arguments of the class, the first of which is the release.
+        """
         if not fields or fields[0] != "4.6":
             return sources, ()
         stated_names = [name for origin, values in sources for name in values if origin == "file"]
@@ -510,11 +531,11 @@ class ArduPilotParameters(ParameterSet):
         return bool(int(self.terrain_follow) & (_FOLLOW_ALWAYS_BIT | _FOLLOW_HOME_BIT))
 
     @property
-    def has_fence_of_its_own(self) -> bool:
+    def has_own_fence(self) -> bool:
         """True if ArduPlane's own fence (a circle about home, or altitude limits) is on and triggers an action.
 
         >>> default = ArduPilotParameters.defaults()
-        >>> [default.changed(FENCE_ENABLE=1, FENCE_TYPE=kind).has_fence_of_its_own for kind in (4, 6)]
+        >>> [default.changed(FENCE_ENABLE=1, FENCE_TYPE=kind).has_own_fence for kind in (4, 6)]
         [False, True]
         """
         enabled = self.fence_enable > 0.0 or self.fence_auto_enable > 0.0

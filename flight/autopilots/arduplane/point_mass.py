@@ -63,7 +63,7 @@ class PointMass(NamedTuple):
     glides: bool = True
 
 
-def point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
+def make_point_mass(aircraft: Aircraft, envelope: Envelope, airspeed: float, wind: Wind) -> PointMass:
     """Return the point mass of an aircraft from its trims, in a wind.
 
     airspeed: commanded equivalent airspeed, m/s.

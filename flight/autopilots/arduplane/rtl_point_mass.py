@@ -80,24 +80,24 @@ RETURN_OFF_TERRAIN = 3
 RETURN_TIMEOUT = 4
 # End of an RTL: it fell below the minimum clearance or distance that the caller demands.
 RETURN_ABORTED = 5
-# Outcome of one simulated RTL.  Heights above ground and distances outside kill spheres in m; threat -1 if none.
+# Outcome of one simulated RTL.  Times in s since the start; heights above ground and distances outside spheres in m.
 RETURN_RESULT = record_dtype(
-    ("ended", np.int64),
-    "seconds",  # to its end
-    "to_circle",  # s, time of the arrival within `LOITER_CAPTURE_RADIUS_M` of the target; NaN without an arrival
-    "circle_up",  # m AMSL, altitude at the arrival
+    ("end_code", np.int64),  # `RETURN_ARRIVED` ... `RETURN_ABORTED`
+    "end_time",
+    "arrival_time",  # of the arrival within `LOITER_CAPTURE_RADIUS_M` of the target; NaN without an arrival
+    "arrival_altitude",  # m AMSL, at the arrival
     "clearance",  # minimum height above ground; after ground contact down to -`MAX_IMPACT_DEPTH_M`
-    "clearance_time",  # s, time of that minimum, or of the first ground contact
+    "clearance_time",  # of that minimum, or of the first ground contact
     "clearance_east",
     "clearance_north",
     "clearance_up",
-    "clearance_before",  # minimum height above ground before the arrival
-    "outside",  # minimum distance outside any kill sphere
-    ("threat", np.int64),
+    "clearance_before_arrival",  # minimum height above ground before the arrival
+    "sphere_distance",  # minimum distance outside the kill spheres
+    ("threat", np.int64),  # index of the sphere at that distance; -1 without spheres
     "threat_time",
-    "outside_before",  # minimum distance outside any kill sphere before the arrival
+    "distance_before_arrival",  # minimum distance outside the kill spheres before the arrival
     "energy",  # Wh, NaN if the envelope has no power data
-    ("rows", np.int64),  # number of stored positions
+    ("position_count", np.int64),  # number of stored positions
 )
 # An RTL has arrived at its loiter within this distance of its target (m), or within
 # `flight.simulation.tick.RTL_ARRIVAL_LOITER_RADII` of its radii.  Flights of ArduPlane were compared up to there.
@@ -141,15 +141,15 @@ class ReturnEnvironment:
 class SimulatedReturns:
     """Simulated RTLs.
 
-    flown: (n,) of `RETURN_RESULT`.
-    ways: n arrays (t, 3) of positions at intervals of 1 s, m; empty if positions were not stored.
+    results: outcomes, (n,) of dtype `RETURN_RESULT`.
+    tracks: n arrays (t, 3) of positions at intervals of 1 s, m; empty if positions were not stored.
     """
 
-    flown: Records
-    ways: tuple[Floats, ...] = ()
+    results: Records
+    tracks: tuple[Floats, ...] = ()
 
 
-def surroundings(scenario: Scenario) -> ReturnEnvironment:
+def make_return_environment(scenario: Scenario) -> ReturnEnvironment:
     """Return the terrain and the kill spheres of a scenario, for simulated RTLs."""
     threats, terrain = scenario.threats, scenario.terrain
     spheres, radii = threats.position.reshape(-1, 3), threats.kill_radius
@@ -167,8 +167,8 @@ def fly_returns(
     environment: ReturnEnvironment,
     *,
     landings: Sequence[LandingStart | None] = (),
-    keep: bool = False,
-    least: tuple[Floats, Floats] | None = None,
+    store_positions: bool = False,
+    abort_limits: tuple[Floats, Floats] | None = None,
     engine_out: bool = False,
 ) -> SimulatedReturns:
     """Simulate an RTL from each of n starts.
@@ -176,28 +176,28 @@ def fly_returns(
     starts: (n,) of `RETURN_START`.
     targets: n loiters, the target of each start; None to go straight to the landing sequence.
     landings: n landing sequences to join after the loiter, up to their end or first loiter, or None; or no sequences.
-    keep: True to store the positions.
-    least: (n,) heights above ground and (n,) distances outside spheres, m, below which an RTL is aborted.
+    store_positions: True to store the positions.
+    abort_limits: heights above ground, (n,), and distances outside spheres, (n,), m, below which an RTL is aborted.
     engine_out: True after an engine failure: the aircraft flies on for `ENGINE_FAILURE_REACTION_S`, and the RTL ends at
         its loiter.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.autopilots.arduplane.parameters import ArduPilotParameters
-    >>> from flight.autopilots.arduplane.point_mass import point_mass
+    >>> from flight.autopilots.arduplane.point_mass import make_point_mass
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from world.scenario import load_scenario
     >>> from world.wind import Wind
     >>> scenario, aerosonde = load_scenario("jacksboro"), load_aircraft("aerosonde")
     >>> start = np.zeros(1, RETURN_START)
     >>> start["up"], start["velocity_north"] = 1000.0, 26.0
-    >>> flown = fly_returns(
+    >>> result = fly_returns(
     ...     start,
     ...     [ReturnCircle(0.0, 4000.0, 900.0, 120.0)],
     ...     ArduPilotParameters.load(aerosonde),
-    ...     point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
-    ...     surroundings(scenario),
-    ... ).flown[0]
-    >>> int(flown["ended"]) == RETURN_ARRIVED, bool(140.0 < flown["to_circle"] < 160.0)
+    ...     make_point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
+    ...     make_return_environment(scenario),
+    ... ).results[0]
+    >>> int(result["end_code"]) == RETURN_ARRIVED, bool(140.0 < result["arrival_time"] < 160.0)
     (True, True)
     """
     stages = [
@@ -206,11 +206,13 @@ def fly_returns(
     ]
     if engine_out:
         stages = [np.concatenate([waypoint_ahead(start), route]) for start, route in zip(starts, stages, strict=True)]
-    flown = np.zeros(len(starts), RETURN_RESULT)
+    results = np.zeros(len(starts), RETURN_RESULT)
     timeouts = [rtl_timeout(start, route, aircraft) for start, route in zip(starts, stages, strict=True)]
-    positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if keep else 0, 3))
-    ways, record = [], parameters.record()
-    min_clearances, min_outsides = (np.full(len(starts), -math.inf),) * 2 if least is None else least
+    positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if store_positions else 0, 3))
+    tracks, record = [], parameters.record()
+    min_clearances, min_sphere_distances = (
+        (np.full(len(starts), -math.inf),) * 2 if abort_limits is None else abort_limits
+    )
     for k, route in enumerate(stages):
         fly_stages(
             starts[k],
@@ -228,14 +230,14 @@ def fly_returns(
             environment.known,
             timeouts[k],
             float(min_clearances[k]),
-            float(min_outsides[k]),
+            float(min_sphere_distances[k]),
             engine_out,
             positions,
-            flown[k],
+            results[k],
         )
-        if keep:
-            ways.append(positions[: int(flown[k]["rows"])].copy())
-    return SimulatedReturns(flown, tuple(ways))
+        if store_positions:
+            tracks.append(positions[: int(results[k]["position_count"])].copy())
+    return SimulatedReturns(results, tuple(tracks))
 
 
 def _make_stages(
@@ -321,7 +323,7 @@ def fly_stages(
     has_terrain: bool,
     timeout: float,
     min_clearance: float,
-    min_outside: float,
+    min_sphere_distance: float,
     engine_out: bool,
     positions: Floats,
     result: Record,
@@ -329,9 +331,12 @@ def fly_stages(
     """Simulate the flight from stage to stage for at most ``timeout`` s, and fill in ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    climb, climb_parameters: climb at the start, a record of `CLIMB`, and the control parameters during the climb.
-    min_clearance, min_outside: height above ground and distance outside spheres, m, below which the flight is aborted.
-    positions, result: (t, 3) array to fill with one position per second, until full, and a record of `RETURN_RESULT`.
+    climb: climb at the start, a record of `CLIMB`.
+    climb_parameters: control parameters during the climb, a record like `parameters`.
+    min_clearance: height above ground below which the flight is aborted, m.
+    min_sphere_distance: distance outside the kill spheres below which the flight is aborted, m.
+    positions: array (t, 3), m, to fill with one position per second until it is full.
+    result: record of `RETURN_RESULT` to fill.
     """
     # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
@@ -353,17 +358,19 @@ def fly_stages(
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas2tas * eas2tas
         if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):
             _record_arrival(estimated, time, engine_out, result)
-        result.seconds = time
+        result.end_time = time
         _update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
-        if result.ended == RETURN_TIMEOUT and (result.clearance < min_clearance or result.outside < min_outside):
-            result.ended = RETURN_ABORTED
-        if result.ended != RETURN_TIMEOUT:
+        if result.end_code == RETURN_TIMEOUT and (
+            result.clearance < min_clearance or result.sphere_distance < min_sphere_distance
+        ):
+            result.end_code = RETURN_ABORTED
+        if result.end_code != RETURN_TIMEOUT:
             break
         if _is_stage_complete(
             estimated, target, memory, loiter, climb, engine_out and stage == 0, stage == 0, time, is_last, radius, dt
         ):
             if is_last:
-                result.ended = RETURN_ARRIVED
+                result.end_code = RETURN_ARRIVED
                 break
             stage += 1
             _load_stage(stages, stage, waypoints, estimated, memory)
@@ -379,7 +386,7 @@ def fly_stages(
         throttle = 0.0 if engine_out else memory.throttle_demand
         energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, dt)
     if result.clearance <= 0.0:
-        result.ended = RETURN_GROUND_IMPACT
+        result.end_code = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     are_arrays_alive = motions.size + states.size + memories.size + progress_records.size + spaced.size == 10
     result.energy = energy / 3600.0 if aircraft.has_power and are_arrays_alive else math.nan
@@ -398,23 +405,27 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
 @inner
 def _store_position(estimated: Record, positions: Floats, result: Record) -> None:
     """Append the present position to the stored positions, unless the array is full."""
-    if result.rows < positions.shape[0]:
-        positions[result.rows, 0], positions[result.rows, 1], positions[result.rows, 2] = (
+    if result.position_count < positions.shape[0]:
+        (
+            positions[result.position_count, 0],
+            positions[result.position_count, 1],
+            positions[result.position_count, 2],
+        ) = (
             estimated.east,
             estimated.north,
             estimated.up,
         )
-        result.rows += 1
+        result.position_count += 1
 
 
 @inner
 def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Record) -> None:
     """Record time and altitude of the first arrival at the loiter; without an engine, end the RTL there."""
-    if math.isnan(result.to_circle):
-        result.to_circle, result.circle_up = time, estimated.up
+    if math.isnan(result.arrival_time):
+        result.arrival_time, result.arrival_altitude = time, estimated.up
         if engine_out:
             # Without an engine the aircraft descends in circles there.
-            result.ended = RETURN_ARRIVED
+            result.end_code = RETURN_ARRIVED
 
 
 @inner
@@ -527,10 +538,10 @@ def _initialise_outcome(
     estimated.east, estimated.north, estimated.up = start.east, start.north, start.up
     estimated.velocity_east, estimated.velocity_north = start.velocity_east, start.velocity_north
     estimated.velocity_up = start.velocity_up
-    result.clearance = result.clearance_before = math.inf if has_terrain else math.nan
+    result.clearance = result.clearance_before_arrival = math.inf if has_terrain else math.nan
     result.threat = -1
-    result.outside, result.outside_before = math.inf, math.inf
-    result.to_circle, result.circle_up, result.energy, result.ended, result.rows = (
+    result.sphere_distance, result.distance_before_arrival = math.inf, math.inf
+    result.arrival_time, result.arrival_altitude, result.energy, result.end_code, result.position_count = (
         math.nan,
         math.nan,
         0.0,
@@ -541,7 +552,7 @@ def _initialise_outcome(
 
 @inner
 def _load_stage(stages: Records, index: int, waypoints: Records, estimated: Record, memory: Record) -> None:
-    """Make the stage with the given index the target of a new leg.
+    """Start a new leg to the stage with the given index.
 
     The leg starts at the previous stage, or at the aircraft if there is none or the aircraft is already past this leg.
     Waypoints 1 and 2 both become a copy of the stage.
@@ -704,20 +715,20 @@ def _update_clearances(
             estimated.up - spheres[m, 2],
         )
         sphere_distance = math.sqrt(offset_e * offset_e + offset_n * offset_n + offset_up * offset_up) - radius
-        if sphere_distance < result.outside:
-            result.outside, result.threat, result.threat_time = sphere_distance, m, time
-        if math.isnan(result.to_circle):
-            result.outside_before = min(result.outside_before, sphere_distance)
+        if sphere_distance < result.sphere_distance:
+            result.sphere_distance, result.threat, result.threat_time = sphere_distance, m, time
+        if math.isnan(result.arrival_time):
+            result.distance_before_arrival = min(result.distance_before_arrival, sphere_distance)
     if not has_terrain:
         return
     clearance = estimated.up - ground_height(heights, to_pixel, estimated.east, estimated.north)
     if math.isnan(clearance):
-        result.ended = RETURN_OFF_TERRAIN
+        result.end_code = RETURN_OFF_TERRAIN
         return
     if clearance < result.clearance:
         if result.clearance > 0.0:
-            if math.isnan(result.to_circle):
-                result.clearance_before = clearance
+            if math.isnan(result.arrival_time):
+                result.clearance_before_arrival = clearance
             result.clearance_time = time
             result.clearance_east, result.clearance_north, result.clearance_up = (
                 estimated.east,
@@ -726,4 +737,4 @@ def _update_clearances(
             )
         result.clearance = clearance
     if clearance <= -MAX_IMPACT_DEPTH_M:
-        result.ended, result.seconds = RETURN_GROUND_IMPACT, result.clearance_time
+        result.end_code, result.end_time = RETURN_GROUND_IMPACT, result.clearance_time

@@ -53,9 +53,9 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
         """Checks of the simulated ArduPlane, without battery failsafes: the program flies with them switched off."""
         return replace(super().checks, battery_failsafes=())
 
-    def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
+    def describe_settings_ignored_by_program(self, mission: MissionParts) -> list[str]:
         """Describe the settings that the program does not receive, or that have no effect on its simulated flight."""
-        settings = self.settings_not_flown(mission, by_program=True)
+        settings = self.describe_unsimulated_settings(mission, by_program=True)
         return [text for text in settings if not text.startswith(_FLOWN_BY_PROGRAM)]
 
     @property

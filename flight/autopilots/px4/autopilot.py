@@ -200,18 +200,18 @@ class Px4(Autopilot):
         2
         """
         parameters = self.parameters
-        is_stated = parameters.is_whole_set or "MIS_TKO_LAND_REQ" in parameters.by_origin("file")
+        is_stated = parameters.is_complete_set or "MIS_TKO_LAND_REQ" in parameters.by_origin("file")
         return MissionChecks(
             dialect="px4",
             feasibility=FeasibilityLimits(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated),
             battery_failsafes=self._battery_failsafes(),
-            settings_not_flown=partial(self.settings_not_flown, by_program=False),
+            describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
         )
 
-    def settings_not_flown(self, mission: MissionParts, *, by_program: bool) -> list[str]:
+    def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:
         """Describe settings that end a mission or change its flight, but are not simulated.
 
-        by_program: True for a flight of PX4's own program, which flies more settings.
+        by_program: True for a flight of PX4's own program, in which more settings have an effect.
         """
         # `FeasibilityChecker` refuses a mission beyond GF_MAX_*, whatever GF_ACTION is.
         parameters, ending_names = self.parameters, ["COM_FLT_TIME_MAX", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"]

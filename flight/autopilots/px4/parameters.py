@@ -1,4 +1,4 @@
-"""PX4's parameters for fixed-wing missions, in SI units and radians.
+"""Define PX4's parameters for fixed-wing missions, in SI units and radians.
 
 Names, units, ranges and defaults are from PX4's parameter reference (docs.px4.io, v1.16 and v1.17) and the `*_params.c`
 files next to the modules that read them.  PX4 itself enforces no range: a value outside the documented range is
@@ -108,7 +108,7 @@ DEFINITIONS = {
     "max_flight_time": Definition("COM_FLT_TIME_MAX", -1.0, -1.0, 1e6),
 }
 # Parameters that are read but not simulated with a value other than PX4's default.
-NOT_FLOWN = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
+NOT_SIMULATED = tuple(definition.name for definition in list(DEFINITIONS.values())[-19:])
 # Minimum number of parameters in a complete set: a ground station saves more than a thousand.
 _COMPLETE_SET_COUNT = 300
 # Parameters whose values should not decrease from one to the next; PX4 warns of some such values and flies with them.
@@ -168,7 +168,7 @@ _OUTPUT_COUNT_BY_DRIVER = {
 OUTPUT_FUNCTION_NAMES = tuple(
     f"{driver}_FUNC{output}" for driver, count in _OUTPUT_COUNT_BY_DRIVER.items() for output in range(1, count + 1)
 )
-# Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.settings_not_flown`).
+# Parameters that may leave a verdict undecided (`flight.autopilots.px4.autopilot.Px4.describe_unsimulated_settings`).
 _WHEN_STATED = {
     "ASPD_PRIMARY": 1.0,
     "BAT_CRIT_THR": 0.07,
@@ -224,7 +224,7 @@ TABLE = ParameterTable(
 
 @dataclass(frozen=True, slots=True)
 class Px4Parameters(ParameterSet):
-    r"""Parameters with which PX4 flies.
+    r"""Parameters of PX4.
 
     version: release of PX4.
 
@@ -235,9 +235,9 @@ class Px4Parameters(ParameterSet):
     56.0
     >>> Px4Parameters.of_text("1\t1\tNAV_ACC_RAD\t30.0\t9\n1\t1\tBAT1_N_CELLS\t3\t6\n", "mine.params").unused
     ('BAT1_N_CELLS',)
-    >>> Px4Parameters.of_text("FW_R_LIM 30", "mine.params").beyond
+    >>> Px4Parameters.of_text("FW_R_LIM 30", "mine.params").outside_documented_ranges
     ('FW_R_LIM 30 (35..75)',)
-    >>> Px4Parameters.of_text("FW_AIRSPD_TRIM 25", "mine.params").misfits
+    >>> Px4Parameters.of_text("FW_AIRSPD_TRIM 25", "mine.params").contradictions
     ('FW_AIRSPD_TRIM 25 of the file is above FW_AIRSPD_MAX 20 of the defaults',)
     >>> made, notes = Px4Parameters.of_log({"NAV_ACC_RAD": -5.0, "FW_R_LIM": 45.0}, "a.ulg", "1.16")
     >>> made.by_origin("file"), notes
@@ -245,7 +245,7 @@ class Px4Parameters(ParameterSet):
     """
 
     table: ClassVar[ParameterTable] = TABLE
-    not_flown: ClassVar[tuple[str, ...]] = NOT_FLOWN
+    not_simulated: ClassVar[tuple[str, ...]] = NOT_SIMULATED
     version: Px4Version = NEWEST_PX4
 
     def __post_init__(self) -> None:
@@ -257,7 +257,10 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _read_aircraft_values(cls, entries: Mapping[str, Entry]) -> dict[str, float]:
-        """Return the values of the aircraft's file that PX4 also has, limited to PX4's ranges."""
+        """Return the values of ArduPlane's parameters in the aircraft's file as PX4's parameters, within PX4's ranges.
+
+        Parameters that PX4 does not have are omitted.
+        """
         values = {}
         for name, entry in entries.items():
             if name in FROM_ARDUPILOT:
@@ -268,11 +271,14 @@ class Px4Parameters(ParameterSet):
 
     @classmethod
     def _is_set_on_purpose(cls, definition: Definition, value: float) -> bool:
-        """Return False for the default value of a parameter that is not simulated: stations save every parameter."""
-        return definition.name not in NOT_FLOWN or value != definition.default
+        """Return False for the default value of a parameter that is not simulated.
+
+        A ground station saves every parameter, so a default value in a file does not show what the user wants.
+        """
+        return definition.name not in NOT_SIMULATED or value != definition.default
 
     @property
-    def is_whole_set(self) -> bool:
+    def is_complete_set(self) -> bool:
         """True if the user's file is a complete set: a parameter that it lacks has the default of the release."""
         return len(self.unused) + len(self.by_origin("file")) >= _COMPLETE_SET_COUNT
 

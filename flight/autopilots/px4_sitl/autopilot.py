@@ -44,9 +44,9 @@ class Px4Sitl(ProgramAutopilot, Px4):
         """Simulated PX4 with the same parameters."""
         return Px4(self.parameters)
 
-    def settings_not_flown_by_program(self, mission: MissionParts) -> list[str]:
+    def describe_settings_ignored_by_program(self, mission: MissionParts) -> list[str]:
         """Describe the settings that have no effect on a flight of PX4's program in planfly's physics."""
-        return self.settings_not_flown(mission, by_program=True)
+        return self.describe_unsimulated_settings(mission, by_program=True)
 
     def store(self) -> StoredAutopilot:
         """Return the settings of the simulated PX4, and the program."""

@@ -25,7 +25,7 @@ from logs.importers.columns.quantities import (
     QUATERNION,
     UNIT_ZEROS,
     UNITS,
-    better_unit,
+    likelier_unit,
     to_frame,
 )
 from world.arrays import Flags, Floats
@@ -420,7 +420,7 @@ class ColumnLog:
         factor = UNITS[limits.dimension][entry.unit]
         largest = float(known[np.argmax(np.abs(known))])
         zero = UNIT_ZEROS.get(entry.unit, 0.0)
-        unit = better_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
+        unit = likelier_unit(quantity, entry.unit, float(np.quantile(np.abs(known - zero), 0.98)) / factor)
         hint = f"; is it in {unit}?" if unit else ""
         shown = f"{(largest - zero) / factor:.4g} {entry.unit}".rstrip()
         bounds = " to ".join(f"{(limit - zero) / factor:.4g}" for limit in (limits.low, limits.high))

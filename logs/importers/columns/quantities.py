@@ -128,17 +128,19 @@ def to_frame(quantity: str, frame: str) -> tuple[float, float]:
     return (-1.0 if _NEGATED_BY_FRAME.get(quantity) == frame else 1.0), 0.0
 
 
-def better_unit(quantity: str, unit: str, size: float) -> str:
-    """Return the unit that the values are more likely to be in: the same numbers are plausible; "" if there is none.
+def likelier_unit(quantity: str, unit: str, magnitude: float) -> str:
+    """Return another unit in which the same numbers would be plausible, "" if there is none.
 
-    size: magnitude of the numbers, which were read as values in ``unit``.
+    magnitude: typical number in the data, which was read as a value in ``unit``.
 
-    >>> better_unit("roll", "rad", 179.0), better_unit("throttle", "fraction", 85.0), better_unit("roll", "deg", 9e9)
-    ('deg', '%', '')
+    >>> likelier_unit("roll", "rad", 179.0), likelier_unit("throttle", "fraction", 85.0)
+    ('deg', '%')
+    >>> likelier_unit("roll", "deg", 9e9)
+    ''
     """
     entry = QUANTITIES[quantity]
     for other in UNITS[entry.dimension]:
-        value = size * UNITS[entry.dimension][other] + UNIT_ZEROS.get(other, 0.0)
+        value = magnitude * UNITS[entry.dimension][other] + UNIT_ZEROS.get(other, 0.0)
         if other != unit and entry.low <= value <= entry.high:
             return other
     return ""

@@ -153,9 +153,10 @@ def _area_hazards(requirements: RouteRequirements, center: Floats, reach: float)
 
 
 def _ring_points(center: Floats, reach: float, spacing: float) -> Floats:
-    """Return points on rings around a center out to the reach, m, (n, 2).
+    """Return points on concentric rings that cover the circle of radius ``reach`` around a center, m, (n, 2).
 
-    spacing: distance between the rings, m, within the limits on their number; 0 for the minimum number.
+    spacing: desired distance between rings, m; the number of rings is clamped to `_MIN_RINGS`..`_MAX_RINGS`, and a
+        spacing of 0 gives `_MIN_RINGS`.
     """
     count = min(_MAX_RINGS, max(_MIN_RINGS, math.ceil(reach / spacing) if spacing > 0.0 else _MIN_RINGS))
     # A polygon circumscribed about its circle leaves no gap between the last ring and the reach.

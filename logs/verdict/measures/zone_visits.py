@@ -159,7 +159,7 @@ def max_violation_bound(records: ZoneRecords, z: int, move: Record, part: Record
 # Visit of a path to one zone.  depth: largest depth of a violation, m, negative if the path complies.  It is exact if
 # it is positive, and for the zone that is nearest to being violated; for all others it is an upper bound.  at_time,
 # at_east, at_north, at_up, at_leg: time, position and leg of the largest depth.  entries: number of violations.
-# beyond: total duration of the violations, s.  entry and exit: start of the first violation and end of the last.
+# violation_time: total duration of the violations, s.  entry and exit: start of the first violation, end of the last.
 # unknown: True if a part of the path is above unknown ground and the zone has a limit above ground.
 VISIT = record_dtype(
     "depth",
@@ -169,7 +169,7 @@ VISIT = record_dtype(
     "at_up",
     ("at_leg", np.int64),
     ("entries", np.int64),
-    "beyond",
+    "violation_time",
     "entry_time",
     "entry_east",
     "entry_north",
@@ -437,7 +437,7 @@ def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> Non
     elif end_depth <= 0.0:
         exit_fraction = entry_fraction + (exit_fraction - entry_fraction) * start_depth / (start_depth - end_depth)
     entry_time, exit_time = move.time + entry_fraction * move.lasts, move.time + exit_fraction * move.lasts
-    visit.beyond += exit_time - entry_time
+    visit.violation_time += exit_time - entry_time
     if visit.entries == 0 or entry_time > visit.exit_time + _MERGE_TIME_S:
         visit.entries += 1
         if visit.entries == 1:

@@ -19,7 +19,7 @@ from aircraft.catalog import Aircraft, find_logged_aircraft
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.failsafes import Cause, failsafe_causes
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.point_mass import PointMass, point_mass
+from flight.autopilots.arduplane.point_mass import PointMass, make_point_mass
 from flight.autopilots.arduplane.rtl_point_mass import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
@@ -27,7 +27,7 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     RETURN_TIMEOUT,
     ReturnEnvironment,
     fly_returns,
-    surroundings,
+    make_return_environment,
 )
 from flight.mission.items import LANDINGS, Command
 from flight.mission.placing import landing_starts, return_points
@@ -273,7 +273,7 @@ def badness(ret: SimulatedReturn) -> tuple[int, float]:
 
 @dataclass(frozen=True, slots=True)
 class ReturnWorld:
-    """Data that determine the outcome of returns, except their starts.
+    """Data that determine the outcomes of simulated returns to launch, except the starts of the returns.
 
     parameters: ArduPlane's parameters.
     home, rally: positions on the map.
@@ -332,7 +332,7 @@ class ReturnWorld:
     @property
     def endings(self) -> tuple[Ending, ...]:
         """All ways in which returns end, RTL's first."""
-        has_landing = any(cause.does == "land" for cause in self.causes) and self.ending != "straight to land"
+        has_landing = any(cause.action == "land" for cause in self.causes) and self.ending != "straight to land"
         return (self.ending, "straight to land") if has_landing else (self.ending,)
 
     @property
@@ -341,7 +341,7 @@ class ReturnWorld:
         reasons: dict[UnjudgedPart, bool] = {
             "terrain": self.parameters.rtl_follows_terrain,
             "law": self.has_other_law,
-            "autoland": any(cause.does == "autoland" for cause in self.causes),
+            "autoland": any(cause.action == "autoland" for cause in self.causes),
             "return path": int(self.parameters.rtl_autoland) == 4 and _has_return_path(self.setup),
             "landing": any(ending != "circle" for ending in self.endings)
             and any(landing.is_landing for landing in self.landings),
@@ -387,8 +387,8 @@ def _has_return_path(setup: FlightSetup) -> bool:
     return any(item.command in (Command.DO_RETURN_PATH_START, Command.DO_LAND_START) for item in setup.mission.items)
 
 
-def return_world(setup: FlightSetup) -> ReturnWorld:
-    """Collect the data that determine the returns of a setup's mission.
+def make_return_world(setup: FlightSetup) -> ReturnWorld:
+    """Collect the data with which returns to launch from a setup's mission are simulated.
 
     The control law is ArduPlane's, with the setup's parameters if it has any, otherwise with the aircraft's parameters.
     Raises MissionError for a mission without a home, and FlightError for an aircraft that cannot be loaded.
@@ -408,8 +408,8 @@ def return_world(setup: FlightSetup) -> ReturnWorld:
         parameters,
         return_positions[0],
         return_positions[1:],
-        point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
-        surroundings(setup.scenario),
+        make_point_mass(aircraft, setup.envelope, setup.airspeed, setup.scenario.wind),
+        make_return_environment(setup.scenario),
         judged_airspace(setup),
         setup_parameters is not parameters,
         setup_parameters is not None and setup_parameters is not parameters,
@@ -510,16 +510,16 @@ def simulate_returns(
     world: ReturnWorld,
     starts: ReturnStarts,
     targets: Sequence[ReturnTarget],
-    limits: tuple[Floats, Floats] | None = None,
+    abort_limits: tuple[Floats, Floats] | None = None,
     *,
-    keep_paths: bool = False,
+    store_paths: bool = False,
 ) -> tuple[Records, tuple[Floats, ...]]:
     """Simulate returns from n starts to their targets.
 
     Returns the results, (n,) of dtype `RETURN_RESULT`, and the paths; the paths are empty without zones.
 
-    limits: the argument ``least`` of `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
-    keep_paths: True to return the paths also without zones.
+    abort_limits: as in `flight.autopilots.arduplane.rtl_point_mass.fly_returns`.
+    store_paths: True to return the paths even without zones.
     """
     radius = ArduPlane(world.parameters).returns.rules.radius
     circles = [
@@ -527,7 +527,7 @@ def simulate_returns(
     ]
     # A landing is not simulated: a return whose landing sequence begins with the landing ends at its loiter.
     landings = [target.landing if target.landing and not target.landing.is_landing else None for target in targets]
-    keep_paths = keep_paths or bool(world.airspace.zones)
+    store_paths = store_paths or bool(world.airspace.zones)
     result = fly_returns(
         starts.rows,
         circles,
@@ -535,10 +535,10 @@ def simulate_returns(
         world.aircraft,
         world.environment,
         landings=landings,
-        keep=keep_paths,
-        least=limits,
+        store_positions=store_paths,
+        abort_limits=abort_limits,
     )
-    return result.flown, result.ways
+    return result.results, result.tracks
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
@@ -567,20 +567,20 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
     energy_left: energy left at the end, Wh; NaN if unknown.
     required_height: required height above ground, m.
     """
-    if result["ended"] == RETURN_GROUND_IMPACT:
+    if result["end_code"] == RETURN_GROUND_IMPACT:
         return "ground"
-    if result["threat"] >= 0 and result["outside"] <= 0.0:
+    if result["threat"] >= 0 and result["sphere_distance"] <= 0.0:
         return "threat"
     if zone >= 0:
         return "zone"
-    if result["ended"] == RETURN_TIMEOUT:
+    if result["end_code"] == RETURN_TIMEOUT:
         return "lost"
     if energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery:
         return "energy"
     if result["clearance"] < required_height - CLEARANCE_TOLERANCE_M:
         # A return that was too low is not judged better by an unknown rest of its path.
         return "low"
-    if result["ended"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
+    if result["end_code"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
         return "unknown"
     battery = world.setup.battery
     max_energy_used = (battery - energy_left) * math.exp(UNDECIDED_FRACTION * world.setup.envelope.power_sd)
@@ -615,12 +615,12 @@ def _judge_return(
             float(result["clearance_north"]),
             float(result["clearance_up"]),
         ),
-        sphere_distance=float(result["outside"]),
+        sphere_distance=float(result["sphere_distance"]),
         threat=int(result["threat"]),
         zone=zone,
         energy=float(result["energy"]),
         energy_left=energy_left,
-        time_to_loiter=float(result["to_circle"]),
+        time_to_loiter=float(result["arrival_time"]),
         required_height=required_height,
         energy_used=float(starts.energy_used[k]),
     )
@@ -709,17 +709,17 @@ def _with_offsets(
     """Return a copy of a return with offsets added to its clearance and its distance outside spheres, m."""
     corrected_result = result.copy()
     corrected_result["clearance"] += height_offset
-    corrected_result["outside"] += distance_offset
+    corrected_result["sphere_distance"] += distance_offset
     if corrected_result["clearance"] <= 0.0:
-        corrected_result["ended"] = RETURN_GROUND_IMPACT
-    elif corrected_result["ended"] == RETURN_GROUND_IMPACT:
+        corrected_result["end_code"] = RETURN_GROUND_IMPACT
+    elif corrected_result["end_code"] == RETURN_GROUND_IMPACT:
         # The simulation continued after it grazed the ground: energy and zones cover the whole path.
-        corrected_result["ended"] = RETURN_TIMEOUT if math.isnan(ret.time_to_loiter) else RETURN_ARRIVED
+        corrected_result["end_code"] = RETURN_TIMEOUT if math.isnan(ret.time_to_loiter) else RETURN_ARRIVED
     kind = classify_return(world, corrected_result, ret.zone, ret.energy_left, ret.required_height)
     return replace(
         ret,
         clearance=float(corrected_result["clearance"]),
-        sphere_distance=float(corrected_result["outside"]),
+        sphere_distance=float(corrected_result["sphere_distance"]),
         kind=kind,
     )
 

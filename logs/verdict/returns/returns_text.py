@@ -209,13 +209,13 @@ def describe_causes(causes: tuple[Cause, ...]) -> list[str]:
         """Return the parameter of an event and its value in brackets."""
         return f" ({cause.parameter} {cause.value})" if cause.parameter else ""
 
-    returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.returns]
+    returning = [f"{cause.name}{setting_text(cause)}" for cause in causes if cause.is_return]
     lines = [f"it returns: {', '.join(returning)}"] if returning else []
     for heading, is_landing in (("it lands", True), ("it does not", False)):
         other_causes: dict[str, list[str]] = {}
         for cause in causes:
-            if not cause.returns and (cause.does in ("land", "autoland")) == is_landing:
-                other_causes.setdefault(_ACTION_TEXTS[cause.does], []).append(f"{cause.name}{setting_text(cause)}")
+            if not cause.is_return and (cause.action in ("land", "autoland")) == is_landing:
+                other_causes.setdefault(_ACTION_TEXTS[cause.action], []).append(f"{cause.name}{setting_text(cause)}")
         text = [f"{', '.join(names)}: {action}" for action, names in other_causes.items()]
         lines += [f"{heading}: {'; '.join(text)}"] if text else []
     return lines

@@ -113,7 +113,7 @@ def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
 
 def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
     """Return a mask of the returns that arrive and keep the required height above ground, (n,)."""
-    return np.asarray((results["ended"] == RETURN_ARRIVED) & (results["clearance"] >= limits.clearance))
+    return np.asarray((results["end_code"] == RETURN_ARRIVED) & (results["clearance"] >= limits.clearance))
 
 
 def _meets_all(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
@@ -121,7 +121,7 @@ def _meets_all(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> F
 
     `_meets_criterion` checks zones and energy.
     """
-    return np.asarray(_clears_ground(world, results, limits) & (results["outside"] >= limits.sphere_distance))
+    return np.asarray(_clears_ground(world, results, limits) & (results["sphere_distance"] >= limits.sphere_distance))
 
 
 Criterion = Callable[[ReturnWorld, Records, _ReturnLimits], Flags]

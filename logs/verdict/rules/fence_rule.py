@@ -149,7 +149,7 @@ def _zone_finding(
         faults.append(
             message(
                 f"{visit.depth:.1f} m {side_text}",
-                f" at {_event_text(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
+                f" at {_event_text(requirements, visit, 'at')}, for {visit.violation_time:.1f} s in all:"
                 f" {entry_text} at {_event_text(requirements, visit, 'entry')}"
                 f" and {exit_text} at {_event_text(requirements, visit, 'exit')}"
                 + (f"; {visit.entries} violations" if visit.entries > 1 else ""),
@@ -184,7 +184,7 @@ def _zone_finding(
 
 def _visit_facts(visit: Record) -> list[Fact]:
     """Return the violation's duration, its number of entries, and time, position and leg of entry and exit."""
-    facts = [Fact("time beyond", visit.beyond, "s"), Fact("entries", float(visit.entries), "1")]
+    facts = [Fact("time beyond", visit.violation_time, "s"), Fact("entries", float(visit.entries), "1")]
     for event in ("entry", "exit"):
         for coordinate, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
             facts.append(Fact(f"{event} {coordinate}", float(visit[f"{event}_{coordinate}"]), unit))

@@ -34,7 +34,7 @@ from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.returns.judge_returns import ReturnWorld, return_world
+from logs.verdict.returns.judge_returns import ReturnWorld, make_return_world
 from logs.verdict.rule import Rule
 from logs.verdict.tolerances import (
     EARLY_TOUCHDOWN_DISTANCE_M,
@@ -263,7 +263,7 @@ def _go_around_finding(
         f" {landing.home_altitude + height - landing.ground_altitude:.0f} m above the landing point"
     )
     # A go-around flies to no rally point.
-    world = return_world(replace(setup, mission=replace(setup.mission, rally=())))
+    world = make_return_world(replace(setup, mission=replace(setup.mission, rally=())))
     go_arounds = (
         []
         if landing.unknown_path_text
@@ -372,7 +372,7 @@ def _simulate_go_arounds(
             top_altitude,
         )
         for (distance, place, height_above_ground), row, path, destination in zip(
-            airborne, results.flown, results.ways, results.landings, strict=True
+            airborne, results.results, results.tracks, results.landings, strict=True
         )
     ]
 
@@ -394,7 +394,7 @@ def _judge_go_around(
     destination: destination of the go-around.
     top_altitude: altitude above which the climb is over, m AMSL.
     """
-    climb_end, end_status = count_climb_rows(positions, top_altitude), int(result["ended"])
+    climb_end, end_status = count_climb_rows(positions, top_altitude), int(result["end_code"])
     go_around = go_around._replace(
         is_lost=end_status == RETURN_TIMEOUT,
         unknown_part_text=_unknown_part_text(end_status, has_climbed=climb_end < len(positions)),

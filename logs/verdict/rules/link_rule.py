@@ -14,7 +14,7 @@ from logs.verdict.measures.link_outages import LinkAlongPath, Outage, link_along
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, return_world
+from logs.verdict.returns.judge_returns import ReturnWorld, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import ReturnStarts, flown_starts, planned_starts
 from logs.verdict.returns.returns_text import headline
 from logs.verdict.rule import LogNeeds, Rule
@@ -80,16 +80,16 @@ def _loss_reaction(requirements: RouteRequirements, link: RadioLink) -> Cause | 
 
     Return None if ArduPlane continues its mission, or if its reaction is unknown.
     """
-    world = _return_world(requirements)
+    world = _make_return_world(requirements)
     causes = () if world is None else world.causes
     reactions = [cause for cause in causes if cause.name in _LOSS_CAUSES[link.use]]
-    return next((cause for cause in reactions if cause.does not in ("on", "never", "landed")), None)
+    return next((cause for cause in reactions if cause.action not in ("on", "never", "landed")), None)
 
 
-def _return_world(requirements: RouteRequirements) -> ReturnWorld | None:
+def _make_return_world(requirements: RouteRequirements) -> ReturnWorld | None:
     """Return the conditions for simulated returns, or None for a mission without a home."""
     try:
-        return return_world(requirements.setup)
+        return make_return_world(requirements.setup)
     except MissionError:
         # Without a home nothing returns.
         return None
@@ -99,13 +99,13 @@ def _reaction_text(
     requirements: RouteRequirements, aligned: AlignedTrack | None, outages: tuple[Outage, ...], reaction: Cause | None
 ) -> str:
     """Describe the autopilot's reaction to the outages that it notices, and the result of its returns from them."""
-    world = _return_world(requirements)
+    world = _make_return_world(requirements)
     title = requirements.setup.autopilot.title
     if world is None or world.has_other_law:
         return f"; the reaction of {title} to the loss is not judged"
     if reaction is None:
         return f"; {title} continues its mission without the link"
-    if not reaction.returns:
+    if not reaction.is_return:
         return f"; {title} then leaves the mission ({reaction.parameter} {reaction.value})"
     setup = requirements.setup
     starts = (

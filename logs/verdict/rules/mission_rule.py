@@ -242,7 +242,7 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
         reason = f"NAV_LAND: the ground there slopes by {steepest_text}, so the touchdown is not judged"
         remarks.append((int(setup.route.items[-1]), reason))
     # An imported flight was flown with its settings.
-    texts = setup.autopilot.checks.settings_not_flown(_mission_parts(setup)) if setup.source is None else []
+    texts = setup.autopilot.checks.describe_unsimulated_settings(_mission_parts(setup)) if setup.source is None else []
     # The route notes a loiter that is flown with another radius.
     unflown_radius = setup.autopilot.loiters.unflown_note
     if unflown_radius and unflown_radius in setup.route.notes and setup.source is None:

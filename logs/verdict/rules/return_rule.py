@@ -29,7 +29,7 @@ from logs.verdict.returns.judge_returns import (
     ReturnWorld,
     heights_above_ground,
     judge_returns,
-    return_world,
+    make_return_world,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, flown_end, flown_starts, planned_end, planned_starts
 from logs.verdict.returns.returns_text import headline, measured_text, outcome_text
@@ -103,7 +103,7 @@ def _automatic_return_findings(requirements: RouteRequirements, end: ReturnStart
     ok: bool | None = None
     check, brief, text = "", "the flight did not reach the end of the mission", ""
     if end is not None:
-        world = return_world(setup)
+        world = make_return_world(setup)
         returns = judge_returns(world, end, 1.0)
         # The first ending is the one by RTL_AUTOLAND; the others are those of failsafes.
         simulated = returns.each[0] if returns.each else None
@@ -142,7 +142,7 @@ def _requirement_findings(requirements: RouteRequirements, starts: Callable[[flo
         return []
     interval = float(max(1, math.ceil(setup.path.length / setup.airspeed / _MAX_RETURNS)))
     try:
-        world, return_starts = return_world(setup), starts(interval)
+        world, return_starts = make_return_world(setup), starts(interval)
         answers = [judge(world, return_starts, interval) for judge in judges]
     except MissionError as error:
         # Without a home no RTL is safe, and the places that a glide reaches are unknown.

@@ -56,10 +56,12 @@ def speed_findings(
 def _parameter_findings(requirements: RouteRequirements) -> list[Finding]:
     """Report contradictory speed parameters as undecided: only a flight shows which airspeed is held."""
     parameters = requirements.setup.autopilot.parameters
-    if parameters is None or not parameters.misfits or requirements.setup.source is not None:
+    if parameters is None or not parameters.contradictions or requirements.setup.source is not None:
         return []
-    more_text = f", and {len(parameters.misfits) - 1} more" if len(parameters.misfits) > 1 else ""
-    fault = message(f"{parameters.misfits[0]}{more_text}", "; only a simulated flight shows which airspeed is held")
+    more_text = f", and {len(parameters.contradictions) - 1} more" if len(parameters.contradictions) > 1 else ""
+    fault = message(
+        f"{parameters.contradictions[0]}{more_text}", "; only a simulated flight shows which airspeed is held"
+    )
     return [make_finding("speed", FLIGHT, ok=None, reason=fault.text, faults=[fault], check=NOT_FLOWN)]
 
 

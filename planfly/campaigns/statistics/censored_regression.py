@@ -59,7 +59,7 @@ class BinaryLink(Protocol):
         """Return the logarithm of the probability of success."""
 
     def survival(self, x: Floats) -> Floats:
-        """Return the probability of success."""
+        """Return the probability of success at the linear predictor x."""
 
     def density(self, x: Floats) -> Floats:
         """Return the derivative of the probability of failure."""
@@ -149,7 +149,7 @@ class _ComplementaryLogLog:
         return -np.exp(np.minimum(x, _MAX_EXPONENT))
 
     def survival(self, x: Floats) -> Floats:
-        """Return the probability of success, exp(-exp(x))."""
+        """Return the probability of success at the linear predictor x, exp(-exp(x))."""
         return np.exp(self.log_survival(x))
 
     def density(self, x: Floats) -> Floats:

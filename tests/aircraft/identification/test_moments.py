@@ -57,7 +57,7 @@ def test_the_propellers_torque_rolls_it_to_the_left() -> None:
         throttle=np.full(1, 0.8),
         density=np.full(1, 1.2),
     )
-    torque = float(base.motor.reaction(running.airspeed, running.throttle, running.density)[0])
+    torque = float(base.motor.propeller_torque(running.airspeed, running.throttle, running.density)[0])
     assert 0.5 < torque < 3.0
     assert required_moments(running, base, base.motor)["roll"] == pytest.approx([torque])
 

@@ -20,7 +20,10 @@ def test_the_tables_of_the_aerosonde_agree_with_its_formulas() -> None:
     by_table = table.thrust_and_current(_AIRSPEEDS, _THROTTLES, _DENSITIES)
     for expected, got in zip(by_formula, by_table, strict=True):
         assert np.abs(got - expected).max() < 0.02 * np.abs(expected).max()
-    torques = motor.reaction(_AIRSPEEDS, _THROTTLES, _DENSITIES), table.reaction(_AIRSPEEDS, _THROTTLES, _DENSITIES)
+    torques = (
+        motor.propeller_torque(_AIRSPEEDS, _THROTTLES, _DENSITIES),
+        table.propeller_torque(_AIRSPEEDS, _THROTTLES, _DENSITIES),
+    )
     assert np.abs(torques[1] - torques[0]).max() < 0.02 * torques[0].max()
 
 

@@ -33,7 +33,7 @@ def test_a_ducted_one_goes_from_the_airspeed_up() -> None:
 
 def test_it_does_not_brake_and_does_not_turn_the_aircraft() -> None:
     assert at(ZAGI, 15.0, 0.0) == at(X8, 18.0, 0.0) == (0.0, 0.0)
-    assert X8.reaction(np.full(2, 18.0), np.ones(2), np.full(2, 1.2)).tolist() == [0.0, 0.0]
+    assert X8.propeller_torque(np.full(2, 18.0), np.ones(2), np.full(2, 1.2)).tolist() == [0.0, 0.0]
 
 
 def test_factors_change_what_they_name() -> None:

@@ -22,7 +22,7 @@ from aircraft.catalog import load_aircraft
     ],
 )
 def test_arduplanes(text: str, misfits: tuple[str, ...]) -> None:
-    found = arduplane.ArduPilotParameters.of_text(text, "a.param").misfits
+    found = arduplane.ArduPilotParameters.of_text(text, "a.param").contradictions
     assert len(found) == len(misfits)
     # Which of two values of one file is named first does not matter.
     for one, expected in zip(found, misfits, strict=True):
@@ -42,7 +42,7 @@ def test_arduplanes(text: str, misfits: tuple[str, ...]) -> None:
     ],
 )
 def test_px4s(text: str, misfits: tuple[str, ...]) -> None:
-    assert px4.Px4Parameters.of_text(text, "a.params").misfits == misfits
+    assert px4.Px4Parameters.of_text(text, "a.params").contradictions == misfits
 
 
 def test_a_file_is_compared_with_the_aircraft_and_the_aircraft_with_nothing(tmp_path: Path) -> None:
@@ -50,5 +50,5 @@ def test_a_file_is_compared_with_the_aircraft_and_the_aircraft_with_nothing(tmp_
     zagi, path = load_aircraft("zagi"), tmp_path / "a.param"
     path.write_text("TRIM_THROTTLE 60\n", encoding="utf-8")
     misfit = "TRIM_THROTTLE 60 of the file is below THR_MIN 74 of the aircraft"
-    assert arduplane.ArduPilotParameters.load(zagi, path).misfits == (misfit,)
-    assert arduplane.ArduPilotParameters.load(zagi).misfits == ()
+    assert arduplane.ArduPilotParameters.load(zagi, path).contradictions == (misfit,)
+    assert arduplane.ArduPilotParameters.load(zagi).contradictions == ()

@@ -182,7 +182,7 @@ def test_a_start_with_little_power_to_spare_is_found() -> None:
     fdm = Fdm(load_aircraft("zagi"))
     trim = fdm.start(45.0, 0.0, 2355.4, 0.7, 16.8433, 0.0016)
     assert 0.9 < trim.throttle < 1.0
-    assert np.abs(fdm.balance(trim.vector())).max() < 1e-7
+    assert np.abs(fdm.apply_trim(trim.vector())).max() < 1e-7
     # It does hold it: in a second nothing has moved.
     again = Fdm(load_aircraft("zagi"))
     again.write(again.start(45.0, 0.0, 2355.4, 0.7, 16.8433, 0.0).commands())

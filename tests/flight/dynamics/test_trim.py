@@ -156,7 +156,7 @@ class LinearAircraft:
     def move_to(self, amsl: float) -> None:
         self.amsl = amsl
 
-    def balance(self, values: Floats) -> Floats:
+    def apply_trim(self, values: Floats) -> Floats:
         airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = values - self.balanced
         return np.array(
             [
@@ -181,7 +181,7 @@ class LinearAircraft:
 
 def test_held_quantities_stay_and_the_others_balance() -> None:
     aircraft = LinearAircraft()
-    found = solve_trim(aircraft.balance, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
+    found = solve_trim(aircraft.apply_trim, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
     assert found is not None
     # 3 m/s faster: alpha less by 0.012, elevator more by 0.03; a slope of 0.1 takes 0.2 more throttle and 0.0003.
     wanted = [28.0, 0.1, 0.038, 0.01, -0.07, 0.02, -0.01, 0.5 + 0.2 + 0.012 * 0.1 / 4.0]
@@ -194,11 +194,11 @@ def test_what_the_stops_do_not_allow_is_no_flight(airspeed: float, climb: float,
     aircraft = LinearAircraft()
     asked: list[Floats] = []
 
-    def balance(values: Floats) -> Floats:
+    def apply_trim(values: Floats) -> Floats:
         asked.append(values)
-        return aircraft.balance(values)
+        return aircraft.apply_trim(values)
 
-    trimmed = solve_trim(balance, {"airspeed": airspeed, "climb": climb}, (0.3, 0.4, 0.3))
+    trimmed = solve_trim(apply_trim, {"airspeed": airspeed, "climb": climb}, (0.3, 0.4, 0.3))
     assert (trimmed is not None) == found
     # Where steps get nowhere the search ends: most of an envelope's time went into flights that there are not.
     assert len(asked) < 100
@@ -209,13 +209,13 @@ def test_a_surface_that_moves_nothing_is_left_alone() -> None:
     aircraft = LinearAircraft()
     calls = iter(range(1000))
 
-    def balance(values: Floats) -> Floats:
+    def apply_trim(values: Floats) -> Floats:
         unmoved = values.copy()
         unmoved[QUANTITIES.index("rudder")] = aircraft.balanced[QUANTITIES.index("rudder")]
         # As JSBSim leaves: 1e-8 of the longest column.
-        return aircraft.balance(unmoved) + 1e-13 * np.cos(np.arange(6.0) + next(calls))
+        return aircraft.apply_trim(unmoved) + 1e-13 * np.cos(np.arange(6.0) + next(calls))
 
-    found = solve_trim(balance, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
+    found = solve_trim(apply_trim, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
     assert found is not None
     assert found[QUANTITIES.index("rudder")] == 0.0
     assert found[QUANTITIES.index("throttle")] == pytest.approx(0.7003, abs=1e-6)

@@ -108,13 +108,13 @@ def test_gains_are_the_aircrafts(space: Workspace) -> None:
 
 def test_the_path_table_holds_each_part_and_how_many_there_are() -> None:
     pieces, nodes, waypoints = np.zeros(2, PIECE), np.zeros(3, NODE), np.zeros(4, WAYPOINT)
-    pieces["length"], nodes["height"], waypoints["airspeed"] = (1, 2), (3, 4, 5), (6, 7, 8, 9)
+    pieces["length"], nodes["altitude"], waypoints["airspeed"] = (1, 2), (3, 4, 5), (6, 7, 8, 9)
     space = Workspace(GAINS, FlyByPath(pieces, nodes, 3.0), waypoints)
     settings = space.record.settings
     assert (settings.pieces, settings.nodes, settings.waypoints) == (2, 3, 4)
     assert len(space.path) == 4
     assert space.path["piece"]["length"].tolist() == [1.0, 2.0, 0.0, 0.0]
-    assert space.path["node"]["height"].tolist() == [3.0, 4.0, 5.0, 0.0]
+    assert space.path["node"]["altitude"].tolist() == [3.0, 4.0, 5.0, 0.0]
     assert space.path["waypoint"]["airspeed"].tolist() == [6.0, 7.0, 8.0, 9.0]
 
 

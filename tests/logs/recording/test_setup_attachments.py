@@ -29,7 +29,7 @@ from tests.logs.log_copies import Attachments, same
 from tests.logs.made_flight import make_setup, record
 from world import scenario as scenario_module
 from world.errors import LogError
-from world.scenario import from_spec, load_scenario
+from world.scenario import load_scenario, scenario_from_spec
 
 
 def test_a_log_holds_exactly_these(log_file: Path) -> None:
@@ -168,7 +168,7 @@ def test_a_parameter_that_is_not_allowed_is_refused() -> None:
 
 def test_an_external_mission_without_terrain_comes_back(tmp_path: Path, track: Track) -> None:
     spec = make_setup().scenario.to_json() | {"terrain": {"kind": "none"}, "threats": []}
-    setup = dataclasses.replace(make_setup(with_plan=False), scenario=from_spec(spec, "t", external=True))
+    setup = dataclasses.replace(make_setup(with_plan=False), scenario=scenario_from_spec(spec, "t", external=True))
     log = read_log(record(tmp_path / "a.mcap", setup, track))
     assert log.setup.scenario.terrain is None
     assert log.setup.scenario.external

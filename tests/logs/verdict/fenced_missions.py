@@ -20,7 +20,7 @@ from tests.setups import spec_around
 from tests.synthetic import bank_radius
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_geo
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 SEED = 12
 MARGIN = 5.0
@@ -285,7 +285,7 @@ def mission_of(draft: Draft, points: Floats, turn: Floats, origin: GeoOrigin) ->
 @cache
 def _airframe() -> Any:
     spec = spec_around([[0.0, 0.0, 300.0], [0.0, 900.0, 300.0]], buffer=900.0, ceiling=900.0, flight=FLIGHT)
-    return load_airframe(from_spec(spec, "made"))
+    return load_airframe(scenario_from_spec(spec, "made"))
 
 
 FLIGHT = {"airspeed_mps": SPEED, "autopilot": "planfly"}
@@ -303,7 +303,7 @@ def fenced_mission(number: int) -> FencedMission:
     placed = draft.points.copy()
     placed[:, :2] = draft.points[:, :2] @ turn.T
     origin = GeoOrigin(float(rng.uniform(-60.0, 60.0)), float(rng.uniform(-180.0, 180.0)))
-    scenario = from_spec(
+    scenario = scenario_from_spec(
         spec_around(
             placed,
             name=f"{feature.__name__} {number}",

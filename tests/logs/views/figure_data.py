@@ -14,7 +14,7 @@ from logs.views.drawing import draw_chart
 from logs.views.failures import route_distance
 from logs.views.map import flight_map
 from logs.views.profile import profile_chart
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 # A right angle and a climb, in round numbers: legs of 1,000, 800 and 600 m.
 ROUTE = np.array([[-900.0, -400.0, 300.0], [100.0, -400.0, 340.0], [100.0, 400.0, 380.0], [700.0, 400.0, 360.0]])
@@ -34,7 +34,7 @@ def make_scenario(**changes: Any) -> Scenario:
         "wind": {"speed_mps": 5, "from_deg": 250, "turbulence": "light"},
     }
     external = changes.pop("external", False)
-    return from_spec(spec | changes, "test", external=external)
+    return scenario_from_spec(spec | changes, "test", external=external)
 
 
 def make_track(route: np.ndarray = ROUTE, rate: float = 2.0) -> Track:

@@ -23,7 +23,7 @@ from planfly.cli import main
 from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
 from tests.mission_lines import mission, wp
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 SPEC = {
     "name": "items",
@@ -89,7 +89,7 @@ CASES = {
 
 
 def answer(law: str, read: Mission) -> str:
-    scenario = from_spec(SPEC, "items")
+    scenario = scenario_from_spec(SPEC, "items")
     airframe = replace(load_airframe(scenario), autopilot=LAWS[law]())
     return judge_geometry(make_setup(scenario, airframe, read, 1)).answer
 

@@ -116,7 +116,7 @@ def test_parameters_make_it_safe(hill: Path) -> None:
     (hill / "mine.parm").write_text("RTL_ALTITUDE 600\nFS_LONG_ACTN 1\nROLL_LIMIT_DEG 30\n", encoding="utf-8")
     found = planfly.returns("hill.waypoints", scenario="hill.toml", params="mine.parm", every=20)
     assert found.safe
-    assert any(cause.name == "RC lost" and cause.returns for cause in found.returns.causes)
+    assert any(cause.name == "RC lost" and cause.is_return for cause in found.returns.causes)
 
 
 def test_returns_that_follow_the_terrain_end_with_3(hill: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import planfly
-from logs.verdict.returns.judge_returns import badness, judge_returns, return_world
+from logs.verdict.returns.judge_returns import badness, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import planned_starts
 from planfly.cli import main
 from planfly.rtl import jsbsim_returns as return_flights
@@ -97,7 +97,7 @@ def test_no_program_but_arduplanes_is_flown(mound: Path, capsys: pytest.CaptureF
 
 def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
-    world, starts = return_world(setup), planned_starts(setup, 2.0)
+    world, starts = make_return_world(setup), planned_starts(setup, 2.0)
     returns = judge_returns(world, starts, 2.0)
     chosen = worst_separated_returns(world, starts, returns, 4)
     assert len(chosen) == 4

@@ -94,7 +94,7 @@ def test_a_motor_of_another_form_becomes_tables(name: str) -> None:
     fdm = Fdm(aircraft)
     trim = steady_flight(fdm, aircraft.airspeed, 500.0)
     assert trim is not None
-    fdm.balance(trim.vector())
+    fdm.apply_trim(trim.vector())
     flow = np.full(1, aircraft.airspeed), np.full(1, trim.throttle), np.full(1, numbers.motor.density)
     thrust, current = numbers.motor.thrust_and_current(*flow)
     pounds = sum(fdm.properties.getter(f"forces/fb{axis}-aero-lbs")() * weight for axis, weight in _along(trim.alpha))
@@ -122,7 +122,7 @@ def test_an_identified_ultra_stick_without_a_log_flies_as_its_base(tmp_path: Pat
         fdm = Fdm(aircraft)
         trim = steady_flight(fdm, base.airspeed, 500.0)
         assert trim is not None
-        fdm.balance(trim.vector())
+        fdm.apply_trim(trim.vector())
         powers.append((trim.throttle, float(fdm.read().power)))
     assert powers[1] == pytest.approx(powers[0], rel=0.02)
 
@@ -208,7 +208,7 @@ def test_the_battery_power_of_a_data_sheet_is_kept(tmp_path: Path) -> None:
         fdm = Fdm(aircraft)
         level = steady_flight(fdm, 15.0, 500.0)
         assert level is not None
-        fdm.balance(level.vector())
+        fdm.apply_trim(level.vector())
         return float(fdm.read().power)
 
     found = float(performance(numbers, prior_means(), 15.0, 1.1673).power[0])

@@ -118,7 +118,7 @@ def test_a_wing_is_the_wing_edited_by_hand(tmp_path: Path, name: str) -> None:
             fdm = Fdm(aircraft)
             found = steady_flight(fdm, base.airspeed, 500.0, climb)
             assert found is not None
-            fdm.balance(found.vector())
+            fdm.apply_trim(found.vector())
             trims.append([*found.vector(), fdm.read().power])
         assert trims[1] == pytest.approx(trims[0], rel=1e-4, abs=1e-5)
 
@@ -133,7 +133,7 @@ def test_a_draw_is_a_set_of_properties(tmp_path: Path) -> None:
     assert weaker.throttle > base.throttle + 0.02
     power = fdm.read().power
     fdm.properties.set("ident/drive-power", 1.5)
-    fdm.balance(weaker.vector())
+    fdm.apply_trim(weaker.vector())
     assert fdm.read().power == pytest.approx(1.5 * power, rel=1e-6)
 
 

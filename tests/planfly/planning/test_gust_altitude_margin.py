@@ -23,7 +23,7 @@ from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from planner.search.shared_budget import SharedBudget
 from tests.setups import spec_around
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 from world.wind import Turbulence
 
 SEED = 3
@@ -42,7 +42,7 @@ def scenario_of(turbulence: str, height: float = 60.0, **tables: Any) -> Scenari
         "wind": {"speed_mps": 0.0, "from_deg": 0.0, "turbulence": turbulence},
     }
     ends = [[0.0, 0.0, GROUND + height], [8000.0, 0.0, GROUND + height]]
-    return from_spec(spec_around(ends, buffer=3000.0, ceiling=GROUND + 800.0) | made | tables, "gusts")
+    return scenario_from_spec(spec_around(ends, buffer=3000.0, ceiling=GROUND + 800.0) | made | tables, "gusts")
 
 
 def plan_along(airframe: Airframe, scenario: Scenario, way: Any) -> Plan:
@@ -101,7 +101,7 @@ def test_a_climb_leaves_less_and_the_plan_says_how_much_it_lacks() -> None:
     airframe = load_airframe(scenario_of("moderate"))
     steep = 0.5 / airframe.airspeed
     way = np.array([[0, 0, 80], [2000, 0, 80], [2000 + 70 / steep, 0, 150], [4000 + 70 / steep, 0, 150]])
-    scenario = from_spec(
+    scenario = scenario_from_spec(
         scenario_of("moderate").to_json()
         | {"start": {"east_m": 0, "north_m": 0, "height_m": 150}}
         | {"destination": {"east_m": float(way[-1, 0]), "north_m": 0, "height_m": 150}}
@@ -189,7 +189,7 @@ def test_an_aircraft_that_hardly_climbs_is_not_sent_into_gusts(ground: float, en
         "destination": {"east_m": 8000, "north_m": 0, "height_m": 300},
         "area": {"east_m": [-3000, 11000], "north_m": [-3000, 3000], "ceiling_amsl_m": ground + 800},
     }
-    scenario = from_spec(scenario_of("moderate").to_json() | far, "gusts")
+    scenario = scenario_from_spec(scenario_of("moderate").to_json() | far, "gusts")
     airframe = load_airframe(scenario)
     assert (airframe.limits.rates(ground + 300.0)[0] > 0.6 * GUST) is enough
     plan = make_plan(scenario, airframe, SEED)
@@ -349,7 +349,7 @@ def band_of(most: float, autopilot: str = "ardupilot", **tables: Any) -> Scenari
         "wind": {"speed_mps": 0.0, "from_deg": 0.0, "turbulence": "moderate"},
     }
     ends = [[0.0, 0.0, 150.0], [8000.0, 0.0, 150.0]]
-    return from_spec(spec_around(ends, buffer=3000.0, ceiling=800.0) | made | tables, "band")
+    return scenario_from_spec(spec_around(ends, buffer=3000.0, ceiling=800.0) | made | tables, "band")
 
 
 @pytest.mark.parametrize(
@@ -400,7 +400,7 @@ def test_a_leg_that_sinks_leaves_less() -> None:
     assert shortfall.place in {"on leg 0", "on leg 1"}
     assert shortfall.depth == pytest.approx(60.0 * GUST - 40.0 + airframe.limits.tracking.up, abs=5.0)  # type: ignore[union-attr]
     # Without a limit above it nothing is wrong.
-    free = from_spec(band_of(230.0).to_json() | {"limits": {"min_clearance_m": 50.0}}, "free")
+    free = scenario_from_spec(band_of(230.0).to_json() | {"limits": {"min_clearance_m": 50.0}}, "free")
     assert not find_shortfalls(plan_along(airframe, free, way), airframe)
 
 
@@ -485,6 +485,6 @@ def test_with_a_low_maximum_height_a_gentle_way_down_from_the_ends_is_found() ->
     ends = {name: scenario.to_json()[name] | {"height_m": 134.0} for name in ("start", "destination")}
     for end in ends.values():
         end.pop("amsl_m", None)
-    low = from_spec(scenario.to_json() | ends, "low")
+    low = scenario_from_spec(scenario.to_json() | ends, "low")
     plan = make_plan(low, load_airframe(low), SEED)
     assert plan.safe

@@ -16,7 +16,7 @@ from planfly.workflow.make_plan import make_plan
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from tests.setups import spec_around, with_path
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 SEED = 3
 
@@ -29,7 +29,7 @@ def scenario_of(turbulence: str, autopilot: str = "px4", **tables: Any) -> Scena
         "zones": [{"name": "mast", "kind": "exclusion", "east_m": 4000.0, "north_m": 60.0, "radius_m": 300.0}],
     }
     ends = [[0.0, 0.0, 150.0], [8000.0, 0.0, 150.0]]
-    return from_spec(spec_around(ends, buffer=3000.0, ceiling=800.0) | made | tables, "gusts")
+    return scenario_from_spec(spec_around(ends, buffer=3000.0, ceiling=800.0) | made | tables, "gusts")
 
 
 def searching(airframe: Airframe, asked: list[int]) -> Callable[[Scenario], Plan]:

@@ -95,7 +95,7 @@ def test_its_intervals_are_those_of_its_draws(foam: Aircraft) -> None:
         tops.append(top.airspeed)
         level = steady_flight(fdm, 15.0, 500.0)
         assert level is not None
-        fdm.balance(level.vector())
+        fdm.apply_trim(level.vector())
         powers.append(math.log(float(fdm.read().power)))
     # The fastest level flight is 25 m/s, with the deviation that the same draws have.
     assert np.std(tops) == pytest.approx(known.max_speed_sd, rel=0.4)
@@ -198,7 +198,7 @@ def test_fuel_and_a_tail(tmp_path: Path) -> None:
     fdm = Fdm(made, is_tested=True)
     level = steady_flight(fdm, 24.0, 500.0)
     assert level is not None
-    fdm.balance(level.vector())
+    fdm.apply_trim(level.vector())
     state = fdm.read()
     # Heat is work by 0.15; thrust x airspeed is a part of the work that a propeller gives.
     work = 0.15 * float(state.power)

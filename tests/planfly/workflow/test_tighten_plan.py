@@ -19,7 +19,7 @@ from planfly.workflow.open_flight import make_setup
 from planfly.workflow.tighten_plan import NEXT_ROUND_REMARK, refine, tighten_limits
 from tests.planfly.conftest import FIELD
 from tests.synthetic import fly_path
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 HILL = """\
 name = "hill"
@@ -102,7 +102,7 @@ FLAT = {
 
 def test_an_autopilot_that_strays_into_a_zones_edge_is_given_more_room() -> None:
     """It flies 16 m south of any plan, whose certificate keeps 10 m and whose search 15 m."""
-    scenario = from_spec(FLAT, "edge")
+    scenario = scenario_from_spec(FLAT, "edge")
     airframe = load_airframe(scenario)
     kept = []
 
@@ -132,7 +132,9 @@ def test_a_plan_that_enters_the_zone_itself_is_no_reason_for_more_room(planned: 
     finding = make_finding(
         "fence", Place("exclusion", 0, name="mill"), ok=False, reason="", planned=planned, margin=-3.0
     )
-    planned_in, changes = tighten_limits(from_spec(FLAT, "edge"), Verdict((finding,), False, True, ("",), "flown"))
+    planned_in, changes = tighten_limits(
+        scenario_from_spec(FLAT, "edge"), Verdict((finding,), False, True, ("",), "flown")
+    )
     assert [(change.what, change.current, change.wanted) for change in changes] == (
         [("zone_margin_m", 10.0, 18.0)] if tightened else []
     )
@@ -142,6 +144,8 @@ def test_a_plan_that_enters_the_zone_itself_is_no_reason_for_more_room(planned: 
 @pytest.mark.parametrize(("over", "wanted"), [(3.0, 292.0), (234.0, 61.0), (236.0, None)])
 def test_what_flew_too_high_is_planned_lower_as_far_as_there_is_room(over: float, wanted: float | None) -> None:
     finding = make_finding("height", FLIGHT, ok=False, reason="", margin=-over)
-    planned_in, changes = tighten_limits(from_spec(FLAT, "edge"), Verdict((finding,), False, True, ("",), "flown"))
+    planned_in, changes = tighten_limits(
+        scenario_from_spec(FLAT, "edge"), Verdict((finding,), False, True, ("",), "flown")
+    )
     assert [change.wanted for change in changes] == ([] if wanted is None else [wanted])
     assert planned_in.limits.max_height_m == (wanted or 300.0)

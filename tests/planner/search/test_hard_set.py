@@ -13,7 +13,7 @@ from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from tests.instances import CLIMB_DEG, DIVE_DEG, ground, random_scenario
 from tests.soak import note, scaled
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 from world.scenario_file import parse_scenario
 
 RUNS = range(1, 1 + scaled(15, 2))
@@ -61,7 +61,7 @@ def test_hard_set_is_safe_in_every_run(threats: str, make_limits: Callable[[Scen
 def test_random_instances_that_a_grid_can_pass_are_solved(
     seed: int, make_limits: Callable[[Scenario], Limits], tmp_path: Path
 ) -> None:
-    scenario = from_spec(parse_scenario(random_scenario(seed), "random"), "random", base=tmp_path)
+    scenario = scenario_from_spec(parse_scenario(random_scenario(seed), "random"), "random", base=tmp_path)
     plan = plan_path(scenario, make_limits(scenario), seed=1, algorithm=DEFAULT)
     assert plan.safe, plan.certificate.problems
     check_at_one_metre(plan)

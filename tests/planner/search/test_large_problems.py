@@ -12,7 +12,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.search.plan_path import plan_path
 from tests.soak import SOAK, note
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 THREATS, SIDE, WAYPOINTS, POPULATION = (10_000, 10_000, 200, 5000) if SOAK else (2000, 1200, 60, 400)
 
@@ -51,7 +51,7 @@ def wide(tmp_path: Path) -> Scenario:
         "limits": {"max_turn_deg": 60, "max_climb_deg": 20, "max_dive_deg": 20},
         "planner": {"waypoints": WAYPOINTS, "population": POPULATION, "generations": 3},
     }
-    return from_spec(spec, "wide", base=tmp_path)
+    return scenario_from_spec(spec, "wide", base=tmp_path)
 
 
 def peak() -> int:

@@ -13,7 +13,7 @@ from planner.search.plan_path import plan_path
 from tests.setups import spec_around
 from world.errors import ScenarioError
 from world.geometry import path_length
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, scenario_from_spec
 
 WIND, SHEAR, RUN, LOW, CEILING = 8.0, 0.02, 12_000.0, 150.0, 600.0
 
@@ -25,7 +25,7 @@ def plain(objective: str, from_deg: float, **tables: Any) -> Scenario:
     flight = {"aircraft": "aerosonde", "autopilot": "planfly"}
     planner = {"objective": objective}
     spec = spec_around(ends, buffer=3000.0, ceiling=CEILING, wind=wind, flight=flight, planner=planner, **tables)
-    return from_spec(spec, "plain")
+    return scenario_from_spec(spec, "plain")
 
 
 def planned(scenario: Scenario) -> tuple[Plan, float]:
@@ -57,7 +57,7 @@ def test_against_a_wind_that_rises_the_fastest_way_stays_as_low_as_it_may() -> N
 def test_in_the_same_wind_everywhere_a_straight_line_is_the_fastest() -> None:
     spec = plain("time", 70.0).to_json()
     spec["wind"]["gradient"] = 0.0
-    plan, seconds = planned(from_spec(spec, "plain"))
+    plan, seconds = planned(scenario_from_spec(spec, "plain"))
     # 8 m/s from 70 degrees: 2.74 against, 7.52 across.
     along = math.sqrt(25.0**2 - (8.0 * math.sin(math.radians(70.0))) ** 2) - 8.0 * math.cos(math.radians(70.0))
     assert seconds == pytest.approx(RUN / along, rel=1e-4)

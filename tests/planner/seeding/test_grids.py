@@ -24,9 +24,9 @@ from planner.seeding.grids import (
     find_obstacles,
     grid_route,
     make_grid,
-    position_of,
     relax_cells,
     set_cell_costs,
+    to_world_position,
     trace_back,
 )
 from world.arrays import Floats
@@ -59,10 +59,10 @@ def test_places_in_the_rotated_frame_come_back_to_the_map() -> None:
     # Towards north-west: along is (-1, 1) / sqrt(2), across, to the left of it, (-1, -1) / sqrt(2).
     h = math.sqrt(0.5)
     frame = rotated_frame(np.array([100.0, 200.0, 0.0]), np.array([-900.0, 1200.0, 0.0]))
-    assert position_of(frame, 0.0, 0.0) == (100.0, 200.0)
-    assert position_of(frame, 10.0, 0.0) == pytest.approx((100.0 - 10.0 * h, 200.0 + 10.0 * h))
-    assert position_of(frame, 0.0, 10.0) == pytest.approx((100.0 - 10.0 * h, 200.0 - 10.0 * h))
-    east, north = position_of(frame, 300.0, -70.0)
+    assert to_world_position(frame, 0.0, 0.0) == (100.0, 200.0)
+    assert to_world_position(frame, 10.0, 0.0) == pytest.approx((100.0 - 10.0 * h, 200.0 + 10.0 * h))
+    assert to_world_position(frame, 0.0, 10.0) == pytest.approx((100.0 - 10.0 * h, 200.0 - 10.0 * h))
+    east, north = to_world_position(frame, 300.0, -70.0)
     assert frame.to_frame(np.array([[east, north, 5.0]]))[0] == pytest.approx([300.0, -70.0, 5.0])
 
 

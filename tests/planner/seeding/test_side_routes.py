@@ -28,8 +28,8 @@ from planner.seeding.side_routes import (
     cheapest_passings,
     grid_costs,
     optimistic_grid,
+    passing_side,
     route_through,
-    side_of,
     side_routes,
     sides_passed,
 )
@@ -53,7 +53,7 @@ def data(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limit
     [(5.0, 4.9, LEFT), (-5.0, 4.9, RIGHT), (5.0, 5.1, OVER), (-5.0, 5.1, OVER), (4.0, -5.0, UNDER), (0.0, 0.0, LEFT)],
 )
 def test_a_side_is_a_quarter_about_the_middle(aside: float, above: float, side: int) -> None:
-    assert side_of(aside, above) == side
+    assert passing_side(aside, above) == side
 
 
 def all_ways(data: ProblemArrays) -> list[tuple[float, tuple[tuple[int, int], ...]]]:
@@ -88,7 +88,10 @@ def test_each_side_is_passed_as_cheaply_as_by_the_best_of_all_ways(data: Problem
         least = math.inf
         for total, way in ways:
             across, layer = way[3]
-            if side_of(GRID.across[across] - obstacles[0]["across"], GRID.layers[layer] - obstacles[0]["up"]) == side:
+            if (
+                passing_side(GRID.across[across] - obstacles[0]["across"], GRID.layers[layer] - obstacles[0]["up"])
+                == side
+            ):
                 least = min(least, total)
         assert passings[side]["cost"] == pytest.approx(least)
     assert passings[UNDER]["cost"] == math.inf

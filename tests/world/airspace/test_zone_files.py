@@ -17,7 +17,7 @@ from world.airspace.zone_entries import FLIGHT_LEVEL_ERROR, zone_entries
 from world.airspace.zone_files import MAX_BYTES, geojson_zones, kml_zones, read_zone_file
 from world.airspace.zones import Cylinder, Polygon
 from world.errors import PlanflyError, ScenarioError
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 
 def limit(value: Any, unit: Any, datum: Any) -> dict[str, Any]:
@@ -336,7 +336,7 @@ def test_what_is_written_down_needs_no_file(tmp_path: Path) -> None:
     written = scenario.to_json()
     assert "zones_file" not in written
     (tmp_path / "zones" / "lake.geojson").unlink()
-    again = from_spec(written, "a log")
+    again = scenario_from_spec(written, "a log")
     assert again.zones == scenario.zones
     assert again.to_json() == written
 
@@ -425,7 +425,7 @@ def test_more_threats_and_zones_than_20000_are_a_line(what: str) -> None:
     spec = tomllib.loads(SMALL)
     spec[what] = [{}] * 20_001
     with pytest.raises(ScenarioError, match=rf"^s: {what}: .*20,?000") as caught:
-        from_spec(spec, "s")
+        scenario_from_spec(spec, "s")
     assert "\n" not in str(caught.value)
 
 
@@ -546,7 +546,7 @@ def test_zones_far_from_the_area_are_left_out(tmp_path: Path) -> None:
     assert scenario.notes[0].endswith("3 of 6 zones lie more than 20 km from the area: ignored")
     # A log of it is as large as what is near.
     assert len(scenario.to_json()["zones"]) == 3
-    assert from_spec(scenario.to_json(), "a log").notes == scenario.notes
+    assert scenario_from_spec(scenario.to_json(), "a log").notes == scenario.notes
 
 
 def test_an_inclusion_counts_however_far_it_is(tmp_path: Path) -> None:

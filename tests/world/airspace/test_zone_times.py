@@ -8,7 +8,7 @@ import pytest
 from tests.world.made.made_scenario import SMALL
 from world.airspace.zone_times import is_active, parse_period, parse_span
 from world.errors import ScenarioError
-from world.scenario import from_spec, load_scenario, with_flight_time
+from world.scenario import load_scenario, scenario_from_spec, with_flight_time
 
 # 2026-05-01 is a Friday.
 FRIDAY_NIGHT = "../.. FRI 22:00/06:00"
@@ -100,7 +100,7 @@ def test_a_zone_that_is_not_active_is_left_out_and_said(tmp_path: Path) -> None:
         "1 of 1 zones with times of activity is not active 2026-05-01 10:00 to 2026-05-01 11:00 UTC: ignored",
     )
     # What is written down of it is the same scenario again, in which another time can be asked for.
-    again = from_spec(json.loads(json.dumps(friday.to_json())), "a log")
+    again = scenario_from_spec(json.loads(json.dumps(friday.to_json())), "a log")
     assert again.zones == friday.zones
     assert [zone.name for zone in with_flight_time(again, "2026-05-02T10:00Z").zones] == ["market", "mast"]
 

@@ -11,7 +11,7 @@ from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel
 from world.airspace.zones_on_map import EDGE_BEND, first_violated_zone, ring_on_map
 from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_geo, to_map
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 
 ORIGIN = GeoOrigin(46.0, 8.0)
 
@@ -82,7 +82,7 @@ def test_what_is_written_down_makes_the_same_zones(tmp_path: Path) -> None:
     ring = [[46.01, 8.0], [46.01, 8.01], [46.02, 8.0]]
     holes = "rings_m = [[[0, 0], [900, 0], [900, 900]], [[600, 100], [800, 100], [800, 300]]]"
     scenario = loaded(tmp_path, zone(f"polygon_deg = {ring}\nceiling_agl_m = 90") + zone(holes))
-    again = from_spec(scenario.to_json(), "a log")
+    again = scenario_from_spec(scenario.to_json(), "a log")
     assert again.zones == scenario.zones
     assert again.to_json() == scenario.to_json()
 
@@ -140,10 +140,10 @@ def test_what_is_no_shape_is_refused_by_its_name(case: str, tmp_path: Path) -> N
 def test_levels_above_ground_need_a_ground() -> None:
     spec = made_spec(zones=[{"name": "z", "kind": "exclusion", "east_m": 0.0, "north_m": 0.0, "radius_m": 9.0}])
     spec |= {"terrain": {"kind": "none"}, "start": spec["destination"], "threats": []}
-    from_spec(spec, "a log", external=True)
+    scenario_from_spec(spec, "a log", external=True)
     spec["zones"][0]["ceiling_agl_m"] = 50.0
     with pytest.raises(ScenarioError, match=r"zones\[0\] \(z\): ceiling_agl_m: requires terrain"):
-        from_spec(spec, "a log", external=True)
+        scenario_from_spec(spec, "a log", external=True)
 
 
 def test_which_zone_a_place_violates() -> None:

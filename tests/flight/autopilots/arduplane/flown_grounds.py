@@ -24,7 +24,7 @@ from tests.setups import spec_around
 from world.airfield import LandingStrip, Launch
 from world.arrays import Floats
 from world.frames import to_geo
-from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario import Scenario, load_scenario, scenario_from_spec
 from world.wind import Wind
 
 FOLDER = Path(__file__).with_name("kept_landings")
@@ -125,7 +125,7 @@ def circuit(
         wind={"speed_mps": wind[0], "from_deg": wind[1]},
         **world,
     )
-    scenario = replace(from_spec(spec, "circuit"), launch=launch, landing=strip)
+    scenario = replace(scenario_from_spec(spec, "circuit"), launch=launch, landing=strip)
 
     def place(east: float, north: float) -> tuple[float, float]:
         lat, lon = to_geo(scenario.origin, east, north)

@@ -19,7 +19,7 @@ from planfly.workflow.airframe import load_airframe
 from planfly.workflow.open_flight import make_setup
 from world.arrays import Floats
 from world.frames import GeoOrigin, to_map
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 FOLDER = Path(__file__).with_name("kept_circles")
 
@@ -129,7 +129,7 @@ def setup_by_law(mission: Mission, flight: str = "") -> FlightSetup:
         "destination": ends | {"north_m": 4000.0},
         "wind": _WINDS.get(flight, {}),
     }
-    scenario = from_spec(spec, flight or "circles")
+    scenario = scenario_from_spec(spec, flight or "circles")
     airframe = load_airframe(scenario)
     law = ArduPlane(ArduPilotParameters.load(airframe.aircraft, None, "4.6"))
     if flight in _ROLL_LIMITS:

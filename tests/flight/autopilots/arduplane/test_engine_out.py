@@ -50,7 +50,9 @@ def glided(flight: str) -> SimulatedReturns:
     begin = start(east=row["east_m"], north=row["north_m"], up=row["amsl_m"], **velocity)
     if GLIDES[flight]["mode"] == "RTL":
         circle = ReturnCircle(HOME[0], HOME[1], HOME[2] + 100.0, parameters().loiter_radius)
-        return fly_returns(begin, [circle], parameters(), aerosonde(WIND), around(), keep=True, engine_out=True)
+        return fly_returns(
+            begin, [circle], parameters(), aerosonde(WIND), around(), store_positions=True, engine_out=True
+        )
     # On along its leg, which bends by no more than 25 degrees.
     over = math.hypot(velocity["velocity_east"], velocity["velocity_north"])
     far = tuple(
@@ -59,12 +61,14 @@ def glided(flight: str) -> SimulatedReturns:
     )
     on = LandingStart(1, (far[0], far[1], far[2]), (far[0], far[1], far[2]))
     world = flat(0.0)
-    return fly_returns(begin, [None], parameters(), aerosonde(WIND), world, landings=[on], keep=True, engine_out=True)
+    return fly_returns(
+        begin, [None], parameters(), aerosonde(WIND), world, landings=[on], store_positions=True, engine_out=True
+    )
 
 
 @pytest.mark.parametrize("flight", some(GLIDES, 2))
 def test_it_is_as_high_as_arduplane_was(flight: str) -> None:
-    (way,) = glided(flight).ways
+    (way,) = glided(flight).tracks
     aside = ASIDE_WITH_FADING_INTEGRATORS.get(flight, ASIDE)
     seconds, compared = np.arange(len(way)), 0
     for time, east, north, up in glide_track(flight):
@@ -78,12 +82,12 @@ def test_it_is_as_high_as_arduplane_was(flight: str) -> None:
 
 @pytest.mark.parametrize("flight", [name for name, row in GLIDES.items() if row["mode"] == "RTL"])
 def test_it_gets_home_where_arduplane_did(flight: str) -> None:
-    real, flown = GLIDES[flight], glided(flight).flown[0]
-    arrives = bool(flown["ended"] == RETURN_ARRIVED and flown["clearance_before"] >= MARGIN)
+    real, flown = GLIDES[flight], glided(flight).results[0]
+    arrives = bool(flown["end_code"] == RETURN_ARRIVED and flown["clearance_before_arrival"] >= MARGIN)
     assert arrives == (real["reaches_home"] == "1")
-    assert (flown["ended"] == RETURN_GROUND_IMPACT) == (real["reaches_home"] == "0")
+    assert (flown["end_code"] == RETURN_GROUND_IMPACT) == (real["reaches_home"] == "0")
     if arrives:
-        assert flown["to_circle"] == pytest.approx(float(real["ends_s"]), abs=10.0)
+        assert flown["arrival_time"] == pytest.approx(float(real["ends_s"]), abs=10.0)
 
 
 # ----------------------------------------------------------------------
@@ -95,9 +99,9 @@ def straight(wind: Wind, north: float = 26.0) -> NDArray[np.float64]:
     begin = start(up=2000.0, velocity_north=north)
     on = LandingStart(1, (0.0, 13_000.0, 2000.0), (0.0, 13_000.0, 2000.0))
     flown = fly_returns(
-        begin, [None], parameters(), aerosonde(wind), flat(0.0), landings=[on], keep=True, engine_out=True
+        begin, [None], parameters(), aerosonde(wind), flat(0.0), landings=[on], store_positions=True, engine_out=True
     )
-    return flown.ways[0]
+    return flown.tracks[0]
 
 
 @pytest.mark.parametrize(("head", "ratio"), [(0.0, 1.0), (6.0, 1.0 - 6.0 / 19.4), (-6.0, 1.0 + 6.0 / 19.4)])
@@ -114,7 +118,9 @@ def test_it_flies_on_before_it_turns_back() -> None:
     """For 3 s, to the north; then it turns to what lies behind it."""
     begin = start(up=900.0, velocity_north=26.0)
     circle = ReturnCircle(0.0, -5000.0, 500.0, 120.0)
-    (way,) = fly_returns(begin, [circle], parameters(), aerosonde(Wind()), flat(), keep=True, engine_out=True).ways
+    (way,) = fly_returns(
+        begin, [circle], parameters(), aerosonde(Wind()), flat(), store_positions=True, engine_out=True
+    ).tracks
     assert way[3, 0] == pytest.approx(0.0, abs=0.5)
     assert way[3, 1] == pytest.approx(3.0 * 25.0, abs=2.5)
     assert abs(way[8, 0]) > 10.0
@@ -132,9 +138,9 @@ def test_above_its_slope_it_dives_onto_it() -> None:
             parameters(),
             aerosonde(Wind()),
             flat(),
-            keep=True,
+            store_positions=True,
             engine_out=True,
-        ).ways[0]
+        ).tracks[0]
         for away in (9000.0, 4000.0)
     )
     assert near[60, 2] == pytest.approx(900.0 - 500.0 * near[60, 1] / 4000.0, abs=25.0)
@@ -147,9 +153,9 @@ def test_with_its_engine_it_does_not_come_down() -> None:
     begin = start(up=900.0, velocity_north=26.0)
     circle = ReturnCircle(0.0, 9000.0, 900.0, 120.0)
     on, off = (
-        fly_returns(begin, [circle], parameters(), aerosonde(Wind()), flat(), engine_out=out).flown[0]
+        fly_returns(begin, [circle], parameters(), aerosonde(Wind()), flat(), engine_out=out).results[0]
         for out in (False, True)
     )
-    assert on["clearance_before"] > 890.0
+    assert on["clearance_before_arrival"] > 890.0
     # 8.8 km at 10.5 : 1, and what it takes to slow down.
-    assert off["circle_up"] == pytest.approx(900.0 - 8800.0 / 10.5, abs=40.0)
+    assert off["arrival_altitude"] == pytest.approx(900.0 - 8800.0 / 10.5, abs=40.0)

@@ -15,7 +15,7 @@ def does(
     """What it does on this cause; "" where the cause is none."""
     made = ArduPilotParameters.defaults().changed(**values)
     causes = failsafe_causes(made, has_fence=has_fence, has_landing=has_landing, ends_landed=ends_landed)
-    return next((cause.does for cause in causes if cause.name == name), "")
+    return next((cause.action for cause in causes if cause.name == name), "")
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from flight.autopilots.arduplane.go_around_point_mass import fly_go_arounds, mak
 from flight.autopilots.arduplane.rtl_point_mass import RETURN_GROUND_IMPACT, RETURN_START
 from flight.mission.ground_ways import Approach
 from flight.mission.placing import landing_sequence
-from logs.verdict.returns.judge_returns import return_world
+from logs.verdict.returns.judge_returns import make_return_world
 from tests.flight.autopilots.arduplane.flown_grounds import LATER_M, Flown
 from tests.flight.autopilots.arduplane.kept_sequences import flown_sequence, kept_sequence, kept_setup
 from world.arrays import Floats
@@ -102,7 +102,7 @@ def test_without_autoland_a_return_ends_in_its_circle() -> None:
 def aborted(pitch: float = math.radians(10.0), height: float = 50.0) -> tuple[Records, Floats]:
     """The kept abort on the point mass: what it comes to, and its way."""
     setup, real = kept_setup("abort"), kept_sequence("abort")
-    world = return_world(setup)
+    world = make_return_world(setup)
     start = np.zeros(1, RETURN_START)
     for name in ("east", "north", "amsl"):
         start["up" if name == "amsl" else name] = real[f"{name}_m"][0]
@@ -112,14 +112,14 @@ def aborted(pitch: float = math.radians(10.0), height: float = 50.0) -> tuple[Re
     landing = places[0]._replace(next_stops=places[1:])
     top = world.home.up + height
     found = fly_go_arounds(start, top, pitch, [landing], world.parameters, world.aircraft, world.environment)
-    return found.flown[0], found.ways[0]
+    return found.results[0], found.tracks[0]
 
 
 def test_the_abort_flies_into_the_hill_as_arduplane_did() -> None:
     """It is already at this height, turns at once, and meets the hillside: place within 10 m and height within 6 m."""
     real = kept_sequence("abort")
     flown, way = aborted()
-    assert flown["ended"] == RETURN_GROUND_IMPACT
+    assert flown["end_code"] == RETURN_GROUND_IMPACT
     seconds = np.arange(10.0)
     for axis, name in enumerate(("east_m", "north_m", "amsl_m")):
         there = np.interp(seconds, real["time_s"], real[name])
@@ -128,7 +128,7 @@ def test_the_abort_flies_into_the_hill_as_arduplane_did() -> None:
 
 def test_an_abort_that_has_to_climb_holds_its_course_until_it_is_above_its_height() -> None:
     flown, way = aborted(height=120.0)
-    assert flown["ended"] != RETURN_GROUND_IMPACT
+    assert flown["end_code"] != RETURN_GROUND_IMPACT
     top = kept_setup("abort").mission.home.alt + 120.0
     k = int(np.argmax(way[:, 2] > top))
     courses = np.degrees(np.arctan2(*np.diff(way[:k, :2], axis=0).T)) % 360.0
@@ -139,7 +139,7 @@ def test_an_abort_that_has_to_climb_holds_its_course_until_it_is_above_its_heigh
 
 
 def test_the_speed_where_it_is_aborted_is_the_glides_in_the_wind() -> None:
-    world = return_world(kept_setup("abort"))
+    world = make_return_world(kept_setup("abort"))
     real = kept_sequence("abort")
     start = make_abort_start((8333.66, -4151.17, 392.3), math.radians(240.0), 0.098, 22.9, world.aircraft)
     for name in ("east", "north"):

@@ -39,7 +39,7 @@ from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, r
 from tests.setups import MakeSetup
 from tests.soak import SOAK
 from world.kernels import Record, field_names
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 from world.scenario_tables import ArduPlaneVersion
 
 
@@ -714,7 +714,7 @@ def test_the_same_setup_gives_the_same_flight(
 
 @pytest.mark.parametrize("kept", KEPT, ids=[str(kept["seed"]) for kept in KEPT])
 def test_it_flies_as_arduplane_flew(kept: dict[str, Any]) -> None:
-    scenario = from_spec(kept["scenario"], "kept")
+    scenario = scenario_from_spec(kept["scenario"], "kept")
     airframe = load_airframe(scenario)
     setup = setup_of(scenario, airframe, parse_mission(kept["mission"], "kept.waypoints"), kept["seed"])
     law = fly_to_end(Flight(setup, airframe.aircraft))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.autopilots.arduplane import point_mass as subject
-from flight.autopilots.arduplane.point_mass import PointMass, excess_power, fill_excess_power, point_mass
+from flight.autopilots.arduplane.point_mass import PointMass, excess_power, fill_excess_power, make_point_mass
 from tests.flight.autopilots.arduplane.test_rtl_point_mass import airframe
 from world.wind import Wind
 
@@ -45,7 +45,7 @@ def made(monkeypatch: pytest.MonkeyPatch, slowest_glide: float) -> PointMass:
     monkeypatch.setattr(subject, "read_tables", lambda *_: None)
     monkeypatch.setattr(subject, "write_tables", lambda *_: None)
     one = airframe()
-    return point_mass(one.aircraft, one.limits.envelope, one.airspeed, Wind(0.0, 0.0))
+    return make_point_mass(one.aircraft, one.limits.envelope, one.airspeed, Wind(0.0, 0.0))
 
 
 def test_a_glide_never_gets_the_thrust_of_a_throttle_that_has_a_trim(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
-from flight.autopilots.arduplane.point_mass import PointMass, point_mass
+from flight.autopilots.arduplane.point_mass import PointMass, make_point_mass
 from flight.autopilots.arduplane.rtl_point_mass import (
     RETURN_ARRIVED,
     RETURN_GROUND_IMPACT,
@@ -18,7 +18,7 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     ReturnEnvironment,
     SimulatedReturns,
     fly_returns,
-    surroundings,
+    make_return_environment,
 )
 from flight.mission.return_path import ReturnCircle, ReturnPoint, choose_target
 from planfly.workflow.airframe import Airframe, load_airframe
@@ -44,12 +44,12 @@ def airframe() -> Airframe:
 @functools.cache
 def aerosonde(wind: Wind = WIND) -> PointMass:
     made = airframe()
-    return point_mass(made.aircraft, made.limits.envelope, made.airspeed, wind)
+    return make_point_mass(made.aircraft, made.limits.envelope, made.airspeed, wind)
 
 
 @functools.cache
 def around() -> ReturnEnvironment:
-    return surroundings(jacksboro())
+    return make_return_environment(jacksboro())
 
 
 def parameters(**values: float) -> ArduPilotParameters:
@@ -91,28 +91,28 @@ def swift(flight: str) -> tuple[str, SimulatedReturns]:
     here = (float(begin["east"][0]), float(begin["north"][0]), float(begin["up"][0]))
     target = choose_target(rules, here, ReturnPoint(*HOME), points)
     circle = ReturnCircle(*target.position, rules.radius, target.slope_base)
-    return target.name, fly_returns(begin, [circle], made, aerosonde(), around(), keep=True)
+    return target.name, fly_returns(begin, [circle], made, aerosonde(), around(), store_positions=True)
 
 
 @pytest.mark.parametrize("flight", KEPT)
 def test_it_ends_as_arduplane_did(flight: str) -> None:
     real, (target, made) = KEPT[flight], swift(flight)
-    flown = made.flown[0]
+    flown = made.results[0]
     assert target == real["target"]
-    assert (flown["ended"] == RETURN_GROUND_IMPACT) == (real["hit"] == "1")
-    assert (flown["outside_before"] < 0.0) == (float(real["outside_spheres_m"]) < 0.0)
+    assert (flown["end_code"] == RETURN_GROUND_IMPACT) == (real["hit"] == "1")
+    assert (flown["distance_before_arrival"] < 0.0) == (float(real["outside_spheres_m"]) < 0.0)
     low, high = CLEARANCE[kind(flight)]
-    assert low <= flown["clearance_before"] - float(real["least_clearance_m"]) <= high
+    assert low <= flown["clearance_before_arrival"] - float(real["least_clearance_m"]) <= high
     if real["hit"] == "1":
-        assert abs(flown["seconds"] - kept_track(flight)[-1, 0]) < 20.0 + ARRIVAL
+        assert abs(flown["end_time"] - kept_track(flight)[-1, 0]) < 20.0 + ARRIVAL
     else:
-        assert flown["ended"] == RETURN_ARRIVED
-        assert abs(flown["to_circle"] - float(real["to_circle_s"])) < ARRIVAL
+        assert flown["end_code"] == RETURN_ARRIVED
+        assert abs(flown["arrival_time"] - float(real["to_circle_s"])) < ARRIVAL
 
 
 @pytest.mark.parametrize("flight", KEPT)
 def test_on_the_way_it_is_where_arduplane_was(flight: str) -> None:
-    way = swift(flight)[1].ways[0]
+    way = swift(flight)[1].tracks[0]
     for time, east, north, up in kept_track(flight):
         if time < len(way) - 1:
             here = [np.interp(time, np.arange(len(way)), way[:, k]) for k in range(3)]
@@ -123,9 +123,9 @@ def test_on_the_way_it_is_where_arduplane_was(flight: str) -> None:
 @pytest.mark.skipif(not SOAK, reason="38 flights in JSBSim; set PLANFLY_SOAK=1")
 @pytest.mark.parametrize("flight", KEPT)
 def test_it_is_where_the_whole_law_is(flight: str) -> None:
-    whole, flown = flown_return(flight), swift(flight)[1].flown[0]
-    assert abs(flown["clearance_before"] - whole.low) < APART[kind(flight)]
-    assert (flown["outside_before"] < 0.0) == (whole.outside < 0.0)
+    whole, flown = flown_return(flight), swift(flight)[1].results[0]
+    assert abs(flown["clearance_before_arrival"] - whole.low) < APART[kind(flight)]
+    assert (flown["distance_before_arrival"] < 0.0) == (whole.outside < 0.0)
 
 
 # ----------------------------------------------------------------------
@@ -142,7 +142,7 @@ def flat(height: float = 0.0, spheres: tuple[tuple[float, ...], ...] = ()) -> Re
 
 
 def returned(begin: Records, circle: ReturnCircle, world: ReturnEnvironment, **values: float) -> Records:
-    found: Records = fly_returns(begin, [circle], parameters(**values), aerosonde(Wind()), world).flown[0]
+    found: Records = fly_returns(begin, [circle], parameters(**values), aerosonde(Wind()), world).results[0]
     return found
 
 
@@ -152,8 +152,8 @@ def test_it_sinks_on_a_straight_line_over_the_ground() -> None:
     sphere = (0.0, 2500.0, 700.0 - 50.0 - 10.0, 10.0)
     flown = returned(begin, ReturnCircle(0.0, 5000.0, 500.0, 120.0), flat(100.0, (sphere,)))
     lag = 3.0 * 26.0 * 400.0 / 5000.0
-    assert flown["outside"] == pytest.approx(50.0 + lag, abs=4.0)
-    assert flown["clearance_before"] == pytest.approx(400.0 * (1.0 + 200.0 / 5000.0) + lag, abs=8.0)
+    assert flown["sphere_distance"] == pytest.approx(50.0 + lag, abs=4.0)
+    assert flown["clearance_before_arrival"] == pytest.approx(400.0 * (1.0 + 200.0 / 5000.0) + lag, abs=8.0)
     assert flown["clearance"] == pytest.approx(400.0, abs=5.0)
 
 
@@ -162,7 +162,7 @@ def test_it_is_mirrored_with_its_start() -> None:
         returned(start(up=900.0, velocity_north=-26.0, east=side), ReturnCircle(0.0, 5000.0, 950.0, side), flat(100.0))
         for side in (-200.0, 200.0)
     ]
-    for name in ("seconds", "to_circle", "clearance", "energy"):
+    for name in ("end_time", "arrival_time", "clearance", "energy"):
         assert lefts[0][name] == pytest.approx(lefts[1][name], rel=1e-6)
 
 
@@ -172,37 +172,37 @@ def test_a_slow_roll_turns_back_later() -> None:
     At 2 deg/s it swings about its course, and does not arrive.
     """
     begin, circle = start(up=900.0, velocity_north=-26.0), ReturnCircle(0.0, 5000.0, 950.0, 200.0)
-    seconds = [float(returned(begin, circle, flat(100.0), RLL2SRV_RMAX=rate)["seconds"]) for rate in (0.0, 90.0, 10.0)]
+    seconds = [float(returned(begin, circle, flat(100.0), RLL2SRV_RMAX=rate)["end_time"]) for rate in (0.0, 90.0, 10.0)]
     assert seconds[0] == seconds[1]
     assert seconds[2] - seconds[0] == pytest.approx(2.0 * (1.5 - 0.42), abs=1.0)
-    assert returned(begin, circle, flat(100.0), RLL2SRV_RMAX=2.0)["ended"] == RETURN_TIMEOUT
+    assert returned(begin, circle, flat(100.0), RLL2SRV_RMAX=2.0)["end_code"] == RETURN_TIMEOUT
 
 
 def test_a_wall_that_is_higher_is_never_safer() -> None:
     circle, begin = ReturnCircle(0.0, 6000.0, 300.0, 120.0), start(up=900.0, velocity_north=26.0)
     ends = [returned(begin, circle, flat(height)) for height in (100.0, 295.0, 310.0, 600.0)]
-    assert [int(end["ended"]) for end in ends] == [
+    assert [int(end["end_code"]) for end in ends] == [
         RETURN_ARRIVED,
         RETURN_ARRIVED,
         RETURN_GROUND_IMPACT,
         RETURN_GROUND_IMPACT,
     ]
     assert ends[0]["clearance"] - ends[1]["clearance"] == pytest.approx(195.0, abs=0.1)
-    assert ends[2]["seconds"] > ends[3]["seconds"]
+    assert ends[2]["end_time"] > ends[3]["end_time"]
 
 
 def test_what_cannot_end_is_told() -> None:
     begin = start(up=900.0, velocity_north=26.0)
     # Higher than the aircraft climbs, and beyond the elevation data.
     high = returned(begin, ReturnCircle(0.0, 1000.0, 8900.0, 120.0), flat(100.0), THR_MAX=78.0)
-    assert high["ended"] == RETURN_TIMEOUT
+    assert high["end_code"] == RETURN_TIMEOUT
     off = returned(begin, ReturnCircle(0.0, 90_000.0, 900.0, 120.0), flat(100.0))
-    assert off["ended"] == RETURN_OFF_TERRAIN
+    assert off["end_code"] == RETURN_OFF_TERRAIN
     nowhere = ReturnEnvironment(
         around().heights, around().to_pixel, read_only(np.zeros((0, 3))), read_only(np.zeros(0)), False
     )
     told = returned(begin, ReturnCircle(0.0, 2000.0, 900.0, 120.0), nowhere)
-    assert told["ended"] == RETURN_ARRIVED
+    assert told["end_code"] == RETURN_ARRIVED
     assert math.isnan(told["clearance"])
     assert told["threat"] == -1
 
@@ -215,22 +215,22 @@ def test_its_circle_is_flown_all_around(radius: float) -> None:
         at = away * math.sin(math.radians(bearing)), 5000.0 + away * math.cos(math.radians(bearing))
         flown = returned(begin, ReturnCircle(0.0, 5000.0, 900.0, radius), flat(100.0, ((*at, 900.0, 1.0),)))
         # True radii grow with height: 900 m are 9 % of it.
-        assert flown["outside"] < 0.12 * away + 60.0
-        assert flown["ended"] == RETURN_ARRIVED
-    assert flown["to_circle"] == pytest.approx((5000.0 - max(200.0, 1.3 * 1.09 * abs(radius))) / 26.1, abs=4.0)
+        assert flown["sphere_distance"] < 0.12 * away + 60.0
+        assert flown["end_code"] == RETURN_ARRIVED
+    assert flown["arrival_time"] == pytest.approx((5000.0 - max(200.0, 1.3 * 1.09 * abs(radius))) / 26.1, abs=4.0)
 
 
 def test_one_that_grazes_the_ground_is_flown_on_and_its_depth_is_known() -> None:
     circle, begin = ReturnCircle(0.0, 6000.0, 900.0, 120.0), start(up=900.0, velocity_north=26.0)
     safe = returned(begin, circle, flat(895.0))
     grazed = returned(begin, circle, flat(905.0))
-    assert (int(safe["ended"]), int(grazed["ended"])) == (RETURN_ARRIVED, RETURN_GROUND_IMPACT)
+    assert (int(safe["end_code"]), int(grazed["end_code"])) == (RETURN_ARRIVED, RETURN_GROUND_IMPACT)
     assert grazed["clearance"] == pytest.approx(safe["clearance"] - 10.0, abs=0.1)
     # The whole way: its energy is that of the one that was not hit.  Where it hits is where it does so first.
     assert grazed["energy"] == pytest.approx(safe["energy"], rel=1e-6)
     assert grazed["clearance_time"] == 0.0
     deep = returned(begin, circle, flat(920.0))
-    assert (int(deep["ended"]), float(deep["seconds"])) == (RETURN_GROUND_IMPACT, 0.0)
+    assert (int(deep["end_code"]), float(deep["end_time"])) == (RETURN_GROUND_IMPACT, 0.0)
     assert deep["clearance"] == pytest.approx(-20.0, abs=0.1)
 
 
@@ -238,4 +238,4 @@ def test_energy_is_power_over_time() -> None:
     # Level for 20 km: the envelope's level power at 26.2 m/s true (25 equivalent at 1,000 m) over the time.
     flown = returned(start(up=1000.0, velocity_north=26.2), ReturnCircle(0.0, 20_000.0, 1000.0, 120.0), flat(100.0))
     power = airframe().limits.envelope.power(26.2, 1000.0, 0.0)
-    assert flown["energy"] == pytest.approx(power * flown["seconds"] / 3600.0, rel=0.04)
+    assert flown["energy"] == pytest.approx(power * flown["end_time"] / 3600.0, rel=0.04)

@@ -95,8 +95,8 @@ def test_what_px4s_own_program_flies_leaves_no_verdict_open() -> None:
     mission = MissionParts(returns=True, moves_payload=True)
     # It gets what begins with `FLYING`, and planfly's physics have no distance sensor.
     assert all(name.startswith(FLYING) for name in values)
-    assert [text.split()[0] for text in Px4Sitl(made).checks.settings_not_flown(mission)] == [*others]
-    left = [text.split()[0] for text in Px4(made).checks.settings_not_flown(mission)]
+    assert [text.split()[0] for text in Px4Sitl(made).checks.describe_unsimulated_settings(mission)] == [*others]
+    left = [text.split()[0] for text in Px4(made).checks.describe_unsimulated_settings(mission)]
     assert sorted(left) == sorted(values | others)
 
 
@@ -119,7 +119,7 @@ def test_a_home_beyond_the_missions_fence_leaves_the_verdict_open(
 ) -> None:
     made = Px4(Px4Parameters.defaults().changed(**values))
     mission = MissionParts(has_fence=True, fence_at_home=fence_at_home)
-    assert made.checks.settings_not_flown(mission) == words
+    assert made.checks.describe_unsimulated_settings(mission) == words
 
 
 @pytest.mark.parametrize(
@@ -136,9 +136,9 @@ def test_a_predicted_breach_of_the_missions_fence_leaves_the_verdict_open(
 ) -> None:
     """`Navigator::geofence_breach_check` up to 1.17."""
     made = Px4(Px4Parameters.defaults().changed(**values))
-    assert [text.split()[0] for text in made.checks.settings_not_flown(MissionParts(has_fence=has_fence))] == [
-        "GF_PREDICT"
-    ] * opens
+    assert [
+        text.split()[0] for text in made.checks.describe_unsimulated_settings(MissionParts(has_fence=has_fence))
+    ] == ["GF_PREDICT"] * opens
 
 
 @pytest.mark.parametrize(

@@ -49,7 +49,7 @@ CA_SV_CS3_TYPE 4
 
 def said(text: str, aircraft: str = "aerosonde") -> list[str]:
     made = Px4(Px4Parameters.of_text(text, "mine.params"))
-    return made.checks.settings_not_flown(MissionParts(aircraft=load_aircraft(aircraft)))
+    return made.checks.describe_unsimulated_settings(MissionParts(aircraft=load_aircraft(aircraft)))
 
 
 @pytest.mark.parametrize("name", aircraft_names())
@@ -134,7 +134,7 @@ def test_gains_of_the_aircraft_leave_nothing_open(name: str) -> None:
 
 def test_px4s_own_program_flies_the_gains_but_has_a_gps() -> None:
     made = Px4Sitl(Px4Parameters.of_text("FW_RR_FF 0\nFW_RR_P 0\nFW_RR_I 0\nEKF2_GPS_CTRL 0", "mine.params"))
-    assert [text.split()[0] for text in made.checks.settings_not_flown(MissionParts())] == ["EKF2_GPS_CTRL"]
+    assert [text.split()[0] for text in made.checks.describe_unsimulated_settings(MissionParts())] == ["EKF2_GPS_CTRL"]
 
 
 @pytest.mark.parametrize(
@@ -157,6 +157,6 @@ def test_returns_to_other_places_than_the_simulated_one(text: str, mission: Miss
     made = Px4(
         Px4Parameters.of_text(f"{text}\nRTL_DESCEND_ALT 100\nRTL_RETURN_ALT 100\nRTL_LAND_DELAY -1", "mine.params")
     )
-    texts = made.checks.settings_not_flown(mission)
+    texts = made.checks.describe_unsimulated_settings(mission)
     assert len(texts) == bool(name)
     assert all(one.startswith(name) for one in texts)

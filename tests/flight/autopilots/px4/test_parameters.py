@@ -9,7 +9,13 @@ import pytest
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import StoredParameters
-from flight.autopilots.px4.parameters import DEFINITIONS, NOT_FLOWN, PX4_PARAMETERS, Px4Parameters, speed_filter_gains
+from flight.autopilots.px4.parameters import (
+    DEFINITIONS,
+    NOT_SIMULATED,
+    PX4_PARAMETERS,
+    Px4Parameters,
+    speed_filter_gains,
+)
 from world.errors import ParameterError
 from world.kernels import field_names
 
@@ -68,13 +74,13 @@ def test_a_stations_file_goes_before_the_aircraft_and_that_before_px4(aerosonde:
 def test_one_that_is_not_flown_counts_where_it_is_not_px4s_own() -> None:
     made = Px4Parameters.of_text("FW_T_F_ALT_ERR -1\nRTL_LAND_DELAY 5\n", "a.params")
     assert set(made.by_origin("file")) == {"RTL_LAND_DELAY"}
-    assert {"FW_T_F_ALT_ERR", "RTL_LAND_DELAY"} <= set(NOT_FLOWN)
-    assert NOT_FLOWN[0] == "FW_USE_AIRSPD"
+    assert {"FW_T_F_ALT_ERR", "RTL_LAND_DELAY"} <= set(NOT_SIMULATED)
+    assert NOT_SIMULATED[0] == "FW_USE_AIRSPD"
 
 
 def test_what_a_person_states_otherwise_and_is_not_flown_is_named() -> None:
     made = Px4Parameters.of_text("FW_USE_AIRSPD 0\nNPFG_EN_MIN_GSP 0\nNAV_FW_ALTL_RAD 8\nFW_LND_ANG 7\n", "a.params")
-    assert {"FW_USE_AIRSPD", "NPFG_EN_MIN_GSP", "NAV_FW_ALTL_RAD"} <= set(made.by_origin("file")) & set(NOT_FLOWN)
+    assert {"FW_USE_AIRSPD", "NPFG_EN_MIN_GSP", "NAV_FW_ALTL_RAD"} <= set(made.by_origin("file")) & set(NOT_SIMULATED)
     assert made.by_origin("file")["FW_LND_ANG"] == 7.0
     assert made.unused == ()
 
@@ -145,15 +151,15 @@ def test_what_lies_beyond_the_documented_range_is_flown_and_said() -> None:
     text = "FW_R_LIM 30\nFW_P_LIM_MAX 70\nNPFG_PERIOD_SF 10\nFW_T_CLMB_R_SP 0.1\nFW_T_SINK_R_SP 40\nFW_T_SEB_R_FF 3\n"
     made = Px4Parameters.of_text(text, "a.params")
     assert made.by_origin("file")["FW_T_SINK_R_SP"] == 40.0
-    assert [said.split(" (")[0] for said in made.beyond] == [
+    assert [said.split(" (")[0] for said in made.outside_documented_ranges] == [
         "FW_R_LIM 30",
         "FW_T_CLMB_R_SP 0.1",
         "FW_T_SINK_R_SP 40",
         "FW_T_SEB_R_FF 3",
         "FW_P_LIM_MAX 70",
     ]
-    assert made.beyond[0] == "FW_R_LIM 30 (35..75)"
-    assert Px4Parameters.of_text("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").beyond == ()
+    assert made.outside_documented_ranges[0] == "FW_R_LIM 30 (35..75)"
+    assert Px4Parameters.of_text("FW_R_LIM 35\nNAV_ACC_RAD 200", "a.params").outside_documented_ranges == ()
 
 
 def test_a_documented_range_holds_the_default_and_is_within_what_is_taken() -> None:

@@ -69,7 +69,7 @@ def test_a_way_through_a_box(aside: float) -> None:
     assert found.depth == pytest.approx(min(aside, 100.0), abs=0.011)
     assert (found.entry_time, found.exit_time) == pytest.approx((15.0, 35.0), abs=1e-4)
     assert (found.entry_east, found.entry_north, found.exit_east) == pytest.approx((0.0, aside, 400.0), abs=2e-3)
-    assert found.beyond == pytest.approx(20.0, abs=1e-4)
+    assert found.violation_time == pytest.approx(20.0, abs=1e-4)
     assert (found.entries, found.unknown) == (1, False)
 
 
@@ -77,7 +77,7 @@ def test_a_way_through_a_box(aside: float) -> None:
 def test_a_way_beside_a_box(aside: float) -> None:
     found = visit([move(-300.0, aside, 100.0, length=1000.0)], box())
     assert found.depth == pytest.approx(aside if aside < 0.0 else 200.0 - aside, abs=0.011)
-    assert (found.entries, found.beyond) == (0, 0.0)
+    assert (found.entries, found.violation_time) == (0, 0.0)
 
 
 def test_a_corner_that_is_cut_by_a_metre_of_way_is_found() -> None:
@@ -86,7 +86,7 @@ def test_a_corner_that_is_cut_by_a_metre_of_way_is_found() -> None:
     away = 1000.0 * math.sqrt(0.5)
     found = visit([move(off - away, off + away, 100.0, course=135.0, length=2000.0, lasts=2000.0)], box())
     assert found.entries == 1
-    assert found.beyond == pytest.approx(1.0, abs=1e-3)
+    assert found.violation_time == pytest.approx(1.0, abs=1e-3)
     # Deepest at half a metre from the corner along the diagonal: 0.35 m from either edge.
     assert found.depth == pytest.approx(off, abs=0.011)
 
@@ -111,7 +111,7 @@ def test_a_blend_between_its_ends_heights() -> None:
         found = visit([hump], box(floor=ZoneLevel(floor, "amsl")))
         assert found.depth == pytest.approx(depth, abs=0.011)
         # 1 m below its top the parabola is 2/25 of its length wide, the square root of 1/25 on either side of it.
-        assert found.beyond == pytest.approx(2.0 if depth > 0.0 else 0.0, abs=1e-3)
+        assert found.violation_time == pytest.approx(2.0 if depth > 0.0 else 0.0, abs=1e-3)
 
 
 def test_a_climb_that_begins_level_goes_through_a_band() -> None:
@@ -130,11 +130,11 @@ def test_a_climb_through_a_band(kind: str) -> None:
     found = visit([move(50.0, 100.0, 0.0, climb=300.0, lasts=30.0)], zone)
     if kind == "exclusion":
         assert found.depth == pytest.approx(30.0, abs=0.011)
-        assert (found.entry_time, found.exit_time, found.beyond) == pytest.approx((10.0, 16.0, 6.0), abs=1e-3)
+        assert (found.entry_time, found.exit_time, found.violation_time) == pytest.approx((10.0, 16.0, 6.0), abs=1e-3)
     else:
         assert found.depth == pytest.approx(140.0, abs=0.011)
         assert (found.entries, found.entry_time, found.exit_time) == (2, 0.0, 30.0)
-        assert found.beyond == pytest.approx(24.0, abs=1e-3)
+        assert found.violation_time == pytest.approx(24.0, abs=1e-3)
 
 
 def test_several_ways_out_of_an_inclusion() -> None:
@@ -144,7 +144,7 @@ def test_several_ways_out_of_an_inclusion() -> None:
     found = visit([there, back], box("inclusion"))
     assert found.depth == pytest.approx(100.0, abs=0.011)
     # 10 s to the box; 20 s beyond it, at its end and on the way back; 10 s at the end.
-    assert (found.entries, found.beyond) == (3, pytest.approx(40.0, abs=1e-3))
+    assert (found.entries, found.violation_time) == (3, pytest.approx(40.0, abs=1e-3))
     assert (found.entry_time, found.exit_time, found.exit_leg) == (0.0, 120.0, 1)
 
 
@@ -152,7 +152,7 @@ def test_a_hole_is_outside() -> None:
     hole = [(100.0, 50.0), (300.0, 50.0), (300.0, 150.0), (100.0, 150.0)]
     zone = Zone("ring", "exclusion", make_polygon([list(BOX), hole]))
     found = visit([move(-100.0, 100.0, 0.0, length=600.0, lasts=60.0)], zone)
-    assert (found.entries, found.beyond) == (2, pytest.approx(20.0, abs=1e-3))
+    assert (found.entries, found.violation_time) == (2, pytest.approx(20.0, abs=1e-3))
     assert found.depth == pytest.approx(50.0, abs=0.011)
 
 
@@ -213,7 +213,7 @@ def test_of_many_zones_each_is_judged_by_itself() -> None:
             assert one.depth == pytest.approx(depths[-1], abs=0.011)
             chord = min(2.0 * math.sqrt(zone.shape.radius**2 - beside**2), 10_000.0)
             inside = min(5000.0, zone.shape.east + chord / 2.0) - max(-5000.0, zone.shape.east - chord / 2.0)
-            assert one.beyond == pytest.approx(inside / 10.0, abs=0.01)
+            assert one.violation_time == pytest.approx(inside / 10.0, abs=0.01)
         else:
             # No less than it is, and not beyond the limit.
             assert depths[-1] - 0.011 <= one.depth <= 0.0
@@ -225,7 +225,7 @@ def test_a_stay_over_several_blocks_of_moves_is_counted_once() -> None:
     """200 moves of 10 m in 1 s each: the box is 400 m wide, from the 50th move on."""
     moves = [move(-500.0 + 10.0 * k, 50.0, 100.0, length=10.0, lasts=1.0, time=float(k), leg=k) for k in range(200)]
     found = visit(moves, box())
-    assert (found.entries, found.beyond) == (1, pytest.approx(40.0, abs=1e-4))
+    assert (found.entries, found.violation_time) == (1, pytest.approx(40.0, abs=1e-4))
     assert (found.entry_time, found.exit_time) == pytest.approx((50.0, 90.0), abs=1e-4)
 
 

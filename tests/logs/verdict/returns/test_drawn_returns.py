@@ -13,7 +13,7 @@ from logs.verdict.returns.drawn_returns import (
     group_segments,
     min_safe_altitudes,
 )
-from logs.verdict.returns.judge_returns import judge_returns, return_world
+from logs.verdict.returns.judge_returns import judge_returns, make_return_world
 from logs.verdict.returns.return_starts import planned_starts
 from tests.logs.verdict.returns.hill import hill_drawn, hill_setup
 
@@ -42,7 +42,7 @@ def test_the_way_of_the_worst_begins_where_it_turns_back_and_ends_where_it_hits(
 
 def test_where_all_are_safe_the_lowest_is_drawn(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
-    world, starts = return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 20.0)
+    world, starts = make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 20.0)
     returns = judge_returns(world, starts, 20.0)
     (only,) = drawn_returns_without_glides(world, starts, returns).worst
     assert only.simulated.safe
@@ -52,7 +52,7 @@ def test_where_all_are_safe_the_lowest_is_drawn(tmp_path: Path) -> None:
 def test_the_least_height_is_that_of_the_straight_slope_over_the_hill(tmp_path: Path) -> None:
     """From x m east at h a return is at 100 + (h - 100) 3000 / x over the hill's 400 m, and some 7 m higher, late."""
     setup = hill_setup(tmp_path)
-    world, starts = return_world(setup), planned_starts(setup, 10.0)
+    world, starts = make_return_world(setup), planned_starts(setup, 10.0)
     found = min_safe_altitudes(world, starts)
     east = np.interp(found.time, starts.time, starts.rows["east"])
     behind = east > 5000.0
@@ -76,7 +76,7 @@ def test_the_least_height_is_that_of_the_straight_slope_over_the_hill(tmp_path: 
 def test_without_terrain_no_height_is_known(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     bare = replace(setup, scenario=replace(setup.scenario, terrain=None))
-    assert np.isnan(min_safe_altitudes(return_world(bare), planned_starts(setup, 40.0)).altitude).all()
+    assert np.isnan(min_safe_altitudes(make_return_world(bare), planned_starts(setup, 40.0)).altitude).all()
 
 
 def test_a_place_with_two_ways_home_counts_by_the_worse(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from logs.verdict.places import FLIGHT
 from logs.verdict.returns.glides_text import glide_notes, glide_range_text, glides_headline
 from logs.verdict.returns.judge_glides import Glides, judge_glides
-from logs.verdict.returns.judge_returns import PointOfNoReturn, judge_returns, return_world
+from logs.verdict.returns.judge_returns import PointOfNoReturn, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import point_of_no_return_text
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
@@ -28,7 +28,7 @@ RATIO = 10.6
 
 
 def judged(setup: FlightSetup, every: float = 4.0, **parameters: float) -> Glides:
-    return judge_glides(return_world(setup).with_parameters(**parameters), planned_starts(setup, every))
+    return judge_glides(make_return_world(setup).with_parameters(**parameters), planned_starts(setup, every))
 
 
 def rally(east: float, up: float = 100.0) -> MissionItem:
@@ -119,11 +119,11 @@ def test_a_sphere_on_the_way_home_stops_its_own_return_and_is_flown_around(tmp_p
 def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     nowhere = replace(setup, scenario=replace(setup.scenario, terrain=None))
-    found = judge_glides(return_world(nowhere), planned_starts(setup, 20.0))
+    found = judge_glides(make_return_world(nowhere), planned_starts(setup, 20.0))
     assert (found.each, found.not_judged) == ((), "terrain")
     assert glides_headline(found) == "not judged: there is no elevation file"
     assert glide_notes(found) == []
-    world = return_world(setup)
+    world = make_return_world(setup)
     without = replace(world, aircraft=world.aircraft._replace(glides=False))
     assert glides_headline(judge_glides(without, planned_starts(setup, 20.0))) == (
         "not judged: the model has no trim with the throttle closed"
@@ -134,7 +134,7 @@ def test_what_is_not_known_is_said(tmp_path: Path) -> None:
     assert "is not simulated" in glides_headline(follows)
     starts = planned_starts(setup, 20.0)
     starts.rows["east"] += 50_000.0
-    away = judge_glides(return_world(setup), starts)
+    away = judge_glides(make_return_world(setup), starts)
     assert away.not_judged == "far" or {one.reach for one in away.each} == {"unknown"}
 
 
@@ -160,7 +160,7 @@ def test_a_scenario_that_requires_it_fails_where_nothing_is_in_reach(tmp_path: P
 
 def test_just_enough_height_is_enough(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path, BARRED)
-    world, starts = return_world(setup), planned_starts(setup, 1.0).subset(np.array([60]))
+    world, starts = make_return_world(setup), planned_starts(setup, 1.0).subset(np.array([60]))
 
     def lowered(metres: float) -> Glides:
         rows = starts.rows.copy()
@@ -237,13 +237,15 @@ def no_return(setup: FlightSetup, used: float = 0.0, flown: float = 0.0, **param
     """Of a flight that had used so many Wh at first, and uses so many in each second."""
     starts = planned_starts(setup, 4.0)
     starts.energy_used[:] = used + flown * starts.time
-    return judge_returns(return_world(setup).with_parameters(**parameters), starts, 4.0).point_of_no_return
+    return judge_returns(make_return_world(setup).with_parameters(**parameters), starts, 4.0).point_of_no_return
 
 
 def test_the_point_of_no_return_is_the_last_with_the_reserve(tmp_path: Path) -> None:
     """10 Wh, 2 of them reserve; a return takes some 7 Wh for its circle, and 4 Wh a kilometre."""
     setup = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
-    each = judge_returns(return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 4.0), 4.0).each
+    each = judge_returns(
+        make_return_world(setup).with_parameters(RTL_ALTITUDE=600.0), planned_starts(setup, 4.0), 4.0
+    ).each
     point = no_return(setup, flown=0.02, RTL_ALTITUDE=600.0)
     leaves = [one.energy_left - 0.02 * one.time for one in each]
     last = max(one.time for one, left in zip(each, leaves, strict=True) if left >= 2.0)
@@ -271,7 +273,7 @@ def test_more_wind_against_the_way_back_brings_it_nearer(tmp_path: Path) -> None
 
 def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
-    returns = judge_returns(return_world(setup), planned_starts(setup, 20.0), 20.0)
+    returns = judge_returns(make_return_world(setup), planned_starts(setup, 20.0), 20.0)
     assert returns.point_of_no_return.kind == "used"
     assert "the energy used before is unknown" in point_of_no_return_text(returns)
     guessed = replace(setup, limits=replace(setup.limits, envelope=replace(setup.envelope, battery_guessed=True)))
@@ -283,6 +285,6 @@ def test_what_is_not_known_of_energy_is_said(tmp_path: Path) -> None:
     starts = planned_starts(setup, 20.0)
     starts.energy_used[:] = 0.0
     deep = starts.subset(np.flatnonzero(starts.rows["east"] > 6000.0))
-    none = judge_returns(return_world(setup), deep, 20.0)
+    none = judge_returns(make_return_world(setup), deep, 20.0)
     assert none.point_of_no_return.kind == "arrives"
     assert point_of_no_return_text(none).endswith("because no return arrives")

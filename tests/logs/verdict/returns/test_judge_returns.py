@@ -19,7 +19,7 @@ from logs.verdict.returns.judge_returns import (
     SimulatedReturn,
     badness,
     judge_returns,
-    return_world,
+    make_return_world,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.returns_text import headline, range_text
@@ -30,7 +30,7 @@ from world.errors import MissionError
 
 
 def judged(setup: FlightSetup, every: float = 4.0, **parameters: float) -> Returns:
-    world = return_world(setup).with_parameters(**parameters)
+    world = make_return_world(setup).with_parameters(**parameters)
     return judge_returns(world, planned_starts(setup, every), every)
 
 
@@ -139,7 +139,7 @@ OFTEN = 2.0
 
 @pytest.fixture(scope="module")
 def hill(tmp_path_factory: pytest.TempPathFactory) -> tuple[ReturnWorld, ReturnStarts, Returns]:
-    world = return_world(hill_setup(tmp_path_factory.mktemp("hill")))
+    world = make_return_world(hill_setup(tmp_path_factory.mktemp("hill")))
     starts = planned_starts(world.setup, OFTEN)
     return world, starts, judge_returns(world, starts, OFTEN)
 
@@ -225,7 +225,7 @@ def test_one_that_begins_low_is_held_to_what_it_has(tmp_path: Path) -> None:
 
 
 def test_what_was_low_before_it_left_the_elevation_file_is_low(tmp_path: Path) -> None:
-    world = return_world(hill_setup(tmp_path))
+    world = make_return_world(hill_setup(tmp_path))
     # Home lies 3 km west of the file, which ends at -3000 m, its circle 225 m below the ground here.  From x metres
     # east it sinks 825 m in D = x + 6000 m, 3 s late at 26 m/s: where the file ends it is at -225 + 825 * 3078 / D.
     # That is the least height of 30 m for D = 9960 m, and the ground for 11290 m.
@@ -297,14 +297,14 @@ def test_energy_that_may_not_suffice_is_undecided(tmp_path: Path) -> None:
 def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     guess = guessed(setup)
-    world, starts = return_world(guess), planned_starts(guess, 20.0)
+    world, starts = make_return_world(guess), planned_starts(guess, 20.0)
     found = ReturnsResult(guess, judge_returns(world, starts, 20.0))
     assert all(math.isnan(one.energy_left) for one in found.returns.each)
     assert not found.returns.count("energy")
     assert any("the battery capacity is guessed, so energy is not judged" in note for note in found.notes)
     stated = hill_setup(tmp_path, "[flight]\nbattery_wh = 10\n")
     known = guessed(stated)
-    found = ReturnsResult(known, judge_returns(return_world(known), starts, 20.0))
+    found = ReturnsResult(known, judge_returns(make_return_world(known), starts, 20.0))
     assert found.returns.count("energy")
     assert not any("battery" in note for note in found.notes)
 
@@ -312,4 +312,4 @@ def test_a_guessed_battery_is_not_judged_and_a_note_says_so(tmp_path: Path) -> N
 def test_without_a_home_there_is_nowhere_to_return_to(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     with pytest.raises(MissionError, match="home: not stated"):
-        return_world(replace(setup, mission=replace(setup.mission, home=None)))
+        make_return_world(replace(setup, mission=replace(setup.mission, home=None)))

@@ -7,7 +7,7 @@ import pytest
 
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT
-from logs.verdict.returns.judge_returns import Returns, judge_returns, return_world
+from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
@@ -28,7 +28,7 @@ LANDING = WAY + row(3, 189) + row(4, 16, 6000.0, 100.0) + row(5, 21, 7000.0, 1.0
 
 def judged(folder: Path, mission: str = LANDING, more: str = "", **parameters: float) -> Returns:
     setup = hill_setup(folder, more, mission)
-    world = return_world(setup).with_parameters(**parameters)
+    world = make_return_world(setup).with_parameters(**parameters)
     starts = planned_starts(setup, EVERY)
     return judge_returns(world, starts.subset(np.flatnonzero(starts.rows["east"] < 4900.0)), EVERY)
 

@@ -8,12 +8,12 @@ import pytest
 
 from flight.mission.return_path import ReturnTarget
 from logs.verdict.returns.judge_glides import judge_glides
-from logs.verdict.returns.judge_returns import Kind, SimulatedReturn, judge_returns, return_world, sinks_to_ground
+from logs.verdict.returns.judge_returns import Kind, SimulatedReturn, judge_returns, make_return_world, sinks_to_ground
 from logs.verdict.returns.return_starts import SINK_HEIGHT_LOSS_M, flown_starts
 from logs.verdict.returns.returns_text import headline
 from logs.views.report.tables import flight_sentence
 from tests.logs.verdict.rules.flown_circuits import flown_circuit
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 
 def a_return(kind: Kind, sunk: float, run: float) -> SimulatedReturn:
@@ -48,7 +48,7 @@ def test_what_sinks_to_the_ground_beside_what_flies_into_it(
 
 def test_nothing_of_a_good_flight_from_the_ground_to_the_ground_hits_it() -> None:
     flown = flown_circuit()
-    world, track = return_world(flown.setup), flown.track
+    world, track = make_return_world(flown.setup), flown.track
     starts = flown_starts(flown.setup, track, 1.0)
     found = judge_returns(world, starts, 1.0)
     assert found.count("ground") == 0
@@ -82,9 +82,9 @@ def test_a_return_from_the_climb_into_a_hill_counts() -> None:
     flown = flown_circuit()
     hill = {"east_m": 150.0, "north_m": 250.0, "height_m": 150.0, "sigma_m": 90.0}
     spec = flown.setup.scenario.to_json()
-    walled = from_spec(spec | {"terrain": {"kind": "peaks", "peak": [hill]}}, "walled")
+    walled = scenario_from_spec(spec | {"terrain": {"kind": "peaks", "peak": [hill]}}, "walled")
     setup = flown.setup.in_scenario(replace(flown.setup.scenario, terrain=walled.terrain))
     starts = flown_starts(setup, flown.track, 1.0)
-    found = judge_returns(return_world(setup), starts, 1.0)
+    found = judge_returns(make_return_world(setup), starts, 1.0)
     low = set(starts.time[starts.is_low].tolist())
     assert [one for one in found.each if one.time in low and one.kind == "ground"]

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 
 from flight.mission.return_path import ReturnPoint, ReturnTarget
-from logs.verdict.returns.judge_returns import Kind, Returns, ReturnWorld, SimulatedReturn, judge_returns, return_world
+from logs.verdict.returns.judge_returns import (
+    Kind,
+    Returns,
+    ReturnWorld,
+    SimulatedReturn,
+    judge_returns,
+    make_return_world,
+)
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
 from logs.verdict.returns.suggest_returns import (
     MARGIN,
@@ -25,7 +32,7 @@ from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup
 
 def asked(folder: Path, every: float = 8.0, more: str = "") -> tuple[ReturnWorld, ReturnStarts]:
     setup = hill_setup(folder, more)
-    return return_world(setup), planned_starts(setup, every)
+    return make_return_world(setup), planned_starts(setup, every)
 
 
 def test_the_least_altitude_clears_the_hill_with_its_margin(tmp_path: Path) -> None:
@@ -79,7 +86,7 @@ def test_a_take_off_below_the_least_height_leaves_the_altitude_to_be_found(tmp_p
         f"{k}\t0\t0\t16\t0\t0\t0\t0\t46.0\t{8.0 + x / DEGREE:.7f}\t{up:g}\t1\n" for k, (x, up) in enumerate(rows, 1)
     )
     setup = hill_setup(tmp_path, mission=way)
-    world, starts = return_world(setup), planned_starts(setup, 4.0)
+    world, starts = make_return_world(setup), planned_starts(setup, 4.0)
     assert judge_returns(world, starts, 4.0).each[0].required_height == pytest.approx(23.0, abs=0.1)
     (found,) = suggest_parameters(world, starts)
     # As without the take-off.

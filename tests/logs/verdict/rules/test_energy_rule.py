@@ -41,7 +41,7 @@ def test_the_parabola_through_three_trims_is_the_trims_between_them(airspeed: fl
     fdm = Fdm(AEROSONDE)
     found = steady_flight(fdm, airspeed, 700.0, math.radians(angle_deg))
     assert found is not None
-    fdm.balance(found.vector())
+    fdm.apply_trim(found.vector())
     known = load_envelope(AEROSONDE).power(airspeed, 700.0, math.radians(angle_deg))
     # Idle is less than full by 300 to 800 W.
     assert known == pytest.approx(float(fdm.read().power), abs=10.0)

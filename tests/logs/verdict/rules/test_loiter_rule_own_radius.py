@@ -22,7 +22,7 @@ from planfly.workflow.open_flight import make_setup
 from tests.logs.verdict.judging import of
 from tests.mission_lines import ORIGIN, wp
 from tests.soak import some
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 SPEED = 25.0 * (1.0 - 0.0065 * 500.0 / 288.15) ** -2.128
 
@@ -47,7 +47,7 @@ def loiter(item: str, parameters: dict[str, float], **tables: Any) -> FlightSetu
         "start": end,
         "destination": end | {"north_m": 4000.0},
     }
-    scenario = from_spec(spec | tables, "own")
+    scenario = scenario_from_spec(spec | tables, "own")
     airframe = load_airframe(scenario)
     law = ArduPlane(ArduPilotParameters.load(airframe.aircraft)).with_parameters(**parameters)
     limits = replace(airframe.limits, max_bank=min(airframe.limits.max_bank, max_turn_bank(scenario, law)))

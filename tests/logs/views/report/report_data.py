@@ -20,7 +20,7 @@ from logs.verdict.places import FLIGHT, Place
 from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
 from logs.views.report.page import write_report
-from world.scenario import from_spec
+from world.scenario import scenario_from_spec
 
 ROUTE = np.array([[-900.0, -400.0, 300.0], [100.0, -400.0, 340.0], [100.0, 400.0, 380.0], [700.0, 400.0, 360.0]])
 EVIL = "<script>alert('x')</script> & \"q\""
@@ -51,7 +51,7 @@ def make_setup(**changes: Any) -> FlightSetup:
         max_bank=0.7,
     )
     items = tuple(MissionItem(k + 1, 16, 0, (0.0, 0.0, 0.0, 0.0), 46.0, 8.0 + k, float(ROUTE[k, 2])) for k in range(4))
-    scenario = from_spec(spec | changes, "test")
+    scenario = scenario_from_spec(spec | changes, "test")
     return FlightSetup(
         scenario=scenario,
         mission=Mission(None, items, warnings=("line 7: CRLF",), source="his.waypoints"),
