@@ -256,11 +256,11 @@ def _judge_flown_return(
     )
     record: Record = np.zeros(1, RETURN_RESULT)[0]
     clearance = min(0.0, approach.clearance) if hits_ground else approach.clearance
-    record["end_code"] = (
+    record["outcome"] = (
         RETURN_GROUND_IMPACT if hits_ground or clearance <= 0.0 else RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
     )
     if math.isnan(clearance):
-        record["end_code"] = RETURN_OFF_TERRAIN
+        record["outcome"] = RETURN_OFF_TERRAIN
     record["clearance"], record["sphere_distance"], record["threat"] = clearance, approach.outside, approach.threat
     used_energy = float(track.energy[start_row + len(position) - 1] - track.energy[start_row])
     remaining_energy = simulated_return.energy_left + simulated_return.energy - used_energy

@@ -100,8 +100,7 @@ def fly_go_arounds(
     """Simulate n go-arounds, each from a start on a landing glide to the end of a landing sequence.
 
     starts: (n,) of `flight.autopilots.arduplane.rtl_point_mass.RETURN_START`.
-    end_altitude: altitude above which the climb ends, m AMSL.
-    pitch: pitch angle during the climb, rad.
+    end_altitude, pitch: altitude above which the climb ends, m AMSL, and pitch angle during the climb, rad.
     landings: one or more landing sequences; each go-around joins the sequence nearest to the end of its climb.  If the
         sequence contains a loiter, the go-around ends there, after one circle.
 
@@ -116,9 +115,8 @@ def fly_go_arounds(
     >>> aircraft = make_point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind())
     >>> start = make_abort_start((0.0, 0.0, 800.0), 0.0, 0.06, 20.0, aircraft)
     >>> landings = [LandingStart(3, (800.0, -400.0, 860.0), (800.0, -400.0, 860.0))]
-    >>> environment = make_return_environment(load_scenario("jacksboro"))
-    >>> parameters = ArduPilotParameters.load(aerosonde)
-    >>> (track,) = fly_go_arounds(start, 840.0, 0.17, landings, parameters, aircraft, environment).tracks
+    >>> world, parameters = make_return_environment(load_scenario("jacksboro")), ArduPilotParameters.load(aerosonde)
+    >>> (track,) = fly_go_arounds(start, 840.0, 0.17, landings, parameters, aircraft, world).tracks
     >>> k = count_climb_rows(track, 840.0)
     >>> bool(abs(track[k, 0]) < 1.0), bool(abs(track[-1, 0] - 800.0) < 100.0), bool(track[:, 2].min() > 797.0)
     (True, True, True)

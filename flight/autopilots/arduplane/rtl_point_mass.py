@@ -82,7 +82,7 @@ RETURN_TIMEOUT = 4
 RETURN_ABORTED = 5
 # Outcome of one simulated RTL.  Times in s since the start; heights above ground and distances outside spheres in m.
 RETURN_RESULT = record_dtype(
-    ("end_code", np.int64),  # `RETURN_ARRIVED` ... `RETURN_ABORTED`
+    ("outcome", np.int64),  # `RETURN_ARRIVED` ... `RETURN_ABORTED`
     "end_time",
     "arrival_time",  # of the arrival within `LOITER_CAPTURE_RADIUS_M` of the target; NaN without an arrival
     "arrival_altitude",  # m AMSL, at the arrival
@@ -197,7 +197,7 @@ def fly_returns(
     ...     make_point_mass(aerosonde, load_envelope(aerosonde), 25.0, Wind()),
     ...     make_return_environment(scenario),
     ... ).results[0]
-    >>> int(result["end_code"]) == RETURN_ARRIVED, bool(140.0 < result["arrival_time"] < 160.0)
+    >>> int(result["outcome"]) == RETURN_ARRIVED, bool(140.0 < result["arrival_time"] < 160.0)
     (True, True)
     """
     stages = [
@@ -210,9 +210,7 @@ def fly_returns(
     timeouts = [rtl_timeout(start, route, aircraft) for start, route in zip(starts, stages, strict=True)]
     positions = np.zeros((int(max(timeouts, default=0.0)) + 2 if store_positions else 0, 3))
     tracks, record = [], parameters.record()
-    min_clearances, min_sphere_distances = (
-        (np.full(len(starts), -math.inf),) * 2 if abort_limits is None else abort_limits
-    )
+    min_clearances, min_distances = abort_limits or (np.full(len(starts), -math.inf),) * 2
     for k, route in enumerate(stages):
         fly_stages(
             starts[k],
@@ -230,7 +228,7 @@ def fly_returns(
             environment.known,
             timeouts[k],
             float(min_clearances[k]),
-            float(min_sphere_distances[k]),
+            float(min_distances[k]),
             engine_out,
             positions,
             results[k],
@@ -323,7 +321,7 @@ def fly_stages(
     has_terrain: bool,
     timeout: float,
     min_clearance: float,
-    min_sphere_distance: float,
+    min_distance: float,
     engine_out: bool,
     positions: Floats,
     result: Record,
@@ -331,12 +329,9 @@ def fly_stages(
     """Simulate the flight from stage to stage for at most ``timeout`` s, and fill in ``result``.
 
     stages: successive targets, (n,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
-    climb: climb at the start, a record of `CLIMB`.
-    climb_parameters: control parameters during the climb, a record like `parameters`.
-    min_clearance: height above ground below which the flight is aborted, m.
-    min_sphere_distance: distance outside the kill spheres below which the flight is aborted, m.
-    positions: array (t, 3), m, to fill with one position per second until it is full.
-    result: record of `RETURN_RESULT` to fill.
+    climb, climb_parameters: climb at the start, a record of `CLIMB`, and the control parameters during the climb.
+    min_clearance, min_distance: height above ground and distance outside spheres, m, below which the flight is aborted.
+    positions, result: (t, 3) array to fill with one position per second, until full, and a record of `RETURN_RESULT`.
     """
     # The same spacing as in `waypoint_column`.  The last loiter is flown until the RTL is over.
     spaced, progress_records = np.zeros(6, WAYPOINT), np.zeros(1, _LOITER_PROGRESS)
@@ -358,19 +353,17 @@ def fly_stages(
         radius = RTL_ARRIVAL_LOITER_RADII * abs(target.loiter_radius) * eas2tas * eas2tas
         if is_last and distance < max(LOITER_CAPTURE_RADIUS_M, radius):
             _record_arrival(estimated, time, engine_out, result)
-        result.end_time = time
         _update_clearances(estimated, time, heights, to_pixel, spheres, radii, has_terrain, result)
-        if result.end_code == RETURN_TIMEOUT and (
-            result.clearance < min_clearance or result.sphere_distance < min_sphere_distance
-        ):
-            result.end_code = RETURN_ABORTED
-        if result.end_code != RETURN_TIMEOUT:
+        if result.outcome != RETURN_TIMEOUT:
+            break
+        if result.clearance < min_clearance or result.sphere_distance < min_distance:
+            result.outcome = RETURN_ABORTED
             break
         if _is_stage_complete(
             estimated, target, memory, loiter, climb, engine_out and stage == 0, stage == 0, time, is_last, radius, dt
         ):
             if is_last:
-                result.end_code = RETURN_ARRIVED
+                result.outcome = RETURN_ARRIVED
                 break
             stage += 1
             _load_stage(stages, stage, waypoints, estimated, memory)
@@ -386,7 +379,7 @@ def fly_stages(
         throttle = 0.0 if engine_out else memory.throttle_demand
         energy += dt * advance_point_mass(estimated, state, path_angle, throttle, aircraft, excesses, power, dt)
     if result.clearance <= 0.0:
-        result.end_code = RETURN_GROUND_IMPACT
+        result.outcome = RETURN_GROUND_IMPACT
     # Compiled code frees an array after its last use, and a record that views it does not keep it alive.
     are_arrays_alive = motions.size + states.size + memories.size + progress_records.size + spaced.size == 10
     result.energy = energy / 3600.0 if aircraft.has_power and are_arrays_alive else math.nan
@@ -405,16 +398,9 @@ def _lag_fractions(parameters: Record, dt: float) -> tuple[float, float, float]:
 @inner
 def _store_position(estimated: Record, positions: Floats, result: Record) -> None:
     """Append the present position to the stored positions, unless the array is full."""
-    if result.position_count < positions.shape[0]:
-        (
-            positions[result.position_count, 0],
-            positions[result.position_count, 1],
-            positions[result.position_count, 2],
-        ) = (
-            estimated.east,
-            estimated.north,
-            estimated.up,
-        )
+    row = result.position_count
+    if row < positions.shape[0]:
+        positions[row, 0], positions[row, 1], positions[row, 2] = estimated.east, estimated.north, estimated.up
         result.position_count += 1
 
 
@@ -425,7 +411,7 @@ def _record_arrival(estimated: Record, time: float, engine_out: bool, result: Re
         result.arrival_time, result.arrival_altitude = time, estimated.up
         if engine_out:
             # Without an engine the aircraft descends in circles there.
-            result.end_code = RETURN_ARRIVED
+            result.outcome = RETURN_ARRIVED
 
 
 @inner
@@ -541,7 +527,7 @@ def _initialise_outcome(
     result.clearance = result.clearance_before_arrival = math.inf if has_terrain else math.nan
     result.threat = -1
     result.sphere_distance, result.distance_before_arrival = math.inf, math.inf
-    result.arrival_time, result.arrival_altitude, result.energy, result.end_code, result.position_count = (
+    result.arrival_time, result.arrival_altitude, result.energy, result.outcome, result.position_count = (
         math.nan,
         math.nan,
         0.0,
@@ -701,10 +687,11 @@ def _update_clearances(
     has_terrain: bool,
     result: Record,
 ) -> None:
-    """Update the minimum height above ground and the minimum distance outside the kill spheres.
+    """Update the end time, the minimum height above ground and the minimum distance outside the kill spheres.
 
     End the RTL outside the elevation data, or once the aircraft is `MAX_IMPACT_DEPTH_M` below the ground.
     """
+    result.end_time = time
     for m in range(spheres.shape[0]):
         radius = radii[m]
         if radius <= 0.0:
@@ -723,7 +710,7 @@ def _update_clearances(
         return
     clearance = estimated.up - ground_height(heights, to_pixel, estimated.east, estimated.north)
     if math.isnan(clearance):
-        result.end_code = RETURN_OFF_TERRAIN
+        result.outcome = RETURN_OFF_TERRAIN
         return
     if clearance < result.clearance:
         if result.clearance > 0.0:
@@ -737,4 +724,4 @@ def _update_clearances(
             )
         result.clearance = clearance
     if clearance <= -MAX_IMPACT_DEPTH_M:
-        result.end_code, result.end_time = RETURN_GROUND_IMPACT, result.clearance_time
+        result.outcome, result.end_time = RETURN_GROUND_IMPACT, result.clearance_time

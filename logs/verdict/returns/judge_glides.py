@@ -334,9 +334,9 @@ def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record)
     """Return the outcome of a simulated return without thrust.  result: record of dtype `RETURN_RESULT`."""
     clearance = float(result["clearance_before_arrival"])
     arrival_height, shortfall, impact = math.nan, math.nan, _NO_POSITION
-    if result["end_code"] == RETURN_ARRIVED and world.scenario.terrain is not None:
+    if result["outcome"] == RETURN_ARRIVED and world.scenario.terrain is not None:
         arrival_height = float(result["arrival_altitude"] - world.scenario.terrain.height(*target.position[:2]))
-    if result["end_code"] == RETURN_GROUND_IMPACT:
+    if result["outcome"] == RETURN_GROUND_IMPACT:
         impact = (float(result["clearance_east"]), float(result["clearance_north"]), float(result["clearance_up"]))
         shortfall = math.dist(impact[:2], target.position[:2])
     return EngineOutReturn(
@@ -346,10 +346,10 @@ def _engine_out_return(world: ReturnWorld, target: ReturnTarget, result: Record)
 
 def _engine_out_end(result: Record, clearance: float, arrival_height: float) -> EngineOutEnd:
     """Classify the outcome of a simulated return without thrust by its record and its heights above ground, m."""
-    if result["end_code"] == RETURN_GROUND_IMPACT:
+    if result["outcome"] == RETURN_GROUND_IMPACT:
         return "ground"
     if result["sphere_distance"] <= 0.0:
         return "threat"
-    if result["end_code"] != RETURN_ARRIVED:
+    if result["outcome"] != RETURN_ARRIVED:
         return "unknown"
     return "arrives" if min(clearance, arrival_height) >= MARGIN else "low"

@@ -567,20 +567,20 @@ def classify_return(world: ReturnWorld, result: Record, zone: int, energy_left: 
     energy_left: energy left at the end, Wh; NaN if unknown.
     required_height: required height above ground, m.
     """
-    if result["end_code"] == RETURN_GROUND_IMPACT:
+    if result["outcome"] == RETURN_GROUND_IMPACT:
         return "ground"
     if result["threat"] >= 0 and result["sphere_distance"] <= 0.0:
         return "threat"
     if zone >= 0:
         return "zone"
-    if result["end_code"] == RETURN_TIMEOUT:
+    if result["outcome"] == RETURN_TIMEOUT:
         return "lost"
     if energy_left < ENERGY_RESERVE_FRACTION * world.setup.battery:
         return "energy"
     if result["clearance"] < required_height - CLEARANCE_TOLERANCE_M:
         # A return that was too low is not judged better by an unknown rest of its path.
         return "low"
-    if result["end_code"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
+    if result["outcome"] == RETURN_OFF_TERRAIN or math.isnan(result["clearance"]):
         return "unknown"
     battery = world.setup.battery
     max_energy_used = (battery - energy_left) * math.exp(UNDECIDED_FRACTION * world.setup.envelope.power_sd)
@@ -711,10 +711,10 @@ def _with_offsets(
     corrected_result["clearance"] += height_offset
     corrected_result["sphere_distance"] += distance_offset
     if corrected_result["clearance"] <= 0.0:
-        corrected_result["end_code"] = RETURN_GROUND_IMPACT
-    elif corrected_result["end_code"] == RETURN_GROUND_IMPACT:
+        corrected_result["outcome"] = RETURN_GROUND_IMPACT
+    elif corrected_result["outcome"] == RETURN_GROUND_IMPACT:
         # The simulation continued after it grazed the ground: energy and zones cover the whole path.
-        corrected_result["end_code"] = RETURN_TIMEOUT if math.isnan(ret.time_to_loiter) else RETURN_ARRIVED
+        corrected_result["outcome"] = RETURN_TIMEOUT if math.isnan(ret.time_to_loiter) else RETURN_ARRIVED
     kind = classify_return(world, corrected_result, ret.zone, ret.energy_left, ret.required_height)
     return replace(
         ret,

@@ -113,7 +113,7 @@ def meets_return_limits(world: ReturnWorld, starts: ReturnStarts) -> Flags:
 
 def _clears_ground(_world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:
     """Return a mask of the returns that arrive and keep the required height above ground, (n,)."""
-    return np.asarray((results["end_code"] == RETURN_ARRIVED) & (results["clearance"] >= limits.clearance))
+    return np.asarray((results["outcome"] == RETURN_ARRIVED) & (results["clearance"] >= limits.clearance))
 
 
 def _meets_all(world: ReturnWorld, results: Records, limits: _ReturnLimits) -> Flags:

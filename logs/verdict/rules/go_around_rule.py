@@ -394,7 +394,7 @@ def _judge_go_around(
     destination: destination of the go-around.
     top_altitude: altitude above which the climb is over, m AMSL.
     """
-    climb_end, end_status = count_climb_rows(positions, top_altitude), int(result["end_code"])
+    climb_end, end_status = count_climb_rows(positions, top_altitude), int(result["outcome"])
     go_around = go_around._replace(
         is_lost=end_status == RETURN_TIMEOUT,
         unknown_part_text=_unknown_part_text(end_status, has_climbed=climb_end < len(positions)),

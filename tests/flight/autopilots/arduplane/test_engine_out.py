@@ -83,9 +83,9 @@ def test_it_is_as_high_as_arduplane_was(flight: str) -> None:
 @pytest.mark.parametrize("flight", [name for name, row in GLIDES.items() if row["mode"] == "RTL"])
 def test_it_gets_home_where_arduplane_did(flight: str) -> None:
     real, flown = GLIDES[flight], glided(flight).results[0]
-    arrives = bool(flown["end_code"] == RETURN_ARRIVED and flown["clearance_before_arrival"] >= MARGIN)
+    arrives = bool(flown["outcome"] == RETURN_ARRIVED and flown["clearance_before_arrival"] >= MARGIN)
     assert arrives == (real["reaches_home"] == "1")
-    assert (flown["end_code"] == RETURN_GROUND_IMPACT) == (real["reaches_home"] == "0")
+    assert (flown["outcome"] == RETURN_GROUND_IMPACT) == (real["reaches_home"] == "0")
     if arrives:
         assert flown["arrival_time"] == pytest.approx(float(real["ends_s"]), abs=10.0)
 

@@ -119,7 +119,7 @@ def test_the_abort_flies_into_the_hill_as_arduplane_did() -> None:
     """It is already at this height, turns at once, and meets the hillside: place within 10 m and height within 6 m."""
     real = kept_sequence("abort")
     flown, way = aborted()
-    assert flown["end_code"] == RETURN_GROUND_IMPACT
+    assert flown["outcome"] == RETURN_GROUND_IMPACT
     seconds = np.arange(10.0)
     for axis, name in enumerate(("east_m", "north_m", "amsl_m")):
         there = np.interp(seconds, real["time_s"], real[name])
@@ -128,7 +128,7 @@ def test_the_abort_flies_into_the_hill_as_arduplane_did() -> None:
 
 def test_an_abort_that_has_to_climb_holds_its_course_until_it_is_above_its_height() -> None:
     flown, way = aborted(height=120.0)
-    assert flown["end_code"] != RETURN_GROUND_IMPACT
+    assert flown["outcome"] != RETURN_GROUND_IMPACT
     top = kept_setup("abort").mission.home.alt + 120.0
     k = int(np.argmax(way[:, 2] > top))
     courses = np.degrees(np.arctan2(*np.diff(way[:k, :2], axis=0).T)) % 360.0

@@ -99,14 +99,14 @@ def test_it_ends_as_arduplane_did(flight: str) -> None:
     real, (target, made) = KEPT[flight], swift(flight)
     flown = made.results[0]
     assert target == real["target"]
-    assert (flown["end_code"] == RETURN_GROUND_IMPACT) == (real["hit"] == "1")
+    assert (flown["outcome"] == RETURN_GROUND_IMPACT) == (real["hit"] == "1")
     assert (flown["distance_before_arrival"] < 0.0) == (float(real["outside_spheres_m"]) < 0.0)
     low, high = CLEARANCE[kind(flight)]
     assert low <= flown["clearance_before_arrival"] - float(real["least_clearance_m"]) <= high
     if real["hit"] == "1":
         assert abs(flown["end_time"] - kept_track(flight)[-1, 0]) < 20.0 + ARRIVAL
     else:
-        assert flown["end_code"] == RETURN_ARRIVED
+        assert flown["outcome"] == RETURN_ARRIVED
         assert abs(flown["arrival_time"] - float(real["to_circle_s"])) < ARRIVAL
 
 
@@ -175,13 +175,13 @@ def test_a_slow_roll_turns_back_later() -> None:
     seconds = [float(returned(begin, circle, flat(100.0), RLL2SRV_RMAX=rate)["end_time"]) for rate in (0.0, 90.0, 10.0)]
     assert seconds[0] == seconds[1]
     assert seconds[2] - seconds[0] == pytest.approx(2.0 * (1.5 - 0.42), abs=1.0)
-    assert returned(begin, circle, flat(100.0), RLL2SRV_RMAX=2.0)["end_code"] == RETURN_TIMEOUT
+    assert returned(begin, circle, flat(100.0), RLL2SRV_RMAX=2.0)["outcome"] == RETURN_TIMEOUT
 
 
 def test_a_wall_that_is_higher_is_never_safer() -> None:
     circle, begin = ReturnCircle(0.0, 6000.0, 300.0, 120.0), start(up=900.0, velocity_north=26.0)
     ends = [returned(begin, circle, flat(height)) for height in (100.0, 295.0, 310.0, 600.0)]
-    assert [int(end["end_code"]) for end in ends] == [
+    assert [int(end["outcome"]) for end in ends] == [
         RETURN_ARRIVED,
         RETURN_ARRIVED,
         RETURN_GROUND_IMPACT,
@@ -195,14 +195,14 @@ def test_what_cannot_end_is_told() -> None:
     begin = start(up=900.0, velocity_north=26.0)
     # Higher than the aircraft climbs, and beyond the elevation data.
     high = returned(begin, ReturnCircle(0.0, 1000.0, 8900.0, 120.0), flat(100.0), THR_MAX=78.0)
-    assert high["end_code"] == RETURN_TIMEOUT
+    assert high["outcome"] == RETURN_TIMEOUT
     off = returned(begin, ReturnCircle(0.0, 90_000.0, 900.0, 120.0), flat(100.0))
-    assert off["end_code"] == RETURN_OFF_TERRAIN
+    assert off["outcome"] == RETURN_OFF_TERRAIN
     nowhere = ReturnEnvironment(
         around().heights, around().to_pixel, read_only(np.zeros((0, 3))), read_only(np.zeros(0)), False
     )
     told = returned(begin, ReturnCircle(0.0, 2000.0, 900.0, 120.0), nowhere)
-    assert told["end_code"] == RETURN_ARRIVED
+    assert told["outcome"] == RETURN_ARRIVED
     assert math.isnan(told["clearance"])
     assert told["threat"] == -1
 
@@ -216,7 +216,7 @@ def test_its_circle_is_flown_all_around(radius: float) -> None:
         flown = returned(begin, ReturnCircle(0.0, 5000.0, 900.0, radius), flat(100.0, ((*at, 900.0, 1.0),)))
         # True radii grow with height: 900 m are 9 % of it.
         assert flown["sphere_distance"] < 0.12 * away + 60.0
-        assert flown["end_code"] == RETURN_ARRIVED
+        assert flown["outcome"] == RETURN_ARRIVED
     assert flown["arrival_time"] == pytest.approx((5000.0 - max(200.0, 1.3 * 1.09 * abs(radius))) / 26.1, abs=4.0)
 
 
@@ -224,13 +224,13 @@ def test_one_that_grazes_the_ground_is_flown_on_and_its_depth_is_known() -> None
     circle, begin = ReturnCircle(0.0, 6000.0, 900.0, 120.0), start(up=900.0, velocity_north=26.0)
     safe = returned(begin, circle, flat(895.0))
     grazed = returned(begin, circle, flat(905.0))
-    assert (int(safe["end_code"]), int(grazed["end_code"])) == (RETURN_ARRIVED, RETURN_GROUND_IMPACT)
+    assert (int(safe["outcome"]), int(grazed["outcome"])) == (RETURN_ARRIVED, RETURN_GROUND_IMPACT)
     assert grazed["clearance"] == pytest.approx(safe["clearance"] - 10.0, abs=0.1)
     # The whole way: its energy is that of the one that was not hit.  Where it hits is where it does so first.
     assert grazed["energy"] == pytest.approx(safe["energy"], rel=1e-6)
     assert grazed["clearance_time"] == 0.0
     deep = returned(begin, circle, flat(920.0))
-    assert (int(deep["end_code"]), float(deep["end_time"])) == (RETURN_GROUND_IMPACT, 0.0)
+    assert (int(deep["outcome"]), float(deep["end_time"])) == (RETURN_GROUND_IMPACT, 0.0)
     assert deep["clearance"] == pytest.approx(-20.0, abs=0.1)
 
 
