@@ -24,13 +24,13 @@ from world.errors import FlightError
 SEA_LEVEL = 1.225
 # Kinematic viscosity of air at sea level, m^2/s.
 VISCOSITY = 1.46e-5
-# Air density at 500 m, for which sheets are read, since most aircraft fly there, kg/m^3.
+# Air density at 500 m, where most aircraft fly, kg/m^3: the values of a sheet are taken to hold there.
 SHEET_DENSITY = 1.1673
 
 
 @dataclass(frozen=True, slots=True)
 class DataSheet:
-    """Known values of an aircraft in SI units and radians; 0 for unknown values.
+    """The stated values of an aircraft in SI units and radians; 0 for a value that is not stated.
 
     mass: kg.
     span: m.
@@ -45,6 +45,7 @@ class DataSheet:
     motor: motor speed per volt, rpm/V.
     propeller: diameter and pitch, m.
     fuel: fuel mass, kg; an aircraft with fuel has no battery.
+    layout: control surfaces.
     """
 
     mass: float
@@ -65,7 +66,7 @@ class DataSheet:
     layout: Layout = "tail"
 
     @property
-    def fuelled(self) -> bool:
+    def burns_fuel(self) -> bool:
         """True if the aircraft burns fuel."""
         return self.fuel > 0.0
 
@@ -106,15 +107,17 @@ class AircraftClass:
     lift_slope: ratio to the lift slope of an elliptic wing of the same aspect ratio.
     lift_max: largest lift coefficient, if the sheet states no area.
     oswald: span efficiency.
-    pitch_alpha, pitch_q: values per unit of aspect ratio if ``by_aspect``, otherwise absolute values.
+    scales_with_aspect_ratio: True if ``pitch_alpha`` and ``pitch_q`` are multiplied by the aspect ratio.
     gyration: radii of gyration about x, y, z as ratios to the span.
-    elevator_stall: elevator at the stall, rad; at the sheet's stall speed it reaches its stop.
+    product_share: product of inertia Jxz as a ratio to Jz.
+    elevator_stall: elevator deflection at the stall, rad.
+    throw: travel of elevator, aileron and rudder in either direction, rad.
     """
 
     lift_slope: float
     lift_max: float
     oswald: float
-    by_aspect: bool
+    scales_with_aspect_ratio: bool
     pitch_alpha: float
     pitch_q: float
     lift_q: float
@@ -144,7 +147,7 @@ TAIL = AircraftClass(
     lift_slope=1.05,
     lift_max=1.25,
     oswald=0.82,
-    by_aspect=True,
+    scales_with_aspect_ratio=True,
     pitch_alpha=-0.16,
     pitch_q=-2.55,
     lift_q=7.0,
@@ -173,7 +176,7 @@ WING = AircraftClass(
     lift_slope=0.80,
     lift_max=1.05,
     oswald=0.86,
-    by_aspect=False,
+    scales_with_aspect_ratio=False,
     pitch_alpha=-0.51,
     pitch_q=-1.35,
     lift_q=3.4,
@@ -202,9 +205,11 @@ CLASSES: dict[Layout, AircraftClass] = {"tail": TAIL, "vtail": TAIL, "wing": WIN
 DEFAULT_CLIMB = math.radians(12.0)
 # Ratio of top speed to cruise speed if the sheet states no top speed.
 DEFAULT_TOP_RATIO = 1.65
-# Guesses of that ratio, the nearest first, if no propeller gives the usual one with the climb of the sheet.
+# Guesses of this ratio, in the order in which they are tried, if no propeller gives the default ratio with the sheet's
+# climb.
 _TOP_GUESSES = (DEFAULT_TOP_RATIO, 1.5, 1.8, 1.35, 2.0, 1.2, 2.3, 1.1)
-# Guesses of the climb, degrees, if a top speed alone leads to a climb that is too flat, or in reverse too steep.
+# Guesses of the climb, degrees, if the top speed alone leads to a climb that is too flat; in reverse order, if it leads
+# to a climb that is too steep.
 _CLIMB_GUESSES_DEG = (2.0, 4.0, 6.0, 9.0, 12.0, 16.0, 20.0, 25.0, 30.0, 35.0)
 # Number of values that are tried to find an allowed range.
 _RANGE_STEP_COUNT = 34
@@ -226,7 +231,7 @@ MIN_CRUISE_ALPHA = -0.05
 # Maximum angle of attack at the stall, rad. Trims are searched up to 0.4, and with thrust flight is possible below the
 # stall speed.
 MAX_STALL_ALPHA = 0.33
-# Maximum elevator at zero lift, which no level flight reaches, as a ratio to its stop.
+# Maximum elevator at zero lift, which no level flight reaches, as a ratio to the elevator's travel.
 MAX_ZERO_LIFT_ELEVATOR = 0.9
 # Elevator at cruise, rad.
 CRUISE_ELEVATOR = -0.035
@@ -234,9 +239,9 @@ CRUISE_ELEVATOR = -0.035
 STALL_SHARPNESS = 80.0
 # Fraction of a rigid propeller's braking that an idle propeller has.
 WINDMILL_FRACTION = 0.5
-# Resistance of the Aerosonde's motor at full throttle in cruise, R P / V^2.
+# Resistance of the Aerosonde's motor at full throttle in cruise, dimensionless: R P / V^2.
 _RESISTANCE_RATIO = 0.026
-# Idle current of the Aerosonde's motor at full throttle in cruise, i0 V / P.
+# Idle current of the Aerosonde's motor at full throttle in cruise, dimensionless: i0 V / P.
 _IDLE_CURRENT_RATIO = 0.055
 # Smallest diameter of a propeller, m.
 _MIN_DIAMETER_M = 0.06
@@ -299,11 +304,11 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         allowed = f"allowed {min_span:.2f}..{max_span:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
         raise _out_of_range("span", sheet.span, allowed, "m")
     electric_options = [name for name, is_given in (("--battery", sheet.volts), ("--motor", sheet.motor)) if is_given]
-    if sheet.fuelled and electric_options:
+    if sheet.burns_fuel and electric_options:
         raise _out_of_range("fuel", sheet.fuel, f"cannot be combined with {' and '.join(electric_options)}", "kg")
     if not _is_within(sheet.fuel, 0.0, 0.6 * sheet.mass):
         raise _out_of_range("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
-    if not sheet.fuelled and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
+    if not sheet.burns_fuel and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
         max_energy = MAX_BATTERY / 3600.0
         allowed = f"allowed up to {max_energy * sheet.mass:g} Wh with a mass of {sheet.mass:g} kg, {max_energy:g} Wh/kg"
         raise _out_of_range("battery", sheet.energy / 3600.0, allowed, "Wh")
@@ -311,14 +316,17 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
 
 
 def _out_of_range(option: str, value: float, allowed: str, unit: str) -> FlightError:
+    """Return the error for a value out of range; `allowed` is the text on the allowed range."""
     return FlightError.of_argument(option, value, allowed, shown=f"{value:g} {unit}")
 
 
 def _speed_range_text(min_speed: float, max_speed: float, sheet: DataSheet) -> str:
+    """Describe a speed range (m/s) that depends on the cruise speed."""
     return f"{min_speed:.4g}..{max_speed:.4g} m/s at a cruise speed of {sheet.cruise:g} m/s"
 
 
 def _weight(sheet: DataSheet) -> float:
+    """Return the weight, N."""
     return sheet.mass * GRAVITY
 
 
@@ -330,6 +338,7 @@ def _wing_area(sheet: DataSheet) -> float:
 
 
 def _area_source(sheet: DataSheet) -> str:
+    """Describe where the wing area comes from."""
     return "as stated" if sheet.area else "that carries this mass at this stall speed; state the area if you know it"
 
 
@@ -338,8 +347,8 @@ class SizedAircraft:
     """A model that matches a data sheet, and the names of its guessed values.
 
     numbers: numbers of the model.
-    sheet: the sheet with every value filled in.
-    guessed: fields that the sheet did not state.
+    sheet: the sheet with all missing values filled in.
+    guessed: fields that were filled in.
     """
 
     numbers: ModelNumbers
@@ -350,12 +359,14 @@ class SizedAircraft:
 def size_aircraft(
     sheet: DataSheet, title: str = "", aircraft_class: AircraftClass | None = None, prior: PowerPrior = POWER_PRIOR
 ) -> SizedAircraft:
-    """Build the model of a data sheet.
+    """Build an aircraft model that matches a data sheet.
 
+    title: title of the model; "" for a title from layout, mass and span.
     aircraft_class: class of the aircraft; None takes the layout's class.
     prior: drag, efficiency and avionics power by size.
 
-    Raises FlightError if no propeller gives the stated climb and top speed.
+    Raises FlightError for a stall speed or a sink rate out of range, and if no propeller gives the stated climb and top
+    speed.
 
     >>> made = size_aircraft(check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)))
     >>> round(made.numbers.area, 3), made.guessed
@@ -363,7 +374,7 @@ def size_aircraft(
     """
     aircraft_class = CLASSES[sheet.layout] if aircraft_class is None else aircraft_class
     full_sheet, guessed_fields = _fill_sheet(sheet)
-    aero = _aerodynamics(full_sheet, aircraft_class, prior)
+    aero = _estimate_coefficients(full_sheet, aircraft_class, prior)
     drag = _drag_function(full_sheet, aero)
     if sheet.sink:
         aero, drag = _match_sink(full_sheet, aero, sheet.sink)
@@ -385,9 +396,9 @@ def size_aircraft(
         layout=sheet.layout,
         throw=aircraft_class.throw,
         rate=math.radians(300.0),
-        lag=(0.05, 0.1 if not sheet.fuelled else 0.3),
+        lag=(0.05, 0.1 if not sheet.burns_fuel else 0.3),
         # A fuel engine drives its own generator.
-        factors=(*FACTORS, *(name for name in POWER_FACTORS if name != "avionics-power" or not sheet.fuelled)),
+        factors=(*FACTORS, *(name for name in POWER_FACTORS if name != "avionics-power" or not sheet.burns_fuel)),
     )
     return SizedAircraft(numbers, full_sheet, guessed_fields)
 
@@ -397,14 +408,14 @@ _LAYOUT_TEXTS = {"tail": "aircraft with a tail", "wing": "flying wing", "vtail":
 
 
 def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
-    """Return the sheet with missing values filled in, and the names of those values."""
+    """Return the sheet with missing values filled in, and the names of the fields that were filled in."""
     defaults: dict[str, Any] = {
         "area": _wing_area(sheet),
         "top": DEFAULT_TOP_RATIO * sheet.cruise,
         "bank": DEFAULT_BANK,
         "climb": DEFAULT_CLIMB,
     }
-    if sheet.fuelled:
+    if sheet.burns_fuel:
         sheet = replace(sheet, energy=sheet.fuel * FUEL_HEAT)
     else:
         defaults["volts"] = next(volts for mass, volts in _DEFAULT_VOLTS if sheet.mass < mass)
@@ -416,19 +427,23 @@ def _fill_sheet(sheet: DataSheet) -> tuple[DataSheet, tuple[str, ...]]:
 
 
 def elliptic_slope(aspect: float) -> float:
-    """Return the lift slope per radian of a straight wing of this aspect ratio (Helmbold; Raymer 12.4).
+    """Return the lift slope, per radian, of a straight wing with an aspect ratio (Helmbold; Raymer 12.4).
 
-    >>> round(elliptic_slope(1e9), 4)  # 2 pi for an endless one
+    >>> round(elliptic_slope(1e9), 4)  # 2 pi for an infinite aspect ratio
     6.2832
     """
     return 2.0 * math.pi * aspect / (2.0 + math.sqrt(4.0 + aspect**2))
 
 
-def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerPrior) -> AeroCoefficients:
+def _estimate_coefficients(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerPrior) -> AeroCoefficients:
+    """Estimate the aerodynamic coefficients of an aircraft from its data sheet, its class and the prior of its drag.
+
+    Raises FlightError if the stall speed is too low for the wing.
+    """
     area, chord = sheet.area, sheet.area / sheet.span
     aspect = sheet.span / chord
     slope = aircraft_class.lift_slope * elliptic_slope(aspect)
-    aspect_factor = aspect if aircraft_class.by_aspect else 1.0
+    aspect_factor = aspect if aircraft_class.scales_with_aspect_ratio else 1.0
     pitch_stiffness = aircraft_class.pitch_alpha * aspect_factor
     weight = _weight(sheet)
     cruise_lift = weight / (0.5 * SHEET_DENSITY * sheet.cruise**2 * area)
@@ -445,11 +460,11 @@ def _aerodynamics(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerP
             f" m/s for a wing of aspect ratio {aspect:.1f}"
         )
         raise _out_of_range("stall", sheet.stall, allowed, "m/s")
-    # An elevator that is enough for the stall only may be too weak for the fastest level flight.
+    # An elevator just strong enough to reach the stall may be too weak for the fastest level flight.
     max_elevator_travel = MAX_ZERO_LIFT_ELEVATOR * aircraft_class.throw[0] - CRUISE_ELEVATOR
     elevator_moment = pitch_stiffness * max(alpha_range / -elevator_travel, cruise_lift / slope / max_elevator_travel)
     lift_0 = cruise_lift - slope * cruise_alpha - aircraft_class.lift_elevator * CRUISE_ELEVATOR
-    # Lift holds up to the elevator's stop, so that the slowest level flight has a trim.
+    # The lift curve is straight up to the elevator's stop, so that the slowest level flight has a trim.
     stall_alpha = cruise_alpha - elevator_travel * elevator_moment / pitch_stiffness
     reynolds = sheet.cruise * chord / VISCOSITY
     return AeroCoefficients(
@@ -487,7 +502,7 @@ Drag = Callable[[float], float]
 
 
 def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
-    """Return a function that computes the drag, N, of level flight at an airspeed, m/s."""
+    """Return a function that computes the drag (N) in level flight at an airspeed (m/s)."""
 
     def drag(airspeed: float) -> float:
         area_times_pressure = 0.5 * SHEET_DENSITY * airspeed**2 * sheet.area
@@ -499,16 +514,21 @@ def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
 
 
 def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[AeroCoefficients, Drag]:
-    """Set the minimum drag to match a sink rate (m/s) at cruise without power, with a folded propeller."""
+    """Return the coefficients with the minimum drag coefficient that gives a sink rate, and the new drag function.
+
+    sink: sink rate at cruise with the power off and the propeller folded, m/s.
+
+    Raises FlightError if the sink rate is out of range for the wing.
+    """
     angle = math.asin(min(0.5, sink / sheet.cruise))
-    area_pressure = 0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area
-    lift = _weight(sheet) * math.cos(angle) / area_pressure
-    drag_min = _weight(sheet) * math.sin(angle) / area_pressure - aero.drag_lift * lift**2
-    min_drag, max_drag = 0.4 * aero.drag_min, 2.5 * aero.drag_min
-    if not min_drag <= drag_min <= max_drag:
+    area_times_pressure = 0.5 * SHEET_DENSITY * sheet.cruise**2 * sheet.area
+    lift = _weight(sheet) * math.cos(angle) / area_times_pressure
+    drag_min = _weight(sheet) * math.sin(angle) / area_times_pressure - aero.drag_lift * lift**2
+    lowest_drag_min, highest_drag_min = 0.4 * aero.drag_min, 2.5 * aero.drag_min
+    if not lowest_drag_min <= drag_min <= highest_drag_min:
         min_sink, max_sink = (
-            sheet.cruise * (limit_drag + aero.drag_lift * lift**2) * area_pressure / _weight(sheet)
-            for limit_drag in (min_drag, max_drag)
+            sheet.cruise * (limit + aero.drag_lift * lift**2) * area_times_pressure / _weight(sheet)
+            for limit in (lowest_drag_min, highest_drag_min)
         )
         allowed = f"allowed {min_sink:.2f}..{max_sink:.2f} m/s for this wing at {sheet.cruise:g} m/s"
         raise FlightError.at("TECS_SINK_MIN", "", sink, allowed, shown=f"{sink:g} m/s")
@@ -521,13 +541,13 @@ def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[
 
 
 class _NoPropellerError(Exception):
-    """Climb and top speed of a sheet that no propeller gives; `_size_propulsion` adds the reason."""
+    """No propeller gives the climb and the top speed of a sheet; `_size_propulsion` adds the reason."""
 
 
 def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
-    """Size motor or engine, and propeller.
+    """Size motor or engine, and propeller; return them with the sheet's resulting climb and top speed.
 
-    Raises FlightError with an allowed range if no value fits the sheet.
+    Raises FlightError, with the allowed range of a stated value, if none fit the sheet.
     """
     try:
         return _size_any_motor(stated_sheet, sheet, drag)
@@ -536,8 +556,11 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
 
 
 def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
-    """Size the engine of a fuelled aircraft, or the motor of an electric one. Raises _NoPropellerError if none fits."""
-    size_function = _size_engine if sheet.fuelled else _size_motor
+    """Size the engine of an aircraft that burns fuel, or the motor of an electric aircraft, with its propeller.
+
+    Raises _NoPropellerError if none fits.
+    """
+    size_function = _size_engine if sheet.burns_fuel else _size_motor
     return size_function(stated_sheet, sheet, drag)
 
 
@@ -553,7 +576,7 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
         motor, result = _solve_motor(stated_sheet, sheet, drag, target_fields)
         if result.climb <= MAX_CLIMB:
             return motor, result
-        # Limit the climb of an aircraft with more thrust than that.
+        # With more thrust than that, the climb is limited.
         return _solve_motor(stated_sheet, replace(sheet, climb=MAX_CLIMB), drag, ["climb"])
     if stated_sheet.climb and stated_sheet.trim_throttle and not stated_sheet.top:
         # The climb that an autopilot is configured with is often less than the motor gives.
@@ -562,8 +585,8 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
     if stated_sheet.climb or not (stated_sheet.top or stated_sheet.trim_throttle):
         tops = [sheet.top] if stated_sheet.top else [ratio * sheet.cruise for ratio in _TOP_GUESSES]
         return _solve_first(stated_sheet, [replace(sheet, top=top) for top in tops], drag)
-    # A propeller of the usual size, and the speed per volt from the top speed or the throttle: either determines the
-    # climb better than a guess.
+    # Use a propeller of the usual size, and derive the speed per volt from the top speed or the throttle: both
+    # determine the climb better than a guess.
     unstated = replace(stated_sheet, top=0.0, trim_throttle=0.0)
     usual_motor, _ = _solve_first(unstated, [replace(sheet, top=ratio * sheet.cruise) for ratio in _TOP_GUESSES], drag)
     propeller = stated_sheet.propeller if stated_sheet.propeller[0] else (usual_motor.propeller.diameter, 0.0)
@@ -580,11 +603,14 @@ _D = TypeVar("_D", ElectricMotor, FuelEngine)
 
 
 def _solve_with_climb_limit(
-    solve: Callable[[], tuple[_D, DataSheet]], solve_for: Callable[[float], tuple[_D, DataSheet]]
+    solve: Callable[[], tuple[_D, DataSheet]], solve_for_climb: Callable[[float], tuple[_D, DataSheet]]
 ) -> tuple[_D, DataSheet]:
-    """Solve for a top speed, or for a guessed climb if no propeller fits or the climb is too steep.
+    """Return a motor and the sheet it gives; if none fits, or its climb is too steep, solve again for guessed climbs.
 
-    solve_for: solves for a climb, rad.
+    solve: function that solves without a climb.
+    solve_for_climb: function that solves for a climb, rad.
+
+    Raises _NoPropellerError if no guessed climb has a solution.
     """
     climbs = _CLIMB_GUESSES_DEG
     with contextlib.suppress(_NoPropellerError):
@@ -594,12 +620,15 @@ def _solve_with_climb_limit(
         climbs = climbs[::-1]
     for climb in climbs:
         with contextlib.suppress(_NoPropellerError):
-            return solve_for(math.radians(climb))
+            return solve_for_climb(math.radians(climb))
     raise _NoPropellerError
 
 
 def _solve_first(stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Drag) -> tuple[ElectricMotor, DataSheet]:
-    """Solve for the motor that meets climb and top speed of the first of these sheets that has a solution."""
+    """Solve for a motor with the climb and top speed of a sheet; take the first sheet that has a solution.
+
+    Raises _NoPropellerError if no sheet has a solution.
+    """
     for sheet in sheets:
         with contextlib.suppress(_NoPropellerError):
             return _solve_motor(stated_sheet, sheet, drag, ["climb", "top"])
@@ -609,9 +638,15 @@ def _solve_first(stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Dra
 def _solve_motor(
     stated_sheet: DataSheet, sheet: DataSheet, drag: Drag, target_fields: list[str]
 ) -> tuple[ElectricMotor, DataSheet]:
-    """Solve for the motor that meets these fields of the sheet, with as many free numbers.
+    """Solve for the motor and propeller that give the sheet's values of some fields.
 
-    The last free number is the motor's speed per volt, or the propeller's pitch.
+    One number is free for each field: the size of the propeller, and the motor's speed per volt or the propeller's
+    pitch.
+
+    stated_sheet: sheet with the stated motor and propeller only; these stay unchanged.
+    target_fields: fields of `DataSheet` whose values are met.
+
+    Raises _NoPropellerError if there is no solution, or only one with a propeller of unusual size.
     """
     volts, (diameter, pitch) = sheet.volts, stated_sheet.propeller
     # With the Aerosonde's blade shape the ratio of pitch to diameter is the zero-thrust ratio.
@@ -623,8 +658,8 @@ def _solve_motor(
     initial_speed = 1.2 * sheet.top / base.zero_thrust_ratio / (base.diameter * initial_size) * 2.0 * math.pi
     has_one_unknown = len(target_fields) == 1 and target_fields != ["climb"]
 
-    def make_motor(free: Sequence[float]) -> ElectricMotor:
-        size_factor, speed_factor = (1.0, free[0]) if has_one_unknown else (*free, 1.0, 1.0)[:2]
+    def make_motor(free_factors: Sequence[float]) -> ElectricMotor:
+        size_factor, speed_factor = (1.0, free_factors[0]) if has_one_unknown else (*free_factors, 1.0, 1.0)[:2]
         propeller = (
             base.scale(blades=size_factor * initial_size)
             if diameter
@@ -634,8 +669,8 @@ def _solve_motor(
             return _motor_on_battery(propeller.scale(pitch=speed_factor), volts, emf, sheet.cruise)
         return _motor_on_battery(propeller, volts, volts / (speed_factor * initial_speed), sheet.cruise)
 
-    def errors(free: Sequence[float]) -> list[float]:
-        motor = make_motor(free)
+    def errors(free_factors: Sequence[float]) -> list[float]:
+        motor = make_motor(free_factors)
         return [_thrust_error(motor, sheet, drag, name) for name in target_fields]
 
     motor = make_motor(_solve_errors(errors, len(target_fields)))
@@ -645,7 +680,12 @@ def _solve_motor(
 
 
 def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
-    """Return a motor of this speed per volt with the Aerosonde's losses relative to its cruise power."""
+    """Return a motor whose losses, relative to its power in cruise, are those of the Aerosonde's motor.
+
+    volts: battery voltage, V.
+    emf: back-emf constant, V s/rad.
+    cruise: cruise airspeed, m/s.
+    """
     power = 0.3 * volts**2 * emf
     motor = ElectricMotor(propeller, volts, emf, 0.1, 0.5, WINDMILL_FRACTION)
     for _ in range(12):
@@ -657,7 +697,7 @@ def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: fl
 
 
 def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prior: PowerPrior) -> ElectricMotor:
-    """Return a motor whose battery power in level flight at cruise has the prior's efficiency and avionics."""
+    """Return a motor whose battery power in level flight at cruise has the prior's efficiency and avionics power."""
     thrust, min_throttle, max_throttle = drag(sheet.cruise), 0.0, 1.0
     for _ in range(60):
         throttle = 0.5 * (min_throttle + max_throttle)
@@ -670,9 +710,9 @@ def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prio
 
 
 def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
-    """Size an engine whose torque meets the climb or the top speed.
+    """Size an engine with the stated climb or top speed; return it with the sheet's resulting climb and top speed.
 
-    If both are stated, the propeller's pitch is chosen too.
+    If both are stated, the propeller's pitch is chosen as well.
     """
     # A stated top speed determines the climb better than a guess.
     target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
@@ -685,7 +725,10 @@ def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple
 
 
 def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tuple[FuelEngine, DataSheet]:
-    """Solve for the engine torque that meets these fields of the sheet, and for two fields also for the pitch."""
+    """Solve for the engine torque that gives the sheet's value of a field; for two fields, also for the pitch.
+
+    Raises _NoPropellerError if there is no solution.
+    """
     needed_thrust = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
     diameter, pitch = sheet.propeller
     pitch_ratio = pitch / diameter / BOOK_PROPELLER.zero_thrust_ratio if diameter else 1.0
@@ -695,9 +738,9 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
     )
     initial_torque = 0.12 * needed_thrust * base_propeller.diameter
 
-    def make_engine(free: Sequence[float]) -> FuelEngine:
-        torque, pitch_factor = (*free, 1.0)[:2]
-        torque *= initial_torque
+    def make_engine(free_factors: Sequence[float]) -> FuelEngine:
+        torque_factor, pitch_factor = (*free_factors, 1.0)[:2]
+        torque = torque_factor * initial_torque
         return FuelEngine(
             base_propeller.scale(pitch=pitch_factor),
             torque,
@@ -706,8 +749,8 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
             WINDMILL_FRACTION,
         )
 
-    def errors(free: Sequence[float]) -> list[float]:
-        engine = make_engine(free)
+    def errors(free_factors: Sequence[float]) -> list[float]:
+        engine = make_engine(free_factors)
         return [_thrust_error(engine, sheet, drag, name) for name in target_fields]
 
     engine = make_engine(_solve_errors(errors, len(target_fields)))
@@ -715,7 +758,7 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return the relative error of the thrust from the thrust that a field of the sheet needs."""
+    """Return the excess of a motor's thrust over the thrust that a field of the sheet requires, as a ratio to it."""
     speed = sheet.top if field == "top" else sheet.cruise
     throttle = sheet.trim_throttle if field == "trim_throttle" else 1.0
     needed_thrust = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if field == "climb" else 0.0)
@@ -723,7 +766,10 @@ def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> flo
 
 
 def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
-    """Return positive numbers near 1, as many as `count`, at which all errors are 0.  Raises _NoPropellerError."""
+    """Return `count` positive numbers near 1 at which all errors are 0.
+
+    Raises _NoPropellerError if none are found.
+    """
     if not count:
         return []
     for size in (1.0, 0.6, 1.7):
@@ -804,7 +850,10 @@ def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -
 
 
 def _with_performance(sheet: DataSheet, motor: Motor, drag: Drag) -> DataSheet:
-    """Return the sheet with the climb and top speed of a motor, if it can climb."""
+    """Return the sheet with the climb and the top speed that a motor gives.
+
+    Raises _NoPropellerError if the climb is flatter than the lowest climb of `RANGES`.
+    """
     excess_thrust = motor.thrust(1.0, sheet.cruise, SHEET_DENSITY) - drag(sheet.cruise)
     climb = math.asin(max(-1.0, min(0.95, excess_thrust / _weight(sheet))))
     if not climb >= math.radians(RANGES["climb"][2]) * (1.0 - _EDGE_ROUNDING):

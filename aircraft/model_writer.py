@@ -101,8 +101,9 @@ class ModelNumbers:
     inertia: Jx, Jy, Jz, Jxz about the centre of gravity, kg m^2; Jxz is the integral of x z dm.
     throw: travel of elevator, aileron and rudder in either direction.
     rate: rate limit of the surfaces, rad/s.
-    lag: lag of surfaces and of the motor, s.
+    lag: time constants of the surfaces and of the motor, s.
     lift_behind: distance from the centre of gravity back to the wing's forces, m.
+    factors: names of the model's factors.
     """
 
     title: str
@@ -123,7 +124,7 @@ class ModelNumbers:
 
 
 def model_xml(name: str, numbers: ModelNumbers) -> str:
-    """Return the text of ``NAME.xml``.
+    """Return the text of an aircraft's ``NAME.xml``.
 
     The model has no ``<input>`` and ``<output>`` channels, and the properties of `aircraft.jsbsim_model.DEFAULT_MODEL`.
     """
@@ -165,11 +166,11 @@ def model_xml(name: str, numbers: ModelNumbers) -> str:
   <ground_reactions/>
   <propulsion/>
 
-{_flight_control(numbers)}
+{_flight_control_xml(numbers)}
 
-{_external_reactions(numbers)}
+{_external_reactions_xml(numbers)}
 
-{_aerodynamics(numbers)}
+{_aerodynamics_xml(numbers)}
 </fdm_config>
 """
 
@@ -183,12 +184,13 @@ def _comment_text(text: str) -> str:
 # Servos: each moves one control, or a mix of two controls.
 
 
-def _flight_control(numbers: ModelNumbers) -> str:
+def _flight_control_xml(numbers: ModelNumbers) -> str:
+    """Return the section of the servos and the motor's lag; elevons and ruddervators mix two commands."""
     elevator, aileron, rudder = numbers.throw
     travels = {"elevator": elevator, "aileron": aileron, "rudder": rudder}
     mixed_controls = {"tail": (), "wing": ("elevator", "aileron"), "vtail": ("elevator", "rudder")}[numbers.layout]
     channels = [
-        _servo(f"surface/{name}-rad", f"command/{name}-rad", travel, numbers)
+        _servo_xml(f"surface/{name}-rad", f"command/{name}-rad", travel, numbers)
         for name, travel in travels.items()
         if name not in mixed_controls
     ]
@@ -200,11 +202,11 @@ def _flight_control(numbers: ModelNumbers) -> str:
         # The outer functions only convert between commands and surfaces; the servos between them have lag and stops.
         for side, sign in sides.items():
             command = add(f"<p> command/{first_control}-rad </p>", scale(sign, f"command/{second_control}-rad"))
-            channels.append(_function(f"{name}/{side}-command-rad", command))
-            channels.append(_servo(f"{name}/{side}-rad", f"{name}/{side}-command-rad", travel, numbers))
+            channels.append(_fcs_function_xml(f"{name}/{side}-command-rad", command))
+            channels.append(_servo_xml(f"{name}/{side}-rad", f"{name}/{side}-command-rad", travel, numbers))
         for control, signs in ((first_control, (0.5, 0.5)), (second_control, (0.5, -0.5))):
             servo_terms = (scale(sign, f"{name}/{side}-rad") for side, sign in zip(sides, signs, strict=True))
-            channels.append(_function(f"surface/{control}-rad", add(*servo_terms)))
+            channels.append(_fcs_function_xml(f"surface/{control}-rad", add(*servo_terms)))
     inverse_lag = 1.0 / numbers.lag[1]
     return f"""  <flight_control name="servos">
     <property value="0"> command/elevator-rad </property>
@@ -224,7 +226,12 @@ def _flight_control(numbers: ModelNumbers) -> str:
   </flight_control>"""
 
 
-def _servo(name: str, command: str, travel: float, numbers: ModelNumbers) -> str:
+def _servo_xml(name: str, command: str, travel: float, numbers: ModelNumbers) -> str:
+    """Return the actuator of a surface, with lag, rate limit and stops.
+
+    name, command: properties of the surface and of its command.
+    travel: travel in either direction, rad.
+    """
     return f"""      <actuator name="{name}">
         <input> {command} </input>
         <lag> {number(1.0 / numbers.lag[0])} </lag>
@@ -233,7 +240,8 @@ def _servo(name: str, command: str, travel: float, numbers: ModelNumbers) -> str
       </actuator>"""
 
 
-def _function(name: str, content: str) -> str:
+def _fcs_function_xml(name: str, content: str) -> str:
+    """Return a function of the flight controls that sets a property."""
     return f"""      <fcs_function name="{name}">
         <function> {content} </function>
       </fcs_function>"""
@@ -251,11 +259,12 @@ _TORQUE_XML = """    <!-- The reaction to the propeller's torque rolls the aircr
     </moment>"""
 
 
-def _external_reactions(numbers: ModelNumbers) -> str:
+def _external_reactions_xml(numbers: ModelNumbers) -> str:
+    """Return the section of the propulsion: factors, functions, thrust and the propeller's torque."""
     factor_properties = "\n".join(f'    <property value="1"> ident/{name} </property>' for name in numbers.factors)
     x, y, z = numbers.propulsion.direction
     # JSBSim's structural axes point aft, right and up; the body's forward, right and down.
-    forward, right, down = numbers.propulsion.place
+    forward, right, down = numbers.propulsion.position
     # Without a rudder only sideslip could balance torque and ailerons, and trims have no sideslip.
     torque = "    <!-- No torque of the propeller: its elevons are rigged against it. -->"
     if numbers.layout != "wing":
@@ -272,7 +281,7 @@ def _external_reactions(numbers: ModelNumbers) -> str:
     <function name="motor/airspeed-mps">
       <product> <p> velocities/vt-fps </p> <v> 0.3048 </v> </product>
     </function>
-{numbers.propulsion.functions(numbers.factors)}
+{numbers.propulsion.functions_xml(numbers.factors)}
     <force name="thrust" frame="BODY">
       <function> <product> <p> motor/thrust-n </p> <v> 0.2248089430997105 </v> </product> </function>
       <location unit="M"> <x> {number(-forward)} </x> <y> {number(right)} </y> <z> {number(-down)} </z> </location>
@@ -303,21 +312,20 @@ _RUDDER = "surface/rudder-rad"
 _CONTROL = "aero/control-factor"
 
 
-def _aerodynamics(numbers: ModelNumbers) -> str:
+def _aerodynamics_xml(numbers: ModelNumbers) -> str:
+    """Return the section of the aerodynamic forces and moments."""
     span, chord = "<p> metrics/bw-ft </p>", "<p> metrics/cbarw-ft </p>"
-    forces, moments = (
-        _force_coefficients(numbers.aero, numbers.factors),
-        _moment_coefficients(numbers.aero, numbers.factors),
-    )
+    drag, lift, side = _force_coefficients(numbers.aero, numbers.factors)
+    roll, pitch, yaw = _moment_coefficients(numbers.aero, numbers.factors)
     drag_factor = "<p> aero/drag-factor </p>"
     axes = "\n".join(
         [
-            _axis("X", "force/drag", multiply(_DYNAMIC_FORCE, drag_factor, forces[0]), ' frame="STABILITY"'),
-            _axis("Z", "force/lift", multiply(_DYNAMIC_FORCE, forces[1]), ' frame="STABILITY"'),
-            _axis("Y", "force/side", multiply(_DYNAMIC_FORCE, forces[2]), ' frame="STABILITY"'),
-            _axis("ROLL", "moment/roll", multiply(_DYNAMIC_FORCE, span, moments[0])),
-            _axis("PITCH", "moment/pitch", multiply(_DYNAMIC_FORCE, chord, moments[1])),
-            _axis("YAW", "moment/yaw", multiply(_DYNAMIC_FORCE, span, moments[2])),
+            _axis_xml("X", "force/drag", multiply(_DYNAMIC_FORCE, drag_factor, drag), ' frame="STABILITY"'),
+            _axis_xml("Z", "force/lift", multiply(_DYNAMIC_FORCE, lift), ' frame="STABILITY"'),
+            _axis_xml("Y", "force/side", multiply(_DYNAMIC_FORCE, side), ' frame="STABILITY"'),
+            _axis_xml("ROLL", "moment/roll", multiply(_DYNAMIC_FORCE, span, roll)),
+            _axis_xml("PITCH", "moment/pitch", multiply(_DYNAMIC_FORCE, chord, pitch)),
+            _axis_xml("YAW", "moment/yaw", multiply(_DYNAMIC_FORCE, span, yaw)),
         ]
     )
     return f"""  <aerodynamics>
@@ -331,7 +339,8 @@ def _aerodynamics(numbers: ModelNumbers) -> str:
   </aerodynamics>"""
 
 
-def _axis(axis: str, name: str, content: str, frame: str = "") -> str:
+def _axis_xml(axis: str, name: str, content: str, frame: str = "") -> str:
+    """Return the element of an axis with one function, ``aero/NAME``."""
     return f"""    <axis name="{axis}"{frame}>
       <function name="aero/{name}">
         {content}
@@ -396,7 +405,7 @@ def _moment_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tu
 
 
 def _lift_curve(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
-    """Return the lift as a function of angle of attack: a straight line, and a flat plate beyond the stall."""
+    """Return the XML of the lift by angle of attack: a straight line, and the lift of a flat plate beyond the stall."""
     straight_line = add(
         f"<v> {number(aero.lift_0)} </v>",
         scale(aero.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors)),
@@ -422,9 +431,9 @@ def _lift_curve(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
 
 
 def _separation_table(stall_alpha: float, sharpness: float) -> str:
-    """Return rows of angle of attack (rad) and separated fraction of the flow (Beard and McLain, 4.10).
+    """Return the rows of a JSBSim table: angle of attack (rad), and the separated fraction of the flow.
 
-    The fraction is exactly 0 in attached flow.
+    The fraction follows Beard and McLain, eq. 4.10, and is exactly 0 in attached flow.
     """
     width = 10.0 / sharpness
     steps = [stall_alpha - width + 0.02 * k for k in range(math.ceil(2.0 * width / 0.02) + 1)]

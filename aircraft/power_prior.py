@@ -1,4 +1,4 @@
-"""Prior of drag and power of a small aircraft from its size, calibrated on real aircraft.
+"""Estimate the drag and the power of a small aircraft from its size, with a prior calibrated on real aircraft.
 
 Power in level flight is D V / efficiency + avionics. Minimum drag depends on layout and aspect ratio, propulsive
 efficiency on mass. All deviations are log-normal. `examples/real/aircraft.csv` lists the powers of the 22 electric
@@ -18,7 +18,7 @@ DRAG_EXPONENT = -0.2
 # Aspect ratio for the reference minimum drag.
 DRAG_ASPECT = 8.0
 # Propulsive efficiency of a large aircraft: propeller 0.85, motor and speed controller 0.88. The Sky-Sailor's parts
-# have 0.86 and 0.80 (Noth, "Design of Solar Powered Airplanes for Continuous Flight", ETH 2008).
+# have efficiencies of 0.86 and 0.80 (Noth, "Design of Solar Powered Airplanes for Continuous Flight", ETH 2008).
 MAX_EFFICIENCY = 0.75
 # Exponent of the mass in the ratio of losses to output. Losses of bearings, iron, speed controller and of blades at low
 # Reynolds numbers weigh more in a small aircraft; powers from -0.5 to -0.8 fit the table equally well.
@@ -58,7 +58,9 @@ class PowerPrior:
         )
 
     def propulsive_efficiency(self, mass: float) -> float:
-        """Return the propulsive efficiency, drag times airspeed by battery power without avionics, for a mass in kg.
+        """Return the propulsive efficiency of an aircraft with a mass, kg.
+
+        It is the ratio of drag times airspeed to the battery power without avionics.
 
         >>> [round(POWER_PRIOR.propulsive_efficiency(mass), 2) for mass in (0.5, 2.0, 20.0)]
         [0.26, 0.43, 0.64]
@@ -73,10 +75,11 @@ POWER_PRIOR = PowerPrior(tail_drag=0.0315, wing_drag=0.0171, aspect_power=-0.42,
 def power_log_sd(min_drag_fraction: float, avionics_fraction: float, min_drag_sd: float = MIN_DRAG_LOG_SD) -> float:
     """Return the standard deviation of the logarithm of the power in level flight.
 
-    min_drag_fraction: fraction of the minimum drag in the drag.
-    avionics_fraction: fraction of the avionics in the power.
+    min_drag_fraction: ratio of the minimum drag to the drag.
+    avionics_fraction: ratio of the avionics' power to the power.
+    min_drag_sd: standard deviation of the logarithm of the minimum drag.
 
-    >>> round(power_log_sd(1.0, 0.0), 3)  # of 0.35 and 0.29
+    >>> round(power_log_sd(1.0, 0.0), 3)  # the root of 0.35^2 + 0.29^2
     0.455
     """
     drive_fraction = 1.0 - avionics_fraction

@@ -1,7 +1,7 @@
-"""Propulsion of small aircraft, as numbers and as JSBSim functions.
+"""Model the propulsion of small aircraft, as numbers and as JSBSim functions.
 
-Each kind provides the properties ``motor/thrust-n``, ``motor/torque-n_m``, ``motor/battery-current-a`` and
-``motor/battery-power-w`` as functions of ``motor/throttle-norm`` (0..1), ``motor/rho-kg_m3`` and
+Each kind of propulsion provides the properties ``motor/thrust-n``, ``motor/torque-n_m``, ``motor/battery-current-a``
+and ``motor/battery-power-w`` as functions of ``motor/throttle-norm`` (0..1), ``motor/rho-kg_m3`` and
 ``motor/airspeed-mps``. All of them are closed forms without states, so that a trim is exact. Factors of the model are
 properties ``ident/NAME``.
 """
@@ -21,7 +21,7 @@ class Propulsion(Protocol):
     """Interface of a kind of propulsion for `aircraft.model_writer`.
 
     direction: direction of the thrust in body axes.
-    place: point where it acts, m forward, right and below the centre of gravity.
+    position: point where the thrust acts, m forward, right and below the centre of gravity.
     """
 
     @property
@@ -29,11 +29,11 @@ class Propulsion(Protocol):
         """Unit vector of the thrust: forward, right, down."""
 
     @property
-    def place(self) -> Vector3:
+    def position(self) -> Vector3:
         """Point where the thrust acts, m forward, right and below the centre of gravity."""
 
-    def functions(self, factors: tuple[str, ...]) -> str:
-        """Return the JSBSim functions.
+    def functions_xml(self, factors: tuple[str, ...]) -> str:
+        """Return the XML of the JSBSim functions.
 
         factors: names of the model's ``ident/`` properties.
         """
@@ -54,9 +54,9 @@ class Propeller:
     torque: tuple[float, float, float]
 
     def scale(self, *, diameter: float = 1.0, blades: float = 1.0, pitch: float = 1.0) -> "Propeller":
-        """Return a propeller of another size.
+        """Return a propeller whose diameter, blade area and pitch are multiplied by factors.
 
-        Coefficients scale with the blade area, and J scales with the pitch. A propeller of steeper pitch gives its
+        The coefficients scale with the blade area, and J scales with the pitch. A propeller of steeper pitch gives its
         thrust up to a higher J and needs proportionally more torque.
         """
         ct, cq = self.thrust, self.torque
@@ -73,10 +73,7 @@ class Propeller:
         return rho * (c0 * n**2 * d**4 + c1 * n * airspeed * d**3 + c2 * airspeed**2 * d**2)
 
     def torque_parabola(self, airspeed: float, rho: float) -> tuple[float, float, float]:
-        """Return the torque (N m) as a parabola in the propeller speed (rad/s).
-
-        The coefficients belong to the square of the speed, the speed, and 1.
-        """
+        """Return the coefficients of the torque (N m) by falling power of the propeller speed (rad/s)."""
         c0, c1, c2 = self.torque
         d, turn = self.diameter, 2.0 * math.pi
         return rho * d**5 * c0 / turn**2, rho * d**4 * airspeed * c1 / turn, rho * d**3 * airspeed**2 * c2
@@ -95,7 +92,7 @@ _RAD_PER_REVOLUTION = 2.0 * math.pi
 
 
 def larger_root(square: float, linear: float, constant: float) -> float:
-    """Return the larger root of a parabola; a negative discriminant is replaced by 0."""
+    """Return the larger root of square x^2 + linear x + constant; a negative discriminant is replaced by 0."""
     return (math.sqrt(max(0.0, linear**2 - 4.0 * square * constant)) - linear) / (2.0 * square)
 
 
@@ -111,7 +108,7 @@ class ElectricMotor:
     power_ratio: ratio of the battery power used for propulsion to the computed power of motor and propeller.
     avionics: power of autopilot, radios and servos, W.
 
-    Beard and McLain, section 4.3, with a current that does not brake (`aircraft/aerosonde/README.md`).
+    The model follows Beard and McLain, section 4.3, but its current does not brake (`aircraft/aerosonde/README.md`).
     """
 
     propeller: Propeller
@@ -121,7 +118,7 @@ class ElectricMotor:
     idle_current: float
     windmill: float = 1.0
     direction: Vector3 = (1.0, 0.0, 0.0)
-    place: Vector3 = (0.0, 0.0, 0.0)
+    position: Vector3 = (0.0, 0.0, 0.0)
     power_ratio: float = 1.0
     avionics: float = 0.0
 
@@ -145,8 +142,8 @@ class ElectricMotor:
         current = max(0.0, (volts - self.emf * self.speed(throttle, airspeed, rho)) / self.resistance)
         return self.power_ratio * volts * current + self.avionics
 
-    def functions(self, factors: tuple[str, ...]) -> str:
-        """Return the JSBSim functions."""
+    def functions_xml(self, factors: tuple[str, ...]) -> str:
+        """Return the XML of the JSBSim functions."""
         factor = _factor_element(factors)
         k, r, i0 = self.emf, self.resistance, self.idle_current
         speed_factor = factor("motor-speed")
@@ -211,7 +208,7 @@ class FuelEngine:
     efficiency: float = 0.2
     windmill: float = 1.0
     direction: Vector3 = (1.0, 0.0, 0.0)
-    place: Vector3 = (0.0, 0.0, 0.0)
+    position: Vector3 = (0.0, 0.0, 0.0)
 
     def speed(self, throttle: float, airspeed: float, rho: float) -> float:
         """Return the propeller speed, rad/s."""
@@ -229,8 +226,8 @@ class FuelEngine:
         work = throttle * self.torque * rho / _SEA_LEVEL_DENSITY * self.speed(throttle, airspeed, rho)
         return work / self.efficiency
 
-    def functions(self, factors: tuple[str, ...]) -> str:
-        """Return the JSBSim functions."""
+    def functions_xml(self, factors: tuple[str, ...]) -> str:
+        """Return the XML of the JSBSim functions."""
         factor = _factor_element(factors)
         speed_factor = factor("motor-speed")
         factors_xml = (speed_factor, speed_factor, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
@@ -259,9 +256,7 @@ class FuelEngine:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorDisc:
-    """A propeller as a disc that accelerates the air, without a motor model.
-
-    Beard and McLain, first edition, section 4.3.
+    """A propeller as a disc that accelerates the air, without a motor model (Beard and McLain, first edition, 4.3).
 
     area: disc area, m^2.
     coefficient: C_prop.
@@ -270,7 +265,7 @@ class ActuatorDisc:
     efficiency: efficiency of motor and propeller beyond the disc's own loss, the power of the air over battery power.
     volts: V.
 
-    The thrust is 0.5 rho S C (v_e^2 - V^2), of a ducted one 0.5 rho S C v_e (v_e - V); it does not brake.
+    The thrust is 0.5 rho S C (v_e^2 - V^2), or 0.5 rho S C v_e (v_e - V) for a ducted disc; it is never negative.
     """
 
     area: float
@@ -280,10 +275,10 @@ class ActuatorDisc:
     efficiency: float
     ducted: bool = False
     direction: Vector3 = (1.0, 0.0, 0.0)
-    place: Vector3 = (0.0, 0.0, 0.0)
+    position: Vector3 = (0.0, 0.0, 0.0)
 
-    def functions(self, factors: tuple[str, ...]) -> str:
-        """Return the JSBSim functions."""
+    def functions_xml(self, factors: tuple[str, ...]) -> str:
+        """Return the XML of the JSBSim functions."""
         factor = _factor_element(factors)
         speed = multiply(f"<v> {number(self.exit_speed)} </v>", factor("motor-speed"))
         air = "<p> motor/airspeed-mps </p>"
@@ -322,7 +317,7 @@ class ShaftPower:
 
     diameter: m.
     thrust, power: coefficients of CT and CP by rising power of J.
-    shaft: coefficients of the shaft power, W, by rising power of the throttle; never below 0.
+    shaft: coefficients of the shaft power, W, by rising power of the throttle; a negative result counts as 0.
     efficiency: motor efficiency, shaft power over battery power.
     volts: V.
     """
@@ -334,10 +329,10 @@ class ShaftPower:
     volts: float
     efficiency: float
     direction: Vector3 = (1.0, 0.0, 0.0)
-    place: Vector3 = (0.0, 0.0, 0.0)
+    position: Vector3 = (0.0, 0.0, 0.0)
 
-    def functions(self, factors: tuple[str, ...]) -> str:
-        """Return the JSBSim functions.
+    def functions_xml(self, factors: tuple[str, ...]) -> str:
+        """Return the XML of the JSBSim functions.
 
         J follows from P / (rho D^2 V^3) = CP(J) / J^3, whose cube root is tabulated.
         """
@@ -393,9 +388,9 @@ class ShaftPower:
     </function>"""
 
     def _advance_table(self) -> str:
-        """Return rows of the cube root of CP(J) / J^3, rising, and of J.
+        """Return the rows of a JSBSim table: the cube root of CP(J) / J^3, increasing, and J.
 
-        The rows go from J where CP is 0 down to a standing aircraft.
+        The first row has the J at which CP is 0; the last rows belong to an aircraft that nearly stands still.
         """
         max_ratio = next(k / 1000.0 for k in range(50, 3000) if _evaluate(self.power, k / 1000.0) <= 0.0)
         rows = [(0.0, max_ratio)]
@@ -413,16 +408,21 @@ _SEA_LEVEL_DENSITY = 1.225
 
 
 def _factor_element(factors: tuple[str, ...]) -> Callable[[str], str]:
-    """Return a function for the element of a model factor, or 1 for a factor that the model lacks."""
+    """Return a function that returns the XML element of a factor, by its name; 1 for a factor that the model lacks."""
     return lambda name: f"<p> ident/{name} </p>" if name in factors else "<v> 1 </v>"
 
 
 def _evaluate(coefficients: tuple[float, ...], x: float) -> float:
+    """Return the value of a polynomial, whose coefficients are given by rising power."""
     return sum(value * x**k for k, value in enumerate(coefficients))
 
 
 def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
-    """Return the JSBSim element of a polynomial in x, by Horner's method."""
+    """Return the JSBSim element of a polynomial, by Horner's method.
+
+    coefficients: by rising power.
+    x: element of the variable.
+    """
     *lower_coefficients, leading_coefficient = coefficients
     text = f"<v> {number(leading_coefficient)} </v>"
     for coefficient in reversed(lower_coefficients):
@@ -431,7 +431,7 @@ def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
 
 
 def _torque_xml(propeller: Propeller) -> str:
-    """Return the propeller's torque Q = q2 w^2 + q1 w + q0 at its speed w, rad/s."""
+    """Return the XML of the coefficients of a propeller's torque, Q = q2 w^2 + q1 w + q0, at the speed w, rad/s."""
     square, linear, constant = propeller.torque_parabola(1.0, 1.0)
     rho, air = "motor/rho-kg_m3", "motor/airspeed-mps"
     return f"""    <!-- Torque of the propeller of {number(propeller.diameter)} m, q2 w^2 + q1 w + q0 at w rad/s. -->
@@ -441,7 +441,11 @@ def _torque_xml(propeller: Propeller) -> str:
 
 
 def _root_xml(linear: str, constant: str) -> str:
-    """Return the larger root of ``motor/q2`` w^2 + linear w + constant; clip the discriminant at 0."""
+    """Return the XML of the larger root of ``motor/q2`` w^2 + linear w + constant; the discriminant is at least 0.
+
+    linear: property of the linear coefficient.
+    constant: element of the constant.
+    """
     discriminant = f"""<difference>
               {multiply(f"<p> {linear} </p>", f"<p> {linear} </p>")}
               {multiply("<v> 4 </v>", "<p> motor/q2 </p>", constant)}
@@ -458,6 +462,10 @@ def _root_xml(linear: str, constant: str) -> str:
 
 
 def _thrust_and_torque_xml(propeller: Propeller, windmill: float, factor: Callable[[str], str]) -> str:
+    """Return the XML of the propeller's thrust and torque; a negative thrust is multiplied by ``windmill``.
+
+    factor: function of `_factor_element`.
+    """
     d, (c0, c1, c2) = propeller.diameter, propeller.thrust
     braking = "<min> <v> 0 </v> <p> motor/pull-n </p> </min>"
     w, air = "motor/propeller-rad_sec", "motor/airspeed-mps"

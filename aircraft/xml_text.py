@@ -1,4 +1,4 @@
-"""Elements of JSBSim's XML functions: numbers, products and sums."""
+"""Write elements of JSBSim's XML functions: numbers, products and sums."""
 
 
 def number(value: float) -> str:

@@ -131,7 +131,7 @@ def fly_random_sheets(count: int, seed: int) -> dict[str, int]:
             seconds = time.perf_counter() - began
             found = fly_both(made, k)
             what = f"{sheet.mass:5.2f} kg {sheet.span:.2f} m {sheet.cruise:4.1f} m/s {sheet.layout:5}"
-            what += " fuel    " if sheet.fuelled else " electric"
+            what += " fuel    " if sheet.burns_fuel else " electric"
             flights = []
             for name, (ended, across, height) in found.items():
                 done[name] += ended == "completed"

@@ -1,7 +1,7 @@
-"""Scale of the airspeed sensor from the wind triangle: ground velocity minus air velocity is the wind.
+"""Estimate the scale of the airspeed sensor from the wind triangle: ground velocity minus air velocity is the wind.
 
-The wind does not depend on the aircraft's heading. A sensor that reads too little leaves a part of the airspeed in the
-wind, and that part turns with the aircraft: every turn shows it. Wind and gusts change too, but slowly, so the change
+The wind does not depend on the aircraft's heading. If the sensor reads too little, a part of the airspeed appears as
+wind, and this part turns with the aircraft: every turn shows it. Wind and gusts also change, but slowly, so the change
 of the difference from one second to the next is used.
 """
 
@@ -30,7 +30,7 @@ _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Return signals with the airspeed scaled to fit the wind triangle, and the factor's standard deviation."""
+    """Return signals with the airspeed scaled to fit the wind triangle, and with the scale's standard deviation."""
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
 
@@ -47,10 +47,10 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     north_air, east_air = thinned.extra["ahead"], thinned.extra["right"]
     north, east, _ = thinned.velocity.T
     stretches = list(zip(thinned.edges[:-1], thinned.edges[1:], strict=True))
-    # Wind is ground velocity minus air velocity; an error of the heading rotates the air velocity. A gust is in the
-    # wind, in the airspeed and its direction, and after a while in the ground velocity, since the aircraft drifts with
-    # it: a regressor with the gust in it would bias the scale. The regressor is therefore the mean airspeed
-    # along the flown course, smoothed over the time in which gusts change.
+    # Wind is ground velocity minus air velocity; an error of the heading rotates the air velocity. A gust changes the
+    # wind, the airspeed and the direction of the air velocity, and after a while the ground velocity, since the
+    # aircraft drifts with the gust: a regressor that contains the gust would bias the scale. The regressor is therefore
+    # the mean airspeed along the flown course, smoothed over the time in which gusts change.
     mean_air = np.empty((2, len(north_air)))
     for first, last in stretches:
         rows = slice(first, last)
@@ -83,7 +83,7 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
 
 
 def _air_velocity(signals: Signals, flow: Flow) -> tuple[Floats, Floats]:
-    """Return the velocity through the air (n,) to the north and to the east, m/s."""
+    """Return the north and the east component of the velocity through the air, m/s, two arrays (n,)."""
     roll, pitch, yaw = signals.attitude.T
     u = signals.airspeed * np.cos(flow.alpha) * np.cos(flow.beta)
     v = signals.airspeed * np.sin(flow.beta)

@@ -1,8 +1,8 @@
-"""Alignment of a log's clocks: lags of the accelerometers and of the control surfaces.
+"""Align the signals of a log in time: find the lags of the accelerometers and of the control surfaces.
 
-The accelerometers lag behind the gyros, and the surfaces behind their commands. A specific force that is 0.1 s late
-explains a moment badly with any model, so the delays are estimated first. The accelerometers' lag and delay and the
-servos' lag are those that explain pitch, roll and yaw best. All other signals are then delayed like the accelerometers.
+The accelerometers lag behind the gyros, and the surfaces behind their commands. With a specific force that is 0.1 s
+late no model explains a moment well, so the lags are estimated first: the lags and delays of the accelerometers and the
+servos are chosen to explain pitch, roll and yaw best. All other signals are then delayed like the accelerometers.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +17,7 @@ from world.arrays import Floats, Ints
 
 @dataclass(frozen=True, slots=True)
 class Clocks:
-    """Clocks of one log, s.
+    """Lags and delays of the sensors and servos in one log, s.
 
     lag, delay: first-order lag and delay of the accelerometers behind the gyros.
     servo_lag: lag of the servos.
@@ -37,16 +37,19 @@ class Clocks:
 
 @dataclass(frozen=True, slots=True)
 class Signals:
-    """All stretches of some logs in sequence, delayed like the accelerometers.
+    """The signals of all stretches of some logs in sequence, delayed like the accelerometers.
 
-    Fields as in `FlightRecord`, (n,) or (n, k).
+    The fields are as in `FlightRecord`, (n,) or (n, k), and in addition:
+
     rate_changes: (n, 3) derivatives of p, q and r, rad/s^2.
     throttle: (n,) after the motor's lag.
     surfaces: (n, 3) elevator, aileron, rudder after the servos' lag, rad.
     airspeed_factor: factor that the airspeed was multiplied with.
     airspeed_sd: relative standard deviation of the airspeed.
-    edges: rows at which each stretch begins, and the end.
+    edges: first row of each stretch, and at the end the number of rows.
     block: (n,) number of the time block of each row.
+    hertz: samples per second.
+    extra: further columns by name.
     """
 
     acceleration: Floats
@@ -69,8 +72,9 @@ class Signals:
     extra: Mapping[str, Floats] = field(default_factory=dict)
 
     def smooth(self, values: Floats, cutoff: float) -> Floats:
-        """Return values (n,) or (n, k) low-passed, each stretch separately.
+        """Return low-passed values; each stretch is filtered separately.
 
+        values: (n,) or (n, k).
         cutoff: Hz.
         """
         smoothed = np.empty_like(values)
@@ -79,9 +83,9 @@ class Signals:
         return smoothed
 
     def thin(self, step: int, extra: Mapping[str, Floats]) -> "Signals":
-        """Return every ``step``-th row of the low-passed signals.
+        """Low-pass the signals and return every ``step``-th row, in each stretch.
 
-        extra: further columns (n,) by name, thinned in the same way.
+        extra: further columns (n,) by name, which are thinned in the same way.
         """
         edges, blocks, pieces = [0], [], []
         columns = {name: getattr(self, name) for name in _SAMPLED_FIELDS} | dict(extra)
@@ -110,7 +114,7 @@ class Signals:
         )
 
     def delay(self, values: Floats, delay: float) -> Floats:
-        """Return values delayed by ``delay`` (s), each stretch separately."""
+        """Return values delayed by ``delay`` (s); each stretch is delayed separately."""
         delayed_values = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
             delayed_values[first:last] = apply_delay(values[first:last], delay)
@@ -140,9 +144,10 @@ _AIRSPEED_CUTOFF_HZ = 2.0
 
 
 def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: float) -> Signals:
-    """Join stretches in sequence, each on the clock of its accelerometers.
+    """Join the signals of stretches in sequence, each delayed like its accelerometers.
 
-    motor_lag: s.
+    clocks: lags and delays of each stretch.
+    motor_lag: time constant of the motor, s.
     """
     parts: dict[str, list[Floats]] = {}
     edges, blocks, block_count = [0], [], 0
@@ -180,7 +185,10 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
 
 
 def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
-    """Return values (n,) or (n, k) before a first-order lag (s): the values plus the lag times their rate of change.
+    """Return the input of a first-order lag from its output: the output plus the lag times its rate of change.
+
+    values: output, (n,) or (n, k).
+    lag: time constant, s.
 
     >>> invert_first_order_lag(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])
@@ -201,7 +209,9 @@ _SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03, 0.02])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
-    """Find the clocks with the smallest misfit, by a grid and then a simplex search (Nelder and Mead 1965).
+    """Find the clocks with the smallest misfit, first on a grid and then by a simplex search (Nelder and Mead 1965).
+
+    misfit: function that returns how badly the signals are explained with some clocks.
 
     >>> found = find_clocks(lambda clock: abs(clock.lag - 0.05) + abs(clock.delay - 0.03) + clock.servo_lag)
     >>> round(found.lag, 2), round(found.delay, 2), round(found.servo_lag, 2)

@@ -1,4 +1,4 @@
-"""Initial model of an identification, as numbers: mass, geometry, inertia, coefficients and motor."""
+"""Define the initial model of an identification as numbers: mass, geometry, inertia, coefficients and motor."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from aircraft.identification.motor import Motor
 
 @dataclass(frozen=True, slots=True)
 class Coefficients:
-    """Dimensionless coefficients about steady flight, per rad and per rad of rate x length / (2 V).
+    """Dimensionless coefficients about steady flight, per rad of an angle and per rad of rate x length / (2 V).
 
     Signs of the controls: trailing edge down, roll to the right, yaw to the left are positive.
 
@@ -49,14 +49,15 @@ class Coefficients:
 
 @dataclass(frozen=True, slots=True)
 class BaseModel:
-    """The aircraft before its logs are used.
+    """Model of the aircraft before its logs are used.
 
     mass: kg.
     area: m^2.
     span, chord: m.
     inertia: (4,) Ixx, Iyy, Izz and Ixz (the integral of x z dm), kg m^2.
     servo_lag, motor_lag: first-order time constants, s.
-    reacts: True if the propeller's torque rolls it; a flying wing's elevons are rigged against that.
+    has_torque_reaction: True if the propeller's torque rolls the aircraft; False for a flying wing, whose elevons are
+        rigged against the torque.
     induced_factor: ratio of drag_induced to the value of the aircraft that it was scaled from.
     """
 
@@ -69,5 +70,5 @@ class BaseModel:
     motor_lag: float
     coefficients: Coefficients
     motor: Motor
-    reacts: bool = True
+    has_torque_reaction: bool = True
     induced_factor: float = 1.0

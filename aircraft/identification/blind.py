@@ -1,11 +1,11 @@
-"""Predict parts of a log that no estimate has seen, as bands of 95 %, and count how often the flight is inside.
+"""Predict parts of a log that no estimate has used, as bands of 95 %, and count how often the flight is inside.
 
 The judged part of the log is cut into windows. Each window starts from the measured state and follows the logged
-controls. The forty simulated flights of a window differ in what is not known: each uses another draw of the aircraft,
-and adds the errors of the central aircraft over one window of an earlier part of the log, drawn at random. These blocks
-of errors contain gusts, noise of the sensors and what the model lacks, with their growth over time and their
-correlation (a block bootstrap: Kunsch 1989; Politis and Romano 1994). Biases of the sensors, trim offsets and the
-filter of the gusts come from the earlier part too. Nothing is fitted to the judged part.
+controls. Forty flights of each window are simulated. Each of them uses another draw of the aircraft, and adds the
+errors of the central aircraft over a window of an earlier part of the log that is drawn at random. These blocks of
+errors contain gusts, sensor noise and errors of the model, with their growth over time and their correlation (a block
+bootstrap: Kunsch 1989; Politis and Romano 1994). Sensor biases, trim offsets and the gust filter also come from the
+earlier part. Nothing is fitted to the judged part.
 """
 
 from collections.abc import Sequence
@@ -28,13 +28,13 @@ from world.arrays import Flags, Floats, Ints
 DRAWS = 40
 # Probability with which the flight is inside a band.
 COVERAGE = 0.95
-# Smallest fraction of the draws with which a band is known.
+# Fraction of the draws that must have a value for a band to be known.
 _MIN_KNOWN_FRACTION = 0.9
 # Duration of a window, s.
 WINDOW_S = 2.0
 # Time between the starts of windows in the earlier part, s; they may overlap.
 _CALIBRATION_STEP_S = 0.5
-# Time in a stretch before its first window, s; the filter has settled then.
+# Time from the start of a stretch to its first window, s; the filter settles in this time.
 _SETTLING_TIME_S = 2.0
 # One of this many samples is kept, at `GRID_HZ`.
 _THINNING_FACTOR = 5
@@ -46,7 +46,7 @@ _SEED = 68
 class BlindQuantity:
     """One predicted quantity.
 
-    name, unit: for people.
+    name, unit: name and unit in texts.
     factor: factor from SI to the unit.
     """
 
@@ -73,11 +73,11 @@ _POWER = 6
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """Band of one quantity, and the flight.
+    """Predicted band of one quantity, and the values of the flight.
 
     along: (n,) time or distance.
     low, high: (n,) ends of the band.
-    flown: (n,) the flight; NaN where it is not known.
+    flown: (n,) values of the flight; NaN where they are not known.
     unchanged: half the width of the band if the quantity is predicted to keep its value at the start of each window;
         NaN if this is not a prediction.
     """
@@ -92,7 +92,7 @@ class Band:
 
     @property
     def inside(self) -> float:
-        """Share of the known values that are inside the band; NaN without known values."""
+        """Fraction of the known values that are inside the band; NaN without known values."""
         known = self._known
         is_inside = (self.flown >= self.low) & (self.flown <= self.high)
         return float(is_inside[known].mean()) if known.any() else float("nan")
@@ -111,25 +111,29 @@ class Band:
 
     @property
     def is_informative(self) -> bool:
-        """False if the band is as wide as if the quantity stayed as at the start, or wider."""
+        """True if the band is narrower than for a quantity that keeps its value at the start of each window."""
         return not self.half_width >= self.unchanged
 
     @property
     def _known(self) -> Flags:
+        """Mask of the values at which the flight and the band are known, (n,)."""
         return np.isfinite(self.flown) & np.isfinite(self.low) & np.isfinite(self.high)
 
 
 def uninformative_note(bands: Sequence[Band]) -> str:
-    """Return a sentence that names the quantities of which the model says nothing; empty if there are none."""
+    """Return a sentence that names the quantities whose bands are not informative; "" if there are none."""
     names = ", ".join(band.name for band in bands if not band.is_informative)
     return f"the model says nothing of {names}: the band is as wide as without a model, or wider" if names else ""
 
 
 def band_limits(values: Floats) -> tuple[Floats, Floats]:
-    """Return the ends of the band (n,) of draws (d, n), at the plotting positions k / (d + 1) (Weibull 1939).
+    """Return the lower and the upper end of the band of draws, two arrays (n,).
 
-    The next draw is inside with the probability `COVERAGE`; percentiles of the draws would contain fewer.  The
-    band is unknown (NaN) where fewer than `_MIN_KNOWN_FRACTION` of the draws have a value.
+    A further draw is inside the band with the probability `COVERAGE`: the ends are at the plotting positions
+    k / (d + 1) (Weibull 1939), while percentiles of the draws would be too narrow.  The band is unknown (NaN) where
+    fewer than `_MIN_KNOWN_FRACTION` of the draws have a value.
+
+    values: draws, (d, n).
 
     >>> low, high = band_limits(np.arange(39.0)[:, np.newaxis])
     >>> low.round(9).tolist(), high.round(9).tolist()
@@ -182,11 +186,11 @@ class BlindPrediction:
 
     @property
     def windows(self) -> tuple[int, int]:
-        """Number of windows of the earlier and of the judged part."""
+        """Numbers of windows in the earlier part and in the judged part."""
         return len(self._errors), len(self._starts)
 
     def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
-        """Return the band of each of `QUANTITIES` over the judged windows, by draws of the aircraft."""
+        """Return the band of each of `QUANTITIES` over the judged windows, predicted with draws of the aircraft."""
         generator = np.random.default_rng(_SEED)
         blocks = generator.integers(len(self._errors), size=(len(draws), len(self._starts)))
         flights = np.stack(
@@ -207,7 +211,10 @@ class BlindPrediction:
         return tuple(bands)
 
     def _fly(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
-        """Return `QUANTITIES` (w, k, q) over windows from some rows (w,), with trims of the earlier part."""
+        """Simulate windows that start at some rows (w,), with the trims of the earlier part; return (w, k, q).
+
+        The result holds the q `QUANTITIES` at the k kept samples of each window.
+        """
         values = prior_means()
         trims = Predictor(self._earlier, base, values, self._filters).trims.mean(axis=0)
         predictor = Predictor(signals, base, values, self._filters, trims=trims)
@@ -222,7 +229,7 @@ class BlindPrediction:
         _, current = motor.thrust_and_current(*flat)
         heading = _headings(states, signals.attitude[rows[:, 0], 2], 1.0 / signals.hertz)
         air = _to_ground(states, heading)
-        # The air moves as it did at the start of the window.
+        # The wind stays as at the start of the window.
         velocity = air + (measured_velocity - air[:, 0])[:, np.newaxis]
         return _stack_quantities(
             states[:, :, 6:8], airspeed, velocity, current.reshape(rows.shape) * battery, signals.hertz
@@ -230,16 +237,21 @@ class BlindPrediction:
 
 
 def _scale_airspeed(signals: Signals, factor: float) -> Signals:
+    """Return signals with the airspeed multiplied by a factor."""
     return replace(signals, airspeed=signals.airspeed * factor)
 
 
 def _kept_rows(count: int) -> Ints:
-    """Return the samples of a window that are kept, without its start, which is measured."""
+    """Return the indices of the kept samples of a window with ``count`` samples; the measured start is not kept."""
     return np.arange(_THINNING_FACTOR, count + 1, _THINNING_FACTOR)
 
 
 def _window_starts(signals: Signals, count: int, step: int) -> Ints:
-    """Return the rows at which windows of a number of samples start, a step apart, in all stretches."""
+    """Return the rows at which windows start, in all stretches.
+
+    count: number of samples in a window.
+    step: rows between the starts of two windows.
+    """
     settling = round(_SETTLING_TIME_S * signals.hertz)
     return np.concatenate(
         [
@@ -250,7 +262,7 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
 
 
 def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
-    """Return the measured `QUANTITIES` (w, k, q) over windows; the power is NaN for a log without current."""
+    """Return the measured `QUANTITIES` over windows, (w, k, q); the power is NaN for a log without current."""
     rows = starts[:, np.newaxis] + np.arange(count + 1)
     return _stack_quantities(
         signals.attitude[rows, :2],
@@ -262,7 +274,11 @@ def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
 
 
 def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power: Floats, hertz: float) -> Floats:
-    """Return `QUANTITIES` (w, k, q) over windows, of bank and pitch (w, n, 2), and velocity (w, n, 3)."""
+    """Compute `QUANTITIES` over windows, (w, k, q), at the kept ones of n samples.
+
+    angles: bank and pitch, (w, n, 2).
+    velocity: velocity over the ground, north, east, down, (w, n, 3).
+    """
     north, east, down = np.moveaxis(velocity, 2, 0)
     course = np.arctan2(east[:, :1], north[:, :1])
     right = east * np.cos(course) - north * np.sin(course)
@@ -273,7 +289,11 @@ def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power:
 
 
 def _headings(states: Floats, start: Floats, step: float) -> Floats:
-    """Return the headings (w, n), rad, from the heading at each window's start (w,), rad."""
+    """Integrate the headings over windows, rad, (w, n).
+
+    start: heading at the start of each window, rad, (w,).
+    step: time between samples, s.
+    """
     roll, pitch = states[:, :, 6], states[:, :, 7]
     rate = (states[:, :, 4] * np.sin(roll) + states[:, :, 5] * np.cos(roll)) / np.cos(pitch)
     turned = np.cumsum(0.5 * step * (rate[:, 1:] + rate[:, :-1]), axis=1)
@@ -281,7 +301,7 @@ def _headings(states: Floats, start: Floats, step: float) -> Floats:
 
 
 def _to_ground(states: Floats, heading: Floats) -> Floats:
-    """Return the velocity through the air, north, east and down (w, n, 3), m/s."""
+    """Return the velocity through the air, north, east and down, m/s, (w, n, 3)."""
     u, v, w, _, _, _, roll, pitch = np.moveaxis(states, 2, 0)
     below = v * np.sin(roll) + w * np.cos(roll)
     across = v * np.cos(roll) - w * np.sin(roll)

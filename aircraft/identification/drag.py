@@ -1,9 +1,9 @@
 """Estimate drag and thrust together, from forward acceleration and, if logged, the battery's current.
 
-Level flight shows only their difference; climbs, glides and other speeds show more, and the current shows most.
-Other uncertain properties of motor and accelerometer are estimated with them, within their ranges. Those that belong to
-the aircraft (its motor's resistance, the battery's voltage) are then folded into the parameters: the model has no place
-for them, and without them would fly with another thrust than the measured one.
+Level flight shows only the difference of thrust and drag; climbs, glides and other speeds show more, and the current
+shows most. Other uncertain properties of motor and accelerometer are estimated as well, within their ranges. The
+properties of the aircraft among them (the motor's resistance, the battery's voltage) are then folded into the
+parameters: the model does not contain them, and would otherwise have another thrust than measured.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from world.arrays import Floats
 FORCE_CUTOFF_HZ = 1.0
 # One of this many samples is used.
 FORCE_THINNING = 10
-# Other uncertain quantities, which the log hardly informs, with standard deviations; they are estimated with drag and
-# thrust.
+# Nuisance parameters: other uncertain quantities, which are estimated with drag and thrust, with their standard
+# deviations. A log hardly determines them.
 NUISANCES = {
     "forward accelerometer, m/s2": 0.01,
     "resistance of the motor": 0.2,
@@ -71,12 +71,13 @@ class AlphaUncertainty:
 
 @dataclass(frozen=True, slots=True)
 class ForwardForces:
-    """Thinned signals, and the part of the forward force from each unknown.
+    """Thinned signals, and the contribution of each unknown to the forward force.
 
-    known: (n,) N, part of the lift.
-    tilts: (2, n) N, part of one standard deviation of each uncertainty of the angle of attack.
-    drags: (2, n) N, zero-lift and induced drag.
-    elevator: (n,) N, drag of the elevator.
+    known: (n,) contribution of the lift, N.
+    tilts: (2, n) contributions of one standard deviation of each uncertainty of the angle of attack, N.
+    drags: (2, n) contributions of zero-lift and induced drag, N.
+    elevator: (n,) contribution of the elevator's drag, N.
+    volts: battery voltage, V, (n,) or one value.
     """
 
     signals: Signals
@@ -87,16 +88,16 @@ class ForwardForces:
     elevator: Floats
     volts: Floats | float
 
-    def predicted(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return forward acceleration (n,), m/s^2, and current (n,), A, low-passed.
+    def predict(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """Return the low-passed forward acceleration, m/s^2, and current, A, two arrays (n,).
 
-        unknown: parameters, then nuisances.
+        unknown: values of the parameters, then of the nuisance parameters.
         """
-        force, current = self._raw(unknown)
+        force, current = self._predict_unfiltered(unknown)
         return self.signals.smooth(force, FORCE_CUTOFF_HZ), self.signals.smooth(current, FORCE_CUTOFF_HZ)
 
-    def _raw(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return forward acceleration (n,), m/s^2, and current (n,), A, before the low-pass."""
+    def _predict_unfiltered(self, unknown: Floats) -> tuple[Floats, Floats]:
+        """Return the forward acceleration, m/s^2, and the current, A, two arrays (n,), before the low-pass."""
         zero_lift, induced, thrust, speed, torque, bias, resistance, idle, voltage, elevator_drag, *tilts = unknown
         motor = self.base.motor.with_factors(thrust, speed, torque, 1.0 + resistance, 1.0 + idle)
         signals = self.signals
@@ -113,10 +114,12 @@ class ForwardForces:
         return force / self.base.mass + bias, current
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return the derivatives (n, p) of forward acceleration and current by each unknown."""
+        """Return the derivatives of forward acceleration and current by the p unknowns, two arrays (n, p)."""
         steps = _DIFFERENCE_STEP * np.eye(len(unknown))
-        # One low-pass of all columns: a call costs far more than a column.
-        forces, currents = zip(*(self._raw(unknown + step) for step in (0.0 * steps[0], *steps)), strict=True)
+        # All columns are filtered in one call: a call costs far more than a column.
+        forces, currents = zip(
+            *(self._predict_unfiltered(unknown + step) for step in (0.0 * steps[0], *steps)), strict=True
+        )
         force, current = (
             self.signals.smooth(np.column_stack(samples), FORCE_CUTOFF_HZ) for samples in (forces, currents)
         )
@@ -126,23 +129,23 @@ class ForwardForces:
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit drag and motor; return the fit, the parameters' values (5,), and their covariance (5, 5).
+    """Fit drag and motor; return the fit, the values of the five parameters (5,), and their covariance (5, 5).
 
     With the base model's resistance, idle current, voltage and elevator drag, these values give the same forces and
-    currents as the fit does with its fitted ones.
+    currents as the fit gives with the fitted values of these quantities.
 
-    values: (n,) of all parameters, of which the parameters of lift are used.
+    values: (n,) values of all parameters, of which the parameters of lift are used.
     uncertainty: uncertainty of the lift curve.
     """
     forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
     thinned = forces.signals
     with_current = bool(np.isfinite(thinned.current).all())
     means, sds = drag_priors(with_current=with_current)
-    # First only the forces, then both, because with the current from the start the first steps would diverge.
+    # First fit only the forces, then forces and current, because the first steps with the current would diverge.
     fit = _fit_from(forces, _Measurement(thinned, with_current=False), means, sds)
     if with_current:
         fit = _fit_from(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)
-    force, _ = forces.predicted(fit.estimate)
+    force, _ = forces.predict(fit.estimate)
     measured = thinned.smooth(thinned.acceleration[:, 0], FORCE_CUTOFF_HZ)
     explained = 1.0 - float((measured - force).var() / measured.var())
     drag_values, jacobian = _fold_nuisances(forces, fit.estimate)
@@ -154,7 +157,10 @@ def fit_drag(
 
 
 def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
-    """Return means and standard deviations (p,) of the parameters of drag and motor, then of `NUISANCES`."""
+    """Return the means and the standard deviations of the p parameters of drag and motor, followed by `NUISANCES`.
+
+    The result is two arrays (p,).
+    """
     nuisances = np.array(list(NUISANCES.values()))
     nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE_FACTOR if with_current else 1.0
     means = np.concatenate([prior_means()[_IS_DRAG_PARAMETER], np.zeros(len(nuisances))])
@@ -162,23 +168,26 @@ def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
 
 
 def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Fold the aircraft's nuisances into the parameters; return the parameters' values (5,) and derivatives (5, p).
+    """Fold the aircraft's nuisance parameters into the five parameters, by least squares over the flow and throttle.
 
-    Least squares over the log's own flow and throttle. unknown: (p,) as fitted.
+    Returns the values of the parameters (5,), and their derivatives by the unknowns (5, p).
+
+    unknown: (p,) fitted values of the unknowns.
     """
     own_count = int(_IS_DRAG_PARAMETER.sum())
     folded = own_count + np.flatnonzero(_IS_OF_AIRCRAFT)
     scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
     def stack_both(force: Floats, current: Floats) -> Floats:
+        """Return forces and weighted currents in one array."""
         return np.concatenate([force, scale * current])
 
-    target = stack_both(*forces.predicted(unknown))
+    target = stack_both(*forces.predict(unknown))
     folded_unknown = unknown.copy()
     folded_unknown[folded] = 0.0
     for _ in range(_MAX_FOLDING_STEPS):
         columns = stack_both(*forces.slopes(folded_unknown))
-        residual = target - stack_both(*forces.predicted(folded_unknown))
+        residual = target - stack_both(*forces.predict(folded_unknown))
         folded_unknown[:own_count] += np.linalg.lstsq(columns[:, :own_count], residual, rcond=None)[0]
     jacobian = np.zeros((own_count, len(unknown)))
     jacobian[:, :own_count] = np.eye(own_count)
@@ -198,15 +207,18 @@ class _Measurement:
 def _fit_from(
     forces: ForwardForces, measurement: _Measurement, means: Floats, sds: Floats, start: Floats | None = None
 ) -> Fit:
-    """Fit by Gauss-Newton steps from a start, each at most one standard deviation of the prior."""
+    """Fit the unknowns by Gauss-Newton steps, each limited to one standard deviation of the prior.
+
+    start: (p,) first estimate; None for the means of the prior.
+    """
     estimate = means.copy() if start is None else start.copy()
     for _ in range(_MAX_STEPS):
-        force, current = forces.predicted(estimate)
+        force, current = forces.predict(estimate)
         slopes, current_slopes = forces.slopes(estimate)
         force_residual, blocks = measurement.force - force, measurement.block
         targets = force_residual + slopes @ estimate
         if measurement.current is not None:
-            # Weight both by the scatter of their residuals.
+            # Weight forces and current by the scatter of their residuals.
             current_scatter = max(_CURRENT_FLOOR_A, float((measurement.current - current).std()))
             scale = max(FORCE_FLOOR, float(force_residual.std())) / current_scatter
             slopes = np.vstack([slopes, scale * current_slopes])
@@ -223,7 +235,7 @@ def _fit_from(
 def forward_forces(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty
 ) -> ForwardForces:
-    """Return the part of the forward force from each unknown over the thinned signals.
+    """Return the contribution of each unknown to the forward force, over the thinned signals.
 
     values, uncertainty: see `fit_drag`.
     """

@@ -1,4 +1,4 @@
-"""Draw whole aircraft from an estimate, with the correlations of their parameters."""
+"""Draw samples of all parameters of an aircraft from an estimate, with their correlations."""
 
 import numpy as np
 
@@ -11,32 +11,32 @@ from world.arrays import Floats
 COUNT = 512
 # Seed of the draws.
 SEED = 1
-# Factor on the battery's power in the model of an identified aircraft, 1 for the estimate.
+# Property of the factor on the battery's power in the model of an identified aircraft; 1 is the estimate.
 DRIVE_POWER = "ident/drive-power"
-# Draws per aircraft that is kept, of which those within the bounds are used.
+# Number of samples that are drawn for each sample that is returned, because samples beyond the bounds are discarded.
 _DRAWS_PER_AIRCRAFT = 20
 
 
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw `aircraft.identification.parameters.PARAMETERS` jointly within their bounds, (count, n)."""
+    """Draw joint samples of `aircraft.identification.parameters.PARAMETERS` within their bounds, (count, n)."""
     generator = np.random.default_rng(seed)
     lower, upper = np.array([parameter.bounds for parameter in PARAMETERS]).T
     samples = generator.multivariate_normal(
         estimate.values, estimate.covariance, _DRAWS_PER_AIRCRAFT * count, method="eigh"
     )
     within_bounds = samples[((samples >= lower) & (samples <= upper)).all(axis=1)]
-    # For an estimate close to its bounds too few draws are within; clipped draws follow them.
+    # For an estimate close to its bounds too few samples lie within the bounds; clipped samples complete them.
     chosen = np.concatenate([within_bounds, np.clip(samples, lower, upper)])[:count]
     return np.asarray(chosen)
 
 
 def draw_drive_power(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw the factor on the battery's power, (count,): 1 if the battery's current was logged.
+    """Draw samples of the factor on the battery's power, (count,); all are 1 if the battery's current was logged.
 
     No other signal shows the propulsive efficiency, which varies by `EFFICIENCY_LOG_SD` among real aircraft.
     """
     if estimate.with_current:
         return np.ones(count)
-    # The parameters take the generator of the seed itself.
+    # `draw_aircraft` uses the generator of the seed itself.
     normals = np.random.default_rng([seed, 1]).standard_normal(count)
     return np.asarray(np.exp(EFFICIENCY_LOG_SD * normals))

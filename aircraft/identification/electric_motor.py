@@ -1,4 +1,4 @@
-"""Electric motor with a fixed propeller: thrust and current by airspeed, throttle and density.
+"""Model an electric motor with a fixed propeller: thrust and current by airspeed, throttle and density.
 
 Beard and McLain, Small Unmanned Aircraft, second edition, section 4.3: the motor's torque KQ ((V_in - KV w) / R - i0)
 equals the propeller's torque q2 w^2 + q1 w + q0. A motor that does not brake windmills at zero current.
@@ -61,7 +61,7 @@ class ElectricMotor:
         )
 
     def speed(self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float) -> Floats:
-        """Return the propeller speed (n,), rad/s.
+        """Return the propeller speed, rad/s, (n,).
 
         throttle: 0..1.
         voltage: battery voltage, V.
@@ -76,7 +76,7 @@ class ElectricMotor:
     def thrust_and_current(
         self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None
     ) -> tuple[Floats, Floats]:
-        """Return thrust (n,), N, and current from the battery (n,), A.
+        """Return the thrust, N, and the current from the battery, A, two arrays (n,).
 
         >>> motor = ElectricMotor((4.48e-6, 5.27e-5, -2.18e-3), (1.58e-4, -1.26e-3, -2.78e-2), 0.0659, 0.042, 1.5, 44.4)
         >>> still, full, sea = np.zeros(1), np.ones(1), np.full(1, 1.225)
@@ -99,14 +99,16 @@ class ElectricMotor:
         return np.asarray(q2 * speed * speed + q1 * speed + q0)
 
     def _torques(self, airspeed: Floats, density: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return q2, q1 and q0 of the propeller's torque, three arrays (n,)."""
         a, b, c = self.torque
         return density * a, density * b * airspeed, density * c * airspeed * airspeed
 
 
 def _times(factor: float, coefficients: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Return three coefficients multiplied by a factor."""
     return factor * coefficients[0], factor * coefficients[1], factor * coefficients[2]
 
 
 def _larger_root(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Return the larger root of a x^2 + b x + c = 0, or the minimum's position if there is none."""
+    """Return the larger root of a x^2 + b x + c, or the position of the minimum if there is no root, (n,)."""
     return np.asarray((np.sqrt(np.maximum(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a))

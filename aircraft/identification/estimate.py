@@ -1,12 +1,13 @@
-"""Estimate lift curve, drag with thrust, and moments one after the other, each with its uncertainty.
+"""Estimate lift curve, drag with thrust, and moments one after the other, with their uncertainties.
 
-The order matters. The wind triangle gives the airspeed its scale. The accelerometer is the vane: lift over the lift
-curve's slope is the angle of attack, gusts included, and side force gives the sideslip likewise. The lift curve itself
-comes from frequencies at which the aircraft heaves with the gusts; drag and thrust come from the forward acceleration,
-the moments from the gyros' rates of change, and then from the errors of short predictions (`refinement`).
+The order matters. The scale of the airspeed is estimated from the wind triangle. The accelerometers serve as vanes: the
+lift divided by the slope of the lift curve is the angle of attack, gusts included, and the side force gives the
+sideslip in the same way. The lift curve is estimated from low frequencies, at which the aircraft heaves with the gusts;
+drag and thrust are estimated from the forward acceleration, and the moments from the rates of change of the gyros, and
+then from the errors of short predictions (`refinement`).
 
-Uncertain quantities that are held fixed (`aircraft.identification.fixed_parameters`) are changed by their standard
-deviation one after the other, and the estimate is repeated: these shifts are part of the covariance.
+Each uncertain quantity that is held fixed (`aircraft.identification.fixed_parameters`) is changed by one standard
+deviation, and the estimate is repeated: the resulting shifts are part of the covariance.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,11 +31,11 @@ from aircraft.identification.refinement import IS_MOMENT, OTHER_HORIZONS_S, Refi
 from aircraft.identification.regression import Fit, correlation_samples
 from world.arrays import Floats
 
-# Length of a log's part that is used to align its clocks, s.
+# Duration of the part of a log that is used to align its signals in time, s.
 ALIGNED_SECONDS = 200.0
-# Number of passes over lift curve and drag, each with the angle of attack of the pass before.
+# Number of passes over lift curve and drag; each pass uses the angle of attack of the previous pass.
 _PASSES = 2
-# Fraction of a parameter's variance that the logs must remove; with less the logs hardly determine the parameter.
+# Minimum fraction of a parameter's prior variance that the logs remove; below it they hardly determine the parameter.
 MIN_LOG_FRACTION = 0.2
 # Title, unit and samples per second of each equation.
 _EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
@@ -48,9 +49,9 @@ _EQUATIONS: Mapping[Group, tuple[str, str, float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Equation:
-    """One equation of motion as it was fitted.
+    """Fit of one equation of motion.
 
-    name: title for people.
+    name: title in texts.
     unit: unit of measured and predicted values.
     hertz: samples per second.
     measured, predicted: (n,), low-passed, all stretches in sequence.
@@ -71,11 +72,11 @@ class Equation:
 class Estimate:
     """Estimate of an aircraft's parameters from its logs.
 
-    values: (n,) of `PARAMETERS`.
-    covariance: (n, n).
-    clocks: clocks of each stretch.
+    values: values of `PARAMETERS`, (n,).
+    covariance: covariance of the values, (n, n).
+    clocks: lags and delays of each stretch.
     equations: the fitted equations.
-    shifts: change (n,) of the estimate for one standard deviation of each quantity that is held fixed.
+    shifts: change of the values (n,) for one standard deviation of each quantity that is held fixed, by its name.
     with_current: True if the battery's current was used.
     dynamics: True if the moments were estimated; False if their parameters are the prior's.
     airspeed: ratio of true to measured airspeed from the wind triangle, and its standard deviation.
@@ -96,11 +97,14 @@ class Estimate:
 
     @property
     def sds(self) -> Floats:
-        """Standard deviations (n,)."""
+        """Standard deviations of the values, (n,)."""
         return np.sqrt(np.diag(self.covariance))
 
     def uninformed_lines(self) -> tuple[str, ...]:
-        """Return a line for each parameter that the logs hardly determine, with a maneuver that would determine it."""
+        """Return a line for each parameter that the logs hardly determine, with a maneuver that would determine it.
+
+        These are the parameters whose `log_fractions` are below `MIN_LOG_FRACTION`.
+        """
         fractions = self.log_fractions().tolist()
         return tuple(
             f"{parameter.title}: its interval stays as assumed before the logs; fly {parameter.show}"
@@ -109,27 +113,24 @@ class Estimate:
         )
 
     def log_fractions(self) -> Floats:
-        """Return the fraction (n,) of each interval that comes from the logs.
-
-        It is 1 minus the ratio of the remaining variance to the prior's variance.
-        """
+        """Return for each parameter the fraction of the prior's variance that the logs remove, (n,)."""
         return np.clip(1.0 - np.square(self.sds / prior_sds()), 0.0, 1.0)
 
 
 def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics: bool = True) -> Estimate:
     """Estimate all parameters from stretches of flight.
 
-    dynamics: True to estimate the moments too; False for logs with too few rows per second to show them.
+    dynamics: True to estimate the moments as well; False for logs with too few rows per second to show them.
     """
     default_clocks = Clocks(servo_lag=base.servo_lag)
     clocks = align_clocks(records, base) if dynamics else tuple(default_clocks for _ in records)
     signals = aligned_signals(records, clocks, base)
-    nominal = fit_all(signals, base, dynamics=dynamics)
+    nominal = fit_parameters(signals, base, dynamics=dynamics)
     shifts = {}
     for fixed in FIXED_PARAMETERS:
         if fixed.applies(with_current=nominal.with_current):
             shifted_signals, shifted_base = fixed.change(signals, base)
-            shifted_estimate = fit_all(
+            shifted_estimate = fit_parameters(
                 shifted_signals,
                 shifted_base,
                 level=fixed.tilt(shifted_signals),
@@ -143,8 +144,8 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
             other = refine_moments(signals, base, nominal.values, horizons, steps=2)
             shifts[name] = np.zeros(len(PARAMETERS))
             shifts[name][IS_MOMENT] = other.values - nominal.refinement.values
-    # Noise in a regressor flattens its slope; the effect of doubling the noise is subtracted (Cook and Stefanski 1994,
-    # with the straight line of their extrapolants).
+    # Noise in a regressor reduces its fitted slope. Doubling the noise shows this effect, which is then subtracted: the
+    # linear extrapolation of Cook and Stefanski 1994.
     noise_bias = np.where(IS_MOMENT, shifts[ACCELEROMETER_NOISE], 0.0)
     covariance = total_covariance(nominal.covariance, shifts)
     values = nominal.values - noise_bias
@@ -164,9 +165,12 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
 
 
 def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Combine each moment's estimate (n,) and its variance, of the covariance (n, n), with its prior by Bayes' rule.
+    """Combine the estimates of the moments with their priors by Bayes' rule; return values (n,) and covariance (n, n).
 
-    The refinement itself has a prior that is wider by `PRIOR_SPREAD`, because its weights do not know the shifts.
+    The refinement itself uses a prior that is wider by `PRIOR_SPREAD`, because its weights do not include the shifts.
+
+    values: values of all parameters, (n,); the parameters of lift and drag are returned unchanged.
+    covariance: covariance of the values, (n, n).
     """
     prior = np.square(prior_sds())
     weight = np.where(IS_MOMENT, prior / (prior + np.diag(covariance)), 1.0)
@@ -175,7 +179,7 @@ def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floa
 
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
-    """Return all stretches on the clocks of their accelerometers, leveled, with wind-triangle airspeed."""
+    """Return the aligned signals of all stretches, without sensor biases and with the airspeed scaled."""
     signals = level_signals(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, flow_from_forces(signals, base, prior_means()))
 
@@ -183,16 +187,21 @@ def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], b
 def score_predictions(
     estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel, base_name: str
 ) -> PredictedLog:
-    """Predict stretches of flight by constant rates, by the base and by an estimate, on the clocks of its last log."""
+    """Predict stretches of flight by constant rates, by the base model and by an estimate.
+
+    The signals are aligned with the lags and delays of the estimate's last log.
+
+    base_name: name of the base model in texts.
+    """
     signals = level_signals(align(records, [estimate.clocks[-1]] * len(records), base.motor_lag))
     signals = replace(signals, airspeed=signals.airspeed * estimate.airspeed[0])
     return predict_log(signals, {base_name: (base, prior_means()), "identified": (base, estimate.values)})
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
-    """Return the covariance (n, n) of fits and shifts (n,).
+    """Return the sum of the covariance of the fits (n, n) and the covariance from the shifts (n,).
 
-    For lift and drag it is never wider than the prior.
+    For lift and drag no variance exceeds the prior's variance.
 
     >>> side = np.zeros(len(PARAMETERS))
     >>> side[0] = 0.04
@@ -201,19 +210,23 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
     (0.05, 0.03)
     """
     covariance = fitted + sum(np.outer(shift, shift) for shift in shifts.values())
-    # Correlations stay where an interval is clipped to the prior's interval.
+    # Scaling rows and columns keeps the correlations where a variance is reduced to the prior's variance.
     factor = np.where(IS_MOMENT, 1.0, np.minimum(1.0, prior_sds() / np.sqrt(np.diag(covariance))))
     return np.asarray(covariance * np.outer(factor, factor))
 
 
 def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Clocks, ...]:
-    """Find the clocks of the stretches, common to one log, by `ALIGNED_SECONDS` of its longest stretch."""
+    """Find the lags and delays of each stretch, from `ALIGNED_SECONDS` of the longest stretch of its log.
+
+    All stretches of a log have the same lags and delays.
+    """
     clocks_by_source: dict[str, Clocks] = {}
     for source in {record.source: None for record in records}:
         longest = max((record for record in records if record.source == source), key=lambda record: record.seconds)
         part = longest.part(ALIGNED_SECONDS)
 
         def misfit(clock: Clocks, part: FlightRecord = part) -> float:
+            """Return the sum over the axes of the logarithm of the unexplained fraction of the moments."""
             signals = align([part], [clock], base.motor_lag)
             alpha, beta, _ = flow_from_forces(signals, base, prior_means())
             # A wide prior, so that the clocks fit the data and not the prior.
@@ -225,10 +238,10 @@ def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Cloc
 
 
 def _log_unexplained(fit: Fit, lag: float) -> float:
-    """Return the logarithm of the fraction of moments that a fit leaves unexplained, before a lag, s.
+    """Return the logarithm of the fraction of the moments' variance that a fit leaves unexplained.
 
-    The lag smooths: fast and badly explained motion vanishes with it, and the longest lag would always seem best.
-    Therefore both are taken as they were before the lag.
+    The residual and the moments are taken as they were before a first-order lag (s): the lag smooths them and removes
+    fast, badly explained motion, so that the longest lag would always seem best.
     """
     hertz = GRID_HZ / MOMENT_THINNING
     residual, total = (
@@ -237,7 +250,7 @@ def _log_unexplained(fit: Fit, lag: float) -> float:
     return float(np.log(residual.var() / (total.var() + 1e-300) + 1e-6))
 
 
-def fit_all(
+def fit_parameters(
     signals: Signals,
     base: BaseModel,
     lift: Floats | None = None,
@@ -246,11 +259,12 @@ def fit_all(
     dynamics: bool = True,
     nominal: Refinement | None = None,
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, with all else held fixed, without shifts.
+    """Estimate all parameters from aligned signals, without the shifts from quantities that are held fixed.
 
-    lift: (2,) values of slope and offset of the lift curve to hold fixed too.
+    lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
     level: error of the autopilot's level, rad.
-    nominal: refinement about which the moments are changed to first order; None to refine them.
+    dynamics: True to estimate the moments as well.
+    nominal: refinement of which the values are changed to first order, instead of refining the moments anew.
     """
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}
@@ -258,6 +272,7 @@ def fit_all(
     uncertainty: AlphaUncertainty | None = None
 
     def store(group: Group, estimate: Floats, spread: Floats) -> None:
+        """Store the values and the covariance of a group of parameters."""
         is_in_group = np.array([parameter.group == group for parameter in PARAMETERS])
         values[is_in_group] = estimate
         covariance[np.ix_(is_in_group, is_in_group)] = spread
@@ -275,7 +290,7 @@ def fit_all(
         store("drag", drag_values, spread)
     refinement = nominal
     if refinement is not None:
-        values[IS_MOMENT] = refinement.shifted(signals, base, values)
+        values[IS_MOMENT] = refinement.values_for(signals, base, values)
     elif dynamics:
         fits |= fit_moments(signals, base, flow.alpha, flow.beta, make_motor(base, values))
         for axis in AXES:
@@ -298,21 +313,22 @@ def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
 
 
 def _equation(group: Group, fit: Fit) -> Equation:
+    """Return the equation of a group of parameters, with its fit."""
     title, unit, hertz = _EQUATIONS[group]
     correlation = correlation_samples(fit.residual) / hertz
     return Equation(title, unit, hertz, fit.predicted + fit.residual, fit.predicted, fit.explained, correlation)
 
 
 def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[str, Floats]:
-    """Return the shifts of the other parameters with the lift curve.
+    """Return the shifts of all parameters with one standard deviation along each principal axis of the lift curve.
 
-    They are along the two principal axes of the lift curve's uncertainty. That uncertainty itself is already included.
+    The lift curve's own part of these shifts is subtracted from the covariance of `nominal`, which already contains it.
     """
     eigenvalues, axes = np.linalg.eigh(nominal.covariance[:2, :2])
     shifts = {}
     for k in range(2):
         lift = nominal.values[:2] + np.sqrt(max(0.0, float(eigenvalues[k]))) * axes[:, k]
-        shifted = fit_all(signals, base, lift=lift, dynamics=nominal.dynamics, nominal=nominal.refinement)
+        shifted = fit_parameters(signals, base, lift=lift, dynamics=nominal.dynamics, nominal=nominal.refinement)
         shift = shifted.values - nominal.values
         nominal.covariance[:2, :2] -= np.outer(shift[:2], shift[:2])
         shifts[f"lift curve, axis {k + 1}"] = shift

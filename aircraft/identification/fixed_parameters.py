@@ -1,4 +1,4 @@
-"""Uncertain quantities that an identification holds fixed, with their standard deviations."""
+"""Define the uncertain quantities that an identification holds fixed, with their standard deviations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,28 +17,28 @@ Changed = tuple[Signals, BaseModel]
 
 @dataclass(frozen=True, slots=True)
 class FixedParameter:
-    """One quantity that is held fixed.
+    """One quantity that is held fixed, and the change by one standard deviation.
 
-    name: name for people, with its standard deviation.
-    change: function that returns signals and model with the quantity one standard deviation higher.
+    name: name in texts, with the standard deviation.
+    change: function that returns the changed signals and model.
     level: change of the autopilot's level, rad.
-    air: change of the vertical air velocity, m/s.
-    of_current: True if the quantity matters only for logs with the battery's current.
+    vertical_air: change of the vertical air velocity, m/s.
+    needs_current: True if the quantity matters only for logs with the battery's current.
     """
 
     name: str
     change: Callable[[Signals, BaseModel], Changed]
     level: float = 0.0
-    air: float = 0.0
-    of_current: bool = False
+    vertical_air: float = 0.0
+    needs_current: bool = False
 
     def tilt(self, signals: Signals) -> float:
-        """Return the change of the flow angle to the level, rad."""
-        return self.level + (self.air / float(signals.airspeed.mean()) if self.air else 0.0)
+        """Return the change of the angle between the airflow and the autopilot's level, rad."""
+        return self.level + (self.vertical_air / float(signals.airspeed.mean()) if self.vertical_air else 0.0)
 
     def applies(self, *, with_current: bool) -> bool:
         """Return True if the quantity matters for a log with, or without, the battery's current."""
-        return with_current or not self.of_current
+        return with_current or not self.needs_current
 
 
 def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
@@ -53,6 +53,8 @@ def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
 
 
 def _change_coefficient(name: str, relative_sd: float, min_sd: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a change of a coefficient by one standard deviation; arguments as in `_move_one_sd`."""
+
     def change(signals: Signals, base: BaseModel) -> Changed:
         value = _move_one_sd(getattr(base.coefficients, name), relative_sd, min_sd)
         return signals, replace(base, coefficients=replace(base.coefficients, **{name: value}))
@@ -76,10 +78,13 @@ def _change_product_of_inertia(relative_sd: float, min_sd_ratio: float) -> Calla
 
 
 def _scale_airspeed(signals: Signals, base: BaseModel) -> Changed:
+    """Increase the airspeed by one standard deviation."""
     return replace(signals, airspeed=signals.airspeed * (1.0 + signals.airspeed_sd)), base
 
 
 def _bias_acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a change that adds a bias (m/s^2) to an accelerometer."""
+
     def change(signals: Signals, base: BaseModel) -> Changed:
         return replace(signals, acceleration=signals.acceleration + bias * np.eye(3)[axis]), base
 
@@ -108,6 +113,7 @@ def _double_noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Chang
 
 
 def _delay_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a change that delays the accelerometers."""
     return lambda signals, base: (
         replace(signals, acceleration=signals.delay(signals.acceleration, seconds)),
         base,
@@ -115,11 +121,12 @@ def _delay_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
 
 
 def _delay_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a change that delays the control surfaces."""
     return lambda signals, base: (replace(signals, surfaces=signals.delay(signals.surfaces, seconds)), base)
 
 
 def _trade_servo_lag(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change of the lag of the servos at the same total delay."""
+    """Return a change that increases the lag of the servos and reduces their delay by the same time."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         surfaces = np.empty_like(signals.surfaces)
@@ -132,10 +139,12 @@ def _trade_servo_lag(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
 
 
 def _scale_current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a change that multiplies the battery's current by a factor."""
     return lambda signals, base: (replace(signals, current=signals.current * factor), base)
 
 
 def _unchanged(signals: Signals, base: BaseModel) -> Changed:
+    """Return signals and model unchanged."""
     return signals, base
 
 
@@ -143,9 +152,9 @@ def _unchanged(signals: Signals, base: BaseModel) -> Changed:
 ACCELEROMETER_NOISE = "noise of the accelerometers"
 # Standard deviation of the autopilot's level, rad.
 _LEVEL_SD_RAD = float(np.radians(0.2))
-# Standard deviations are ratios to the base's value. Base models leave out small values, and a value of 0 is no more
-# certain than the Aerosonde's (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2), which gives the
-# smallest standard deviation.
+# The standard deviation of a coefficient is a ratio to the base model's value, and at least a smallest value. Base
+# models omit small coefficients, and their value of 0 is not certain: the smallest standard deviation is from the
+# Aerosonde's coefficients (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2).
 FIXED_PARAMETERS = (
     FixedParameter("lift of the elevator (50 %)", _change_coefficient("lift_elevator", 0.5)),
     FixedParameter("lift of the pitch rate (50 %)", _change_coefficient("lift_rate", 0.5)),
@@ -162,8 +171,8 @@ FIXED_PARAMETERS = (
     FixedParameter(
         "level of the autopilot (0.2 deg)", _bias_acceleration(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD
     ),
-    FixedParameter("mean vertical air (0.04 m/s)", _unchanged, air=0.04),
+    FixedParameter("mean vertical air (0.04 m/s)", _unchanged, vertical_air=0.04),
     FixedParameter("downward accelerometer (0.03 m/s2)", _bias_acceleration(2, 0.03)),
     FixedParameter(ACCELEROMETER_NOISE, _double_noise((1, 2))),
-    FixedParameter("scale of the current (2 %)", _scale_current(1.02), of_current=True),
+    FixedParameter("scale of the current (2 %)", _scale_current(1.02), needs_current=True),
 )

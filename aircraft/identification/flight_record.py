@@ -1,4 +1,4 @@
-"""Input of an identification: sensors and controls of one flight, on one clock and one time grid."""
+"""Define the input of an identification: sensors and controls of one flight on a common time grid."""
 
 from dataclasses import dataclass, fields, replace
 from functools import cache
@@ -13,21 +13,21 @@ GRID_HZ = 50.0
 
 @dataclass(frozen=True, slots=True)
 class FlightRecord:
-    """One stretch of flight without a gap, as logged: nothing is shifted yet. SI and radians.
+    """One stretch of flight without a gap, as logged, without any correction of delays. SI and radians.
 
     time: (n,) s, `GRID_HZ` samples per second.
     acceleration: (n, 3) specific force of the accelerometers, body axes forward, right, down, m/s^2.
     rates: (n, 3) p, q, r of the gyros, rad/s.
     attitude: (n, 3) roll, pitch, yaw, rad.
     velocity: (n, 3) north, east, down over the ground, m/s.
-    wind: (n, 2) north, east, direction of air motion, as the autopilot estimates it, m/s.
+    wind: (n, 2) velocity of the air, north and east, as estimated by the autopilot, m/s.
     airspeed: (n,) true, m/s.
     density: (n,) kg/m^3.
     height: (n,) m AMSL.
     controls: (n, 4) elevator, aileron, rudder (rad, positive as in the model) and throttle (0..1) as commanded.
-    current: (n,) A from the battery; NaN for a log without it.
-    voltage: (n,) V of the battery; NaN for a log without it.
-    source: name of the log for people.
+    current: (n,) current from the battery, A; NaN for a log without current.
+    voltage: (n,) voltage of the battery, V; NaN for a log without voltage.
+    source: name of the log in texts.
     """
 
     time: Floats
@@ -46,11 +46,11 @@ class FlightRecord:
 
     @property
     def seconds(self) -> float:
-        """Length of the stretch, s."""
+        """Duration of the stretch, s."""
         return len(self.time) / GRID_HZ
 
     def part(self, seconds: float) -> "FlightRecord":
-        """Return the central part, at most ``seconds`` long."""
+        """Return the central part of the stretch, at most ``seconds`` long."""
         rows = round(seconds * GRID_HZ)
         begin = max(0, (len(self.time) - rows) // 2)
         return self.rows(slice(begin, begin + rows))
@@ -61,7 +61,7 @@ class FlightRecord:
         return self.rows(slice(begin_row, end_row))
 
     def rows(self, rows: slice) -> "FlightRecord":
-        """Return some rows."""
+        """Return the stretch with only the rows of a slice."""
         columns = {field.name: getattr(self, field.name)[rows] for field in fields(self) if field.name != "source"}
         return replace(self, **columns)
 
@@ -73,6 +73,7 @@ class FlightRecord:
 
 @cache
 def _sections(cutoff: float, hertz: float) -> Floats:
+    """Return the second-order sections of a Butterworth low-pass filter; cutoff and sampling rate in Hz."""
     # Imported here, as in the neighboring modules: scipy is an extra, without which `planfly` still has this module's
     # names.
     from scipy.signal import butter
@@ -81,9 +82,10 @@ def _sections(cutoff: float, hertz: float) -> Floats:
 
 
 def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
-    """Smooth (n,) or (n, k) forwards and backwards, without delay.
+    """Low-pass values forwards and backwards, without delay.
 
-    cutoff: Hz, of a second-order Butterworth filter.
+    values: (n,) or (n, k).
+    cutoff: cutoff of the second-order Butterworth filter, Hz.
     hertz: samples per second.
 
     >>> steady = low_pass(np.full(200, 3.0), 0.5)
@@ -99,7 +101,9 @@ def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
 
 
 def apply_delay(values: Floats, delay: float) -> Floats:
-    """Delay (n,) or (n, k) by ``delay`` seconds with linear interpolation; a negative delay advances.
+    """Return values delayed by ``delay`` seconds, with linear interpolation; a negative delay advances them.
+
+    values: (n,) or (n, k).
 
     >>> apply_delay(np.arange(5.0), 0.02)
     array([0., 0., 1., 2., 3.])
@@ -113,9 +117,11 @@ def apply_delay(values: Floats, delay: float) -> Floats:
 
 
 def apply_lag(values: Floats, time_constant: float) -> Floats:
-    """Return (n,) or (n, k) after a first-order lag with this time constant, s.
+    """Return the output of a first-order lag with a time constant, s.
 
-    It is exact for values held over a sample.
+    The output is exact for an input that is constant over each sample.
+
+    values: input, (n,) or (n, k).
 
     >>> apply_lag(np.array([0.0, 1.0, 1.0]), 0.0)
     array([0., 1., 1.])

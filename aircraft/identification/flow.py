@@ -1,7 +1,8 @@
-"""Angle of attack and sideslip without vanes: from the accelerometers, and from attitude and velocity.
+"""Compute angle of attack and sideslip without vanes: from the accelerometers, or from attitude and velocity.
 
-Lift over the lift curve's slope is the angle of attack, gusts included; side force gives the sideslip likewise.
-Attitude and velocity give the angle of attack in air without vertical motion, which is valid only at low frequencies.
+The lift divided by the slope of the lift curve is the angle of attack, gusts included; the side force gives the
+sideslip in the same way.  Attitude and velocity give the angle of attack in air without vertical motion, which is valid
+only at low frequencies.
 """
 
 from typing import NamedTuple
@@ -19,7 +20,7 @@ VANE_CUTOFF_HZ = 8.0
 
 
 class Flow(NamedTuple):
-    """Angle of attack and sideslip, rad, and lift coefficient from only the angle of attack, (n,) each."""
+    """Angle of attack and sideslip, rad, and lift coefficient due to the angle of attack alone, three arrays (n,)."""
 
     alpha: Floats
     beta: Floats
@@ -27,7 +28,7 @@ class Flow(NamedTuple):
 
 
 def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
-    """Return slope (per rad) and value at zero of the lift coefficient.
+    """Return the slope of the lift coefficient, per rad, and its value at zero angle of attack.
 
     values: (n,) of `aircraft.identification.parameters.PARAMETERS`.
     """
@@ -47,7 +48,7 @@ def battery_voltage(signals: Signals, base: BaseModel) -> Floats | float:
 
 
 def dynamic_force(signals: Signals, base: BaseModel) -> Floats:
-    """Return dynamic pressure times wing area (n,), N."""
+    """Return dynamic pressure times wing area, N, (n,)."""
     return np.asarray(0.5 * signals.density * np.square(signals.airspeed) * base.area)
 
 
@@ -88,7 +89,7 @@ def flow_from_forces(signals: Signals, base: BaseModel, values: Floats, *, smoot
 
 
 def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:
-    """Return the angle of attack (n,), rad, from attitude, ground velocity and estimated horizontal wind.
+    """Return the angle of attack from attitude, ground velocity and estimated horizontal wind, rad, (n,).
 
     level: angle of the autopilot's level above the model's level, rad.
     """

@@ -1,7 +1,7 @@
-"""Biases of the inertial sensors, and the level of the autopilot, from attitude and ground velocity.
+"""Estimate biases of the inertial sensors and the level error of the autopilot, from attitude and ground velocity.
 
-The gyros must turn the aircraft as its attitude turns, and the accelerometers must show the change of its ground
-velocity less gravity. Mean differences are biases; forward, a level error looks the same.
+The rates of the gyros must agree with the change of attitude, and the accelerometers with the change of ground velocity
+minus gravity. Mean differences are biases; in the forward direction a level error has the same effect as a bias.
 """
 
 from dataclasses import replace
@@ -19,18 +19,18 @@ GRAVITY = 9.80665
 LEVEL_SD = float(np.radians(0.2))
 # Standard deviation of the forward accelerometer's bias, m/s^2.
 FORWARD_SD = 0.03
-# Largest level error that an excess is taken for, in standard deviations; what exceeds it is the accelerometer's bias,
-# which reaches 0.4 m/s^2 for uncalibrated sensors.
+# Largest part of an excess that is attributed to a level error, in standard deviations; the rest is attributed to the
+# accelerometer's bias, which reaches 0.4 m/s^2 for uncalibrated sensors.
 _MAX_LEVEL_SIGMAS = 2.0
 # Largest bank of straight flight, rad.
 _MAX_STRAIGHT_BANK_RAD = 0.1
 
 
 def forward_excess(signals: Signals) -> list[float]:
-    """Return the forward accelerometer's excess over the gain in speed and altitude per stretch, m/s^2.
+    """Return for each stretch the mean excess of the forward acceleration over the gain in ground speed, m/s^2.
 
-    It is the mean over straight flight, from attitude and ground velocity. The excess is a level error or an
-    accelerometer's bias; either would be taken for drag.
+    The mean is over straight flight, and 0 if there is none. The excess is a level error or a bias of the
+    accelerometer; both would be mistaken for drag.
     """
     excesses = []
     for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
@@ -47,7 +47,10 @@ def forward_excess(signals: Signals) -> list[float]:
 
 
 def lateral_biases(signals: Signals) -> Floats:
-    """Return the biases of the gyros p, q, r, rad/s, and of the right accelerometer, m/s^2, per stretch, (s, 4)."""
+    """Return for each of s stretches the biases of the gyros p, q, r, rad/s, and of the right accelerometer, m/s^2.
+
+    The result is (s, 4).
+    """
     biases = []
     for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
         rows = slice(first, last)
@@ -70,9 +73,9 @@ def lateral_biases(signals: Signals) -> Floats:
 
 
 def level_signals(signals: Signals, reference: Signals | None = None) -> Signals:
-    """Remove the biases of the sensors, and divide the forward excess between level and accelerometer.
+    """Return signals without the biases of the sensors; the forward excess is divided between level and accelerometer.
 
-    reference: signals of the same sensors whose mean biases are used; None for the biases of each stretch itself.
+    reference: signals of the same sensors, whose mean biases are used; None to use the biases of each stretch.
     """
     level_fraction = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
     attitude, acceleration, rates = signals.attitude.copy(), signals.acceleration.copy(), signals.rates.copy()

@@ -1,7 +1,7 @@
-"""Fit the lift curve by reverse regression: the attitude's angle of attack on the lift coefficient.
+"""Fit the lift curve by reverse regression: of the angle of attack, computed from attitude, on the lift coefficient.
 
-At low frequencies an aircraft heaves with the gusts: its lift does not contain them, but the angle of attack from
-attitude and velocity does. Therefore lift is the regressor without errors, and the angle of attack has the errors.
+At low frequencies an aircraft heaves with the gusts: its lift does not contain the gusts, but the angle of attack from
+attitude and velocity does. Therefore the lift is the regressor, without errors, and the angle of attack has the errors.
 """
 
 import numpy as np
@@ -18,16 +18,16 @@ LIFT_CUTOFF_HZ = 0.15
 
 
 def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0) -> tuple[Fit, Floats, Floats]:
-    """Fit the lift curve; return the fit, values of slope and offset (2,), and their covariance (2, 2).
+    """Fit the lift curve; return the fit, the values of slope and offset (2,), and their covariance (2, 2).
 
     lift: (n,) lift coefficient.
-    level: rad.
+    level: angle of the autopilot's level above the model's level, rad.
     """
     measured = signals.smooth(attitude_alpha(signals, level), LIFT_CUTOFF_HZ)
     smoothed = signals.smooth(lift, LIFT_CUTOFF_HZ)
     c = base.coefficients
     slope_sd, offset_sd = prior_sds()[:2]
-    # About the mean lift, where slope and angle are uncorrelated.
+    # Fit the angle at the mean lift, where slope and angle are uncorrelated.
     mean_lift = float(smoothed.mean())
     columns = np.column_stack([smoothed - mean_lift, np.ones(len(smoothed))])
     inverse = 1.0 / c.lift_alpha

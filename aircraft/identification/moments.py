@@ -33,10 +33,10 @@ def fit_moments(
     motor: Motor | None = None,
     spread: float = 1.0,
 ) -> dict[Group, Fit]:
-    """Fit pitch, roll and yaw, and return the fits by axis.
+    """Fit the moments in pitch, roll and yaw, and return the fits by axis.
 
-    Each axis has a trim offset for each stretch, which follows the parameters in the fit: surfaces may be trimmed, and
-    sensors biased, differently in each stretch.
+    For each axis the fit also has a trim offset for each stretch, after the parameters: the trim of the surfaces and
+    the biases of the sensors may differ between stretches.
 
     alpha, beta: (n,) rad.
     motor: motor whose torque rolls the aircraft; None for the base's motor.
@@ -52,7 +52,7 @@ def fit_moments(
         known_part, *columns = terms[axis]
         parameters = [parameter for parameter in PARAMETERS if parameter.group == axis]
         means, sds = [parameter.prior for parameter in parameters], [parameter.sd for parameter in parameters]
-        # With a single stretch, a trim offset in pitch is the parameter's own offset.
+        # With a single stretch, the parameter "pitch-offset" is the trim offset in pitch.
         trims = _stretch_indicators(thinned) if axis != "pitch" or len(thinned.edges) > 2 else []
         columns, means, sds = [*columns, *trims], [*means, *(0.0 for _ in trims)], [*sds, *(_TRIM_SD for _ in trims)]
         scale = pressure * length / inertia
@@ -83,7 +83,9 @@ def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Gr
     ixx, iyy, izz, ixz = base.inertia
     p, q, r = signals.rates.T
     dp, dq, dr = signals.rate_changes.T
-    torque = motor.propeller_torque(signals.airspeed, signals.throttle, signals.density) if base.reacts else 0.0
+    torque = (
+        motor.propeller_torque(signals.airspeed, signals.throttle, signals.density) if base.has_torque_reaction else 0.0
+    )
     return {
         "pitch": iyy * dq + (ixx - izz) * p * r + ixz * (p * p - r * r),
         "roll": ixx * dp - ixz * (dr + p * q) + (izz - iyy) * q * r + torque,
@@ -92,7 +94,10 @@ def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Gr
 
 
 def _moment_regressors(signals: Signals, base: BaseModel) -> dict[Group, list[Floats]]:
-    """Return the terms of each axis's moment coefficient, (n,) each: first the known part, then one per parameter."""
+    """Return the terms of the moment coefficient of each axis, arrays (n,), by axis.
+
+    The first term is the known part; the others belong to one parameter each.
+    """
     c = base.coefficients
     alpha, beta = signals.extra["alpha"], signals.extra["beta"]
     elevator, aileron, rudder = signals.surfaces.T

@@ -1,4 +1,4 @@
-"""Interface of a motor with its propeller for identification."""
+"""Define the interface of a motor with its propeller, for identification."""
 
 from typing import Protocol, Self
 
@@ -30,7 +30,7 @@ class Motor(Protocol):
     def thrust_and_current(
         self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None
     ) -> tuple[Floats, Floats]:
-        """Return thrust (n,), N, and current from the battery (n,), A."""
+        """Return the thrust, N, and the current from the battery, A, two arrays (n,)."""
 
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
         """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""

@@ -1,4 +1,4 @@
-"""Motor with its propeller as tables of thrust, battery power and torque, for a model of any form.
+"""Model a motor with its propeller by tables of thrust, battery power and torque, for an aircraft model of any form.
 
 The tables hold for one density and the nominal battery voltage. A motor that runs faster by a factor s at the same
 throttle and advance ratio V / (n D) has s squared times the thrust and torque, and s cubed times the power, at s times
@@ -25,7 +25,9 @@ class MotorTable:
     density: density of the tables, kg/m^3.
     voltage: battery voltage, V.
     nominal: battery voltage of the tables, V; 0 for an engine, whose tables do not depend on a voltage.
-    pull, speed, load: factors on thrust, speed of the motor, and power and torque.
+    thrust_factor: factor on the thrust.
+    speed: factor on the speed of the motor.
+    load: factor on power and torque.
     """
 
     airspeeds: Floats
@@ -36,7 +38,7 @@ class MotorTable:
     density: float
     voltage: float
     nominal: float
-    pull: float = 1.0
+    thrust_factor: float = 1.0
     speed: float = 1.0
     load: float = 1.0
 
@@ -48,7 +50,9 @@ class MotorTable:
         resistance, idle: have no effect, because a table does not separate the losses of the motor.
         """
         del resistance, idle
-        return replace(self, pull=self.pull * thrust, speed=self.speed * speed, load=self.load * torque)
+        return replace(
+            self, thrust_factor=self.thrust_factor * thrust, speed=self.speed * speed, load=self.load * torque
+        )
 
     def for_voltage(self, volts: float) -> "MotorTable":
         """Return a motor with the same thrust and power for another battery voltage."""
@@ -57,7 +61,7 @@ class MotorTable:
     def thrust_and_current(
         self, airspeed: Floats, throttle: Floats, density: Floats, voltage: Floats | float | None = None
     ) -> tuple[Floats, Floats]:
-        """Return thrust (n,), N, and current from the battery (n,), A.
+        """Return the thrust, N, and the current from the battery, A, two arrays (n,).
 
         >>> table = np.array([[0.0, 10.0], [-1.0, 8.0]])
         >>> motor = MotorTable(np.array([0.0, 10.0]), np.array([0.0, 1.0]), table, 20.0 * table, table, 1.2, 10.0, 10.0)
@@ -71,7 +75,7 @@ class MotorTable:
         power = self._interpolate(self.powers, airspeed / speed, throttle)
         ratio = density / self.density
         current = self.load * ratio * speed**3 * power / np.maximum(volts, _MIN_VOLTS)
-        return np.asarray(self.pull * ratio * speed**2 * thrust), np.asarray(np.maximum(0.0, current))
+        return np.asarray(self.thrust_factor * ratio * speed**2 * thrust), np.asarray(np.maximum(0.0, current))
 
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
         """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
@@ -79,16 +83,19 @@ class MotorTable:
         return np.asarray(self.load * density / self.density * self.speed**2 * torque)
 
     def _interpolate(self, table: Floats, airspeed: Floats, throttle: Floats) -> Floats:
-        """Return values of a table (m, k) by linear interpolation; beyond its edges the edge's value."""
-        row, down = _cell(self.airspeeds, airspeed)
-        column, right = _cell(self.throttles, throttle)
-        above = table[row, column] * (1.0 - right) + table[row, column + 1] * right
-        below = table[row + 1, column] * (1.0 - right) + table[row + 1, column + 1] * right
-        return np.asarray(above * (1.0 - down) + below * down)
+        """Interpolate a table (m, k) linearly; beyond an edge of the table return the value at the edge."""
+        row, row_fraction = _find_cells(self.airspeeds, airspeed)
+        column, column_fraction = _find_cells(self.throttles, throttle)
+        slow_values = table[row, column] * (1.0 - column_fraction) + table[row, column + 1] * column_fraction
+        fast_values = table[row + 1, column] * (1.0 - column_fraction) + table[row + 1, column + 1] * column_fraction
+        return np.asarray(slow_values * (1.0 - row_fraction) + fast_values * row_fraction)
 
 
-def _cell(grid: Floats, values: Floats) -> tuple[Ints, Floats]:
-    """Return the lower grid index and the fraction of the way to the next, for each value."""
+def _find_cells(grid: Floats, values: Floats) -> tuple[Ints, Floats]:
+    """Return for each value the index of the grid point below it, and its fraction of the distance to the next point.
+
+    A value beyond an end of the grid is clipped to the end.
+    """
     clipped = np.clip(values, grid[0], grid[-1])
     lower = np.clip(np.searchsorted(grid, clipped, side="right") - 1, 0, len(grid) - 2)
     return lower, (clipped - grid[lower]) / (grid[lower + 1] - grid[lower])

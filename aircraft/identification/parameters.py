@@ -1,7 +1,7 @@
-"""Estimated parameters: each with the model's property that carries it, its prior and its bounds.
+"""Define the estimated parameters, with their properties in the model, their priors and their bounds.
 
-A parameter is a factor on a coefficient of the base model, 1 without logs, or an offset to it, 0 without logs. Forces
-are absolute; moments are relative to the moment of inertia, from which no log can separate them.
+A parameter is a factor on a coefficient of the base model, 1 without logs, or an offset to the coefficient, 0 without
+logs. Forces are absolute; moments are relative to the moment of inertia, because no log can separate the two.
 """
 
 from dataclasses import dataclass
@@ -20,12 +20,12 @@ class Parameter:
     """One unknown quantity.
 
     name: name after ``ident/`` in the model.
-    title: name for people.
-    kind: "factor" on the base's coefficient, or "offset" to it.
-    sd: standard deviation of the prior, about 1 or 0.
-    group: equation in which it is estimated.
-    bounds: range of all aircraft of this kind.
-    show: maneuver that would inform it.
+    title: name in texts.
+    kind: "factor" on the base model's coefficient, or "offset" to it.
+    sd: standard deviation of the prior about its mean, 1 for a factor and 0 for an offset.
+    group: equation in which the parameter is estimated.
+    bounds: range of the values of all aircraft.
+    show: maneuver that would determine the parameter.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Parameter:
 
     @property
     def prior(self) -> float:
-        """Value before any log."""
+        """Mean of the prior."""
         return 1.0 if self.kind == "factor" else 0.0
 
 

@@ -1,7 +1,7 @@
-"""Steady flight for any parameter values: climb at full throttle, sink at idle, power in cruise.
+"""Compute the steady flight of many draws at once: climb at full throttle, sink at idle, power in cruise.
 
-Closed formulas for a point mass with a trimmed elevator, for many draws at once; JSBSim's own trims remain the
-reference (`flight.dynamics.trim`), and tests compare the two.
+The formulas are for a point mass with a trimmed elevator. JSBSim's trims (`flight.dynamics.trim`) are the reference,
+and tests compare the two.
 """
 
 from dataclasses import dataclass
@@ -20,10 +20,11 @@ GRAVITY = 9.80665
 class Performance:
     """Performance of each of m draws, (m,).
 
-    climb, sink: path angles to the air, rad, sink positive downwards.
-    drag: N, in level flight.
-    throttle: 0..1, in level flight.
-    power: W from the battery, in level flight.
+    climb: climb angle at full throttle relative to the air, rad.
+    sink: descent angle at idle relative to the air, rad, positive downwards.
+    drag: drag in level flight, N.
+    throttle: throttle in level flight, 0..1.
+    power: power from the battery in level flight, W.
     """
 
     climb: Floats
@@ -34,8 +35,9 @@ class Performance:
 
 
 def performance(base: BaseModel, values: Floats, airspeed: float, density: float, idle: float = 0.0) -> Performance:
-    """Return the performance for parameter values (m, n).
+    """Return the performance of each of m draws.
 
+    values: values of the n parameters in each draw, (m, n).
     airspeed: m/s, true.
     density: kg/m^3.
     idle: throttle in a glide.
@@ -65,8 +67,9 @@ _SPEED_RANGE_MPS = (3.0, 150.0)
 
 
 def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
-    """Return the fastest level flight (m,) at full throttle, m/s, for parameter values (m, n).
+    """Return the airspeed of level flight at full throttle of each of m draws, m/s, (m,).
 
+    values: values of the n parameters in each draw, (m, n).
     density: kg/m^3.
     """
     values = np.atleast_2d(values)
@@ -78,7 +81,7 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
         alpha, drag = _flow(base, values, speed, density, thrust, level)
         return np.asarray(thrust * np.cos(alpha) - drag)
 
-    # From above: on the back side of the power curve there is a slower speed at which thrust equals drag again.
+    # Search downwards: at a lower speed, on the back side of the power curve, thrust equals drag again.
     high_speed = np.full(count, _SPEED_RANGE_MPS[1])
     low_speed = high_speed.copy()
     for _ in range(200):
@@ -98,7 +101,7 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
 
 
 def level_controls(base: BaseModel, values: Floats, airspeed: float, density: float) -> tuple[float, float]:
-    """Return elevator, rad, and throttle (0..1) of level flight for parameter values (n,)."""
+    """Return the elevator, rad, and the throttle, 0..1, in level flight for parameter values (n,)."""
     rows = np.atleast_2d(values)
     throttle = performance(base, rows, airspeed, density).throttle
     thrust, _ = _thrust(base, rows, airspeed, throttle, density)
@@ -108,7 +111,7 @@ def level_controls(base: BaseModel, values: Floats, airspeed: float, density: fl
 
 
 def _elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
-    """Return the elevator of balanced pitch at zero angle of attack, rad, and its change per angle of attack, (m,)."""
+    """Return the trimmed elevator at zero angle of attack, rad, and its change per angle of attack, two arrays (m,)."""
     c = base.coefficients
     power = c.pitch_elevator * values[:, INDEX["elevator-power"]]
     return (
@@ -118,7 +121,7 @@ def _elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
-    """Return the flight path angle of each set of values, rad (m,), at a given throttle (m,)."""
+    """Return the flight path angle of each draw at a throttle (m,), rad, (m,)."""
     thrust, _ = _thrust(base, values, airspeed, throttle, density)
     angle = np.zeros(len(values))
     for _ in range(12):
@@ -130,7 +133,7 @@ def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float
 def _flow(
     base: BaseModel, values: Floats, airspeed: Floats | float, density: float, thrust: Floats, angle: Floats
 ) -> tuple[Floats, Floats]:
-    """Return angle of attack and drag (m,) at a path angle, with the elevator in balance."""
+    """Return the angle of attack, rad, and the drag, N, with a trimmed elevator at a path angle, rad, all (m,)."""
     c = base.coefficients
     pressure = 0.5 * density * airspeed * airspeed * base.area
     column = {name: values[:, k] for name, k in INDEX.items()}
@@ -154,7 +157,7 @@ def _flow(
 def _thrust(
     base: BaseModel, values: Floats, airspeed: Floats | float, throttle: Floats, density: float
 ) -> tuple[Floats, Floats]:
-    """Return thrust, N, and battery current, A, (m,)."""
+    """Return the thrust, N, and the battery current, A, of each draw, two arrays (m,)."""
     # Arrays over the draws replace the motor's constants: its formulas accept them unchanged.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
     motors = base.motor.with_factors(thrust, speed, torque)  # type: ignore[arg-type]

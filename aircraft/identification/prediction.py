@@ -1,12 +1,12 @@
 """Predict the motion up to a second ahead, and score a model by the errors of its predictions.
 
-In real air an open-loop simulation over seconds shows the gusts, not the model. A prediction starts from the state that
-sensors show, gusts included, and a Kalman filter carries the moments that gusts and other unmodelled effects add: a
+In real air an open-loop simulation over seconds shows the gusts, not the model. A prediction therefore starts from the
+measured state, gusts included, and a Kalman filter estimates the moments that gusts and other unmodelled effects add: a
 first-order Gauss-Markov process about each axis (process noise, as in the filter-error method: Jategaonkar, Flight
-Vehicle System Identification, second edition, chapter 5; rotational gusts of MIL-F-8785C, 3.7.2, have that form). Its
-time constant and gain make the innovations smallest. The errors stand next to the errors of constant rates, which show
-how much a model explains. The innovations of a complete model are white (Klein and Morelli, Aircraft System
-Identification, section 6.2).
+Vehicle System Identification, second edition, chapter 5; rotational gusts of MIL-F-8785C, 3.7.2, have that form). The
+time constant and the gain of the filter minimize the innovations. The errors are compared with the errors of constant
+rates, which shows how much a model explains. The innovations of a complete model are white (Klein and Morelli, Aircraft
+System Identification, section 6.2).
 
 Trim offsets (constant moments, one for each stretch) are estimated for each model before it predicts.
 """
@@ -46,7 +46,7 @@ _WHITENESS_TIME_S = 0.5
 class Prediction:
     """Errors of one model's predictions.
 
-    model: name for people: of the base, "identified" or "constant rates".
+    model: name in texts: the base's name, "identified" or "constant rates".
     rms: root mean square error for each of `QUANTITIES`, in `UNITS`, by the time ahead, s.
     whiteness: for roll, pitch and yaw the fraction of the innovations' autocorrelations, at lags up to 0.5 s, within
         the 95 % interval of white noise; 0.95 for white innovations. Empty for constant rates.
@@ -61,9 +61,9 @@ class Prediction:
 class PredictedLog:
     """Predictions of a log by several models.
 
-    predictions: of constant rates, the base and the identified model.
+    predictions: errors of constant rates, of the base and of the identified model.
     count: number of predictions.
-    time: (n,) of the predicted values that are shown, s.
+    time: (n,) times of the predicted values that are shown, s.
     measured, predicted: (n, 6) measured values, and the identified model's predictions half a second ahead.
     """
 
@@ -76,17 +76,17 @@ class PredictedLog:
 
 @dataclass(frozen=True, slots=True)
 class GustFilter:
-    """Steady Kalman filter of the unmodelled moments about one axis, a first-order Gauss-Markov process in white noise.
+    """Steady-state Kalman filter of the unmodelled moments about one axis: a first-order Gauss-Markov process.
 
-    decay: factor on the process over a sample.
-    gain: fraction of an innovation that is taken for the process.
+    decay: factor by which the process decays over a sample.
+    gain: fraction of an innovation that is attributed to the process; the rest is white noise.
     """
 
     decay: float
     gain: float
 
     def estimate(self, residual: Floats, signals: Signals) -> Floats:
-        """Return the estimate (n,) of each sample of a residual from the samples before it."""
+        """Return the estimate of each sample of a residual from the earlier samples, (n,)."""
         from scipy.signal import lfilter
 
         estimate = np.zeros_like(residual)
@@ -99,9 +99,9 @@ class GustFilter:
 class Predictor:
     """A model with the trim offsets and the filtered unmodelled moments of one log.
 
-    filters: of roll, pitch and yaw; None for the filters with the smallest innovations.
+    filters: filters of roll, pitch and yaw; None for the filters with the smallest innovations.
     trims: (3,) trim offsets as angular accelerations, rad/s^2; None for the means over each stretch of the log.
-    with_flow: True to take measured flow angles and airspeed throughout, for an estimate; False to predict them too.
+    with_flow: True to use the measured flow angles and airspeed at all times, for an estimate; False to predict them.
     """
 
     def __init__(
@@ -141,19 +141,25 @@ class Predictor:
         return tuple(whiteness(self._innovations[:, axis], count) for axis in range(3))
 
     def predict(self, starts: Ints, horizons: Sequence[float] = HORIZONS_S) -> dict[float, Floats]:
-        """Return predicted `QUANTITIES` (rad and m/s, (n, 6)) by the time ahead (s) from some rows (n,)."""
-        due = {round(horizon * self._signals.hertz): horizon for horizon in horizons}
+        """Predict `QUANTITIES` from some rows; return arrays (n, 6), in rad, rad/s and m/s, by the time ahead, s.
+
+        starts: (n,) rows at which the predictions start.
+        """
+        horizon_by_sample = {round(horizon * self._signals.hertz): horizon for horizon in horizons}
         predictions = {}
-        for k, state in enumerate(self.fly(starts, max(due))):
-            if k in due:
+        for sample, state in enumerate(self.fly(starts, max(horizon_by_sample))):
+            if sample in horizon_by_sample:
                 speed = np.linalg.norm(state[:, :3], axis=1)
-                predictions[due[k]] = np.column_stack([state[:, 3:8], speed])
+                predictions[horizon_by_sample[sample]] = np.column_stack([state[:, 3:8], speed])
         return predictions
 
     def fly(self, starts: Ints, count: int) -> Iterator[Floats]:
-        """Yield the states (n, 8) at some rows (n,) and after each of a number of samples of the logged controls.
+        """Simulate flights with the logged controls; yield the states (n, 8) at their starts and after each sample.
 
         A state holds velocity through the air, m/s, angular rates, rad/s, bank and pitch, rad.
+
+        starts: (n,) rows at which the flights start.
+        count: number of samples.
         """
         signals, step = self._signals, 1.0 / self._signals.hertz
         state = np.column_stack([self._air_velocity(starts), signals.rates[starts], signals.attitude[starts, :2]])
@@ -171,19 +177,19 @@ class Predictor:
             yield state
 
     def _air_velocity(self, rows: Ints) -> Floats:
-        """Return the measured velocity through the air (n, 3), body axes, m/s."""
+        """Return the measured velocity through the air in body axes at some rows (n,), m/s, (n, 3)."""
         speed, alpha, beta = self._signals.airspeed[rows], self._flow.alpha[rows], self._flow.beta[rows]
         ahead = speed * np.cos(beta)
         return np.column_stack([ahead * np.cos(alpha), speed * np.sin(beta), ahead * np.sin(alpha)])
 
     def _required_accelerations(self) -> Floats:
-        """Return the measured angular accelerations (n, 3), as the aerodynamic moments over the inertias."""
+        """Return the aerodynamic moments that the measured motion requires, over the moments of inertia, (n, 3)."""
         ixx, iyy, izz, _ = self._base.inertia
         required = required_moments(self._signals, self._base, self._motor)
         return np.column_stack([required["roll"] / ixx, required["pitch"] / iyy, required["yaw"] / izz])
 
     def _accelerations(self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints) -> Floats:
-        """Return the model's aerodynamic moments over the moments of inertia (n, 3)."""
+        """Return the model's aerodynamic moments over the moments of inertia, rad/s^2, (n, 3)."""
         base, c = self._base, self._base.coefficients
         factor = {name: float(self._values[k]) for name, k in INDEX.items()}
         elevator, aileron, rudder = self._signals.surfaces[rows].T
@@ -217,7 +223,7 @@ class Predictor:
         return np.asarray(pressure[:, np.newaxis] * moments)
 
     def _state_rates(self, state: Floats, disturbances: Floats, rows: Ints) -> Floats:
-        """Return the rates of change of the state (n, 8), in air with constant gusts."""
+        """Return the rates of change of the states (n, 8), in air with constant gusts."""
         signals, base = self._signals, self._base
         u, v, w, p, q, r, roll, pitch = state.T
         airspeed = np.sqrt(u * u + v * v + w * w)
@@ -227,7 +233,7 @@ class Predictor:
         ixx, iyy, izz, ixz = base.inertia
         torque = (
             self._motor.propeller_torque(airspeed, signals.throttle[rows], signals.density[rows])
-            if base.reacts
+            if base.has_torque_reaction
             else 0.0
         )
         # Euler's equations with a product of inertia, solved for the accelerations.
@@ -250,7 +256,7 @@ class Predictor:
     def _specific_forces(
         self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the specific forces forward, right and down (n,), m/s^2."""
+        """Return the specific forces forward, right and down, m/s^2, three arrays (n,)."""
         signals, base, c = self._signals, self._base, self._base.coefficients
         elevator, aileron, rudder = signals.surfaces[rows].T
         roll, pitch, yaw = (rates * np.array([base.span, base.chord, base.span])).T / (2.0 * airspeed)
@@ -278,7 +284,7 @@ class Predictor:
 
 
 def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
-    """Return the filter whose innovations of the unexplained accelerations (n,) about an axis are smallest."""
+    """Return the filter with the smallest innovations, for the unexplained accelerations (n,) about an axis."""
     filters = [
         GustFilter(float(np.exp(-1.0 / (signals.hertz * gust_time))), gain)
         for gust_time in _GUST_TIMES_S
@@ -288,7 +294,9 @@ def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
 
 
 def whiteness(innovations: Floats, lags: int) -> float:
-    """Return the fraction of autocorrelations, at lags of 1 to `lags` samples, within +-1.96 / sqrt(n).
+    """Return the fraction of the autocorrelations of a series (n,) within +-1.96 / sqrt(n), as for white noise.
+
+    lags: the autocorrelations are those at lags of 1 to this number of samples.
 
     >>> whiteness(np.random.default_rng(1).normal(size=5000), 100) > 0.9
     True
@@ -301,7 +309,7 @@ def whiteness(innovations: Floats, lags: int) -> float:
 
 
 def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: float = max(HORIZONS_S)) -> Ints:
-    """Return at most ``count`` rows (n,) from which predictions start, evenly over all stretches.
+    """Return at most ``count`` rows from which predictions start, (n,), evenly distributed over all stretches.
 
     horizon: longest time ahead, s.
     """
@@ -317,7 +325,10 @@ def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: f
 
 
 def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]) -> PredictedLog:
-    """Predict a log by constant rates and by each model (base model and parameter values), by name."""
+    """Predict a log by constant rates and by several models.
+
+    models: base model and parameter values by name; the predictions of the last model are returned to be shown.
+    """
     starts = prediction_starts(signals)
     measured = {
         horizon: _measured_quantities(signals, starts + round(horizon * signals.hertz)) for horizon in HORIZONS_S
@@ -341,11 +352,12 @@ def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]
 
 
 def _measured_quantities(signals: Signals, rows: Ints) -> Floats:
+    """Return the measured `QUANTITIES` at some rows, in rad, rad/s and m/s, (n, 6)."""
     return np.column_stack([signals.rates[rows], signals.attitude[rows, :2], signals.airspeed[rows]])
 
 
 def _constant_rates(quantities: Floats, horizon: float) -> Floats:
-    """Return quantities (n, 6) after a time at constant angular rates and airspeed."""
+    """Return the quantities (n, 6) after a time, s, at constant angular rates and airspeed."""
     p, q, r, roll, pitch, _ = quantities.T
     predicted = quantities.copy()
     predicted[:, 3] += horizon * (p + np.tan(pitch) * (q * np.sin(roll) + r * np.cos(roll)))
@@ -354,6 +366,7 @@ def _constant_rates(quantities: Floats, horizon: float) -> Floats:
 
 
 def _in_units(quantities: Floats) -> Floats:
+    """Convert quantities (n, 6) from rad, rad/s and m/s to `UNITS`."""
     return quantities * np.array([np.degrees(1.0)] * 5 + [1.0])
 
 

@@ -1,12 +1,12 @@
 """Refine the moments by the errors of short predictions.
 
-Equation error takes the measured rates for the true ones, and its low-pass lets later samples in: in real air,
-stiffness, damping and the power of the surfaces come out too small together. The prediction-error method (Ljung, System
+The equation-error method treats the measured rates as true, and its low-pass uses later samples: in real air, its
+estimates of stiffness, damping and control power are all too small. The prediction-error method (Ljung, System
 Identification, second edition, chapter 7; the filter-error method of Jategaonkar, Flight Vehicle System Identification,
-second edition, chapter 5, is its one-step form) compares angular rates one and three tenths of a second ahead: long
-enough for the rates to respond, short enough that the autopilot has hardly reacted to later gusts. The measured flow
-angles, gusts included, are inputs. On a flight of an Ultra Stick 25e, dampings and the power of elevator and ailerons
-are 0.7 to 0.8 of the wind tunnel's values in this way, and 0.3 to 0.45 by equation error.
+second edition, chapter 5, is its one-step form) compares angular rates 0.1 s and 0.3 s ahead: long enough for the rates
+to respond, short enough that the autopilot has hardly reacted to later gusts. The measured flow angles, gusts included,
+are inputs. On a flight of an Ultra Stick 25e, damping and the power of elevator and ailerons are 0.7 to 0.8 of the wind
+tunnel's values by this method, and 0.3 to 0.45 by equation error.
 """
 
 from collections.abc import Sequence
@@ -24,9 +24,9 @@ from world.arrays import Flags, Floats, Ints
 
 # Times ahead of the compared predictions, s.
 HORIZONS_S = (0.1, 0.3)
-# Times ahead whose estimates show how much the estimate depends on them, s. The autopilot answers gusts within these
-# times, so that controls and gusts are correlated and the estimate is biased (Forssell and Ljung 1999, Closed-loop
-# identification revisited, Automatica 35); the sandwich covariance, from residuals, does not contain this bias.
+# Other times ahead, s; their estimates show how much the estimate depends on the times. The autopilot reacts to gusts
+# within these times, so that controls and gusts are correlated and the estimate is biased (Forssell and Ljung 1999,
+# Closed-loop identification revisited, Automatica 35); the covariance from the residuals does not contain this bias.
 OTHER_HORIZONS_S = {
     "time ahead of the predictions (0.06 to 0.2 s shorter)": (0.04, 0.1),
     "time ahead of the predictions (0.1 to 0.2 s longer)": (0.2, 0.5),
@@ -51,12 +51,12 @@ IS_MOMENT: Flags = np.array([parameter.group in AXES for parameter in PARAMETERS
 class Refinement:
     """Refined parameters of the moments.
 
-    values: (m,) of the parameters for which `IS_MOMENT` is true.
-    covariance: (m, m).
+    values: values of the m parameters for which `IS_MOMENT` is true, (m,).
+    covariance: covariance of the values, (m, m).
     starts: (n,) rows of the compared predictions.
     filters: filters of the unmodelled moments about roll, pitch and yaw.
     errors: (3, n, h) errors of the predictions, rad/s, by axis, start and time ahead.
-    gains: (m, 3 n h) change of the parameters with each error.
+    gains: (m, 3 n h) change of the values with each error.
     """
 
     values: Floats
@@ -66,8 +66,8 @@ class Refinement:
     errors: Floats
     gains: Floats
 
-    def shifted(self, signals: Signals, base: BaseModel, values: Floats) -> Floats:
-        """Return the parameters (m,) for changed signals, base, and parameters of lift and drag, to first order.
+    def values_for(self, signals: Signals, base: BaseModel, values: Floats) -> Floats:
+        """Return the refined values (m,) for other signals, base model, and lift and drag parameters, to first order.
 
         values: (n,) all parameters, of which the parameters of the moments are ignored.
         """
@@ -80,8 +80,9 @@ class Refinement:
 def refine_moments(
     signals: Signals, base: BaseModel, values: Floats, horizons: Sequence[float] = HORIZONS_S, steps: int = MAX_STEPS
 ) -> Refinement:
-    """Refine the moments of parameter values (n,) by Gauss-Newton steps, each at most one deviation of the prior.
+    """Refine the parameters of the moments by Gauss-Newton steps, each limited to one standard deviation of the prior.
 
+    values: values of all parameters, (n,), from which the refinement starts.
     horizons: times ahead of the compared predictions, s.
     steps: number of steps.
     """
@@ -115,9 +116,10 @@ def refine_moments(
 
 
 def without_collinear_directions(slopes: Floats) -> Floats:
-    """Return slopes (n, m) that are zero along the directions of the parameters that the log does not determine.
+    """Return slopes (n, m) with the components removed along directions that the log does not determine.
 
-    The columns are compared at equal length. Along these directions an estimate keeps its prior.
+    These are directions in the space of the m parameters, with all columns scaled to the same length.  Along them an
+    estimate keeps its prior.
 
     >>> aileron = np.array([1.0, -1.0, 2.0, 0.5])
     >>> slopes = np.column_stack([aileron, aileron + 0.01 * np.array([1.0, 1.0, -1.0, 0.0])])
@@ -138,7 +140,7 @@ def prediction_errors(
     filters: Sequence[GustFilter],
     horizons: Sequence[float] = HORIZONS_S,
 ) -> Floats:
-    """Return measured minus predicted angular rates (3, n, h), rad/s, by axis, start and time ahead."""
+    """Return the measured minus the predicted angular rates, rad/s, by axis, start and time ahead, (3, n, h)."""
     predicted = Predictor(signals, base, values, filters, with_flow=True).predict(starts, horizons)
     measured = [signals.rates[starts + round(horizon * signals.hertz)] for horizon in horizons]
     return np.stack(

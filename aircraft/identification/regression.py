@@ -1,4 +1,4 @@
-"""Least squares with a prior, and a covariance that allows for autocorrelated residuals."""
+"""Fit by least squares with a prior, and a covariance that allows for autocorrelated residuals."""
 
 from dataclasses import dataclass
 
@@ -28,7 +28,8 @@ class Fit:
 def correlation_samples(residual: Floats, max_lag: int = 500) -> float:
     """Return the correlation length of a series (n,) in samples.
 
-    It is the sum of the autocorrelation up to its first zero: that many samples carry the information of one.
+    It is the two-sided sum of the autocorrelation up to its first zero: so many samples contain as much information as
+    one independent sample.
 
     >>> round(correlation_samples(np.random.default_rng(1).normal(size=4000)))
     1
@@ -53,12 +54,14 @@ def fit_with_prior(
 ) -> Fit:
     """Fit measured (n,) = columns (n, p) @ coefficients by maximum a posteriori, with normal priors.
 
-    mean, sd: (p,) of the independent priors; an infinite sd means no prior.
+    mean, sd: means and standard deviations of the independent priors, (p,); an infinite standard deviation means no
+        prior.
     blocks: (n,) block number of each row.
     floor: lower bound on residual variance times correlation length in samples, for errors of the model itself.
 
-    Autocorrelated residuals reduce the data's weight to that of the independent samples in them. The covariance is the
-    robust covariance over blocks (White 1980, Liang and Zeger 1986), plus the prior's contribution.
+    The weight of the data is divided by the correlation length of the residuals, because autocorrelated samples contain
+    less information. The covariance is the robust covariance over blocks (White 1980, Liang and Zeger 1986), plus the
+    contribution of the prior.
 
     >>> x = np.linspace(0.0, 1.0, 50)
     >>> fit = fit_with_prior(x[:, None], 3.0 * x, np.zeros(1), np.full(1, np.inf), np.arange(50) // 5)

@@ -156,7 +156,7 @@ ULTRASTICK = ModelNumbers(
         shaft=(-4.39, 70.135, 174.46),
         volts=11.1,
         efficiency=0.75,
-        place=(-0.297, 0.0, -0.046),
+        position=(-0.297, 0.0, -0.046),
     ),
     layout="tail",
     throw=(math.radians(15.0), math.radians(25.0), math.radians(25.0)),

@@ -55,7 +55,9 @@ def base_model(aircraft: Aircraft) -> BaseModel:
     (5.61, -0.99, 0.043)
     """
     probe, motor = _Probe(aircraft), read_motor(aircraft)
-    return probe.base_model(probe.motor_table() if motor is None else motor, reacts=_has_torque_reaction(aircraft))
+    return probe.base_model(
+        probe.motor_table() if motor is None else motor, has_torque_reaction=_has_torque_reaction(aircraft)
+    )
 
 
 def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
@@ -64,7 +66,7 @@ def varied_model(aircraft: Aircraft, variation: Variation) -> BaseModel:
     Raises FlightError for an aircraft without steady flight at cruise.
     """
     probe = _Probe(aircraft, variation)
-    return probe.base_model(probe.motor_table(), reacts=True)
+    return probe.base_model(probe.motor_table(), has_torque_reaction=True)
 
 
 class _Probe:
@@ -88,8 +90,11 @@ class _Probe:
         self.inertia = (ixx, iyy, izz, -ixz)
         self._pressure = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
-    def base_model(self, motor: Motor, *, reacts: bool) -> BaseModel:
-        """Return the model values with a motor; reacts: True if the propeller's torque rolls the aircraft."""
+    def base_model(self, motor: Motor, *, has_torque_reaction: bool) -> BaseModel:
+        """Return the model's numbers with a motor.
+
+        has_torque_reaction: True if the propeller's torque rolls the aircraft.
+        """
         return BaseModel(
             mass=self.mass,
             area=self._area,
@@ -100,7 +105,7 @@ class _Probe:
             motor_lag=self._aircraft.motor_lag,
             coefficients=self.coefficients(),
             motor=motor,
-            reacts=reacts,
+            has_torque_reaction=has_torque_reaction,
         )
 
     def motor_table(self) -> MotorTable:

@@ -238,7 +238,7 @@ def _reactions_text(numbers: BaseModel, values: Floats, base_properties: list[El
   <location unit="M"> <x> 0 </x> <y> 0 </y> <z> 0 </z> </location>
   <direction> <x> 1 </x> <y> 0 </y> <z> 0 </z> </direction>
 </force>
-{torque if numbers.reacts else ""}
+{torque if numbers.has_torque_reaction else ""}
 </external_reactions>"""
 
 
@@ -267,7 +267,7 @@ def _disc_functions(disc: PropellerDisc) -> dict[str, str]:
     if disc.ducted:
         speed_gain = f"<product> <p> motor/throttle-norm </p> <difference> {full_speed} {_AIR} </difference> </product>"
         exit_speed, flow_speed = f"<sum> {_AIR} {speed_gain} </sum>", exit_property
-    thrust = f"<v> {number(disc.pull)} </v> <p> ident/thrust </p> {_RHO} {flow_speed}"
+    thrust = f"<v> {number(disc.thrust_area)} </v> <p> ident/thrust </p> {_RHO} {flow_speed}"
     # Power given to the air, T (V + v_e) / 2, plus losses.
     power = f"<v> {number(0.5 * disc.power * (1.0 + disc.losses))} </v> <p> ident/propeller-torque </p>"
     return {
@@ -305,7 +305,7 @@ def _table_functions(motor: MotorTable) -> dict[str, str]:
     load = "<p> ident/propeller-torque </p>"
     return {
         "scaled-airspeed-mps": f"<quotient> {_AIR} {speed} </quotient>",
-        "thrust-n": scaled(motor.pull * motor.thrusts, "<p> ident/thrust </p>", 2),
+        "thrust-n": scaled(motor.thrust_factor * motor.thrusts, "<p> ident/thrust </p>", 2),
         "torque-n_m": scaled(motor.load * motor.torques, load, 2),
         "battery-power-w": scaled(motor.load * motor.powers, load, 3),
         "battery-current-a": "<quotient> <p> motor/battery-power-w </p> <p> motor/battery-v </p> </quotient>",

@@ -515,7 +515,7 @@ def _metadata_text(sized: SizedAircraft, stall: float, min_airspeed: float, max_
     elevator, aileron, rudder = (math.degrees(value) for value in numbers.throw)
     energy = (
         f"fuel_kg = {sheet.fuel:.6g}\nfuel_mj_per_kg = {FUEL_HEAT / 1e6:g}"
-        if sheet.fuelled
+        if sheet.burns_fuel
         else f"battery_v = {sheet.volts:.6g}\nbattery_wh = {sheet.energy / 3600.0:.6g}"
     )
     return f"""# What planner, guidance and verdict need to know of the aircraft; README.md says what was guessed of it.
@@ -661,7 +661,7 @@ def _readme_text(
 ) -> str:
     """Return the text of ``README.md``: stated and guessed values, performance, uncertainties and files."""
     sheet = sized.sheet
-    propulsion = "burns fuel; its mass stays the same" if sheet.fuelled else "is electric"
+    propulsion = "burns fuel; its mass stays the same" if sheet.burns_fuel else "is electric"
     climb, sink = math.degrees(performance.climb.climb), -math.degrees(performance.idle.climb)
     lines = [
         f"# {name}",

@@ -32,7 +32,7 @@ def test_the_forward_force_is_lift_drag_and_thrust_summed_by_hand() -> None:
     forces = forward_forces(signals, base, prior_means(), Flow(flat, 0.0 * flat, 0.0 * flat), AlphaUncertainty())
     # Zero-lift drag 1.2, induced drag 0.8, thrust 0.9 times the base's; then all but the elevator's drag as it is.
     unknown = np.array([1.2, 0.8, 0.9, 1.0, 1.0, 0.02, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
-    found, _ = forces.predicted(unknown)
+    found, _ = forces.predict(unknown)
     pressure = 0.5 * density * speed**2 * 0.55
     thrust, _ = base.motor.thrust_and_current(np.full(1, speed), np.full(1, 0.6), np.full(1, density))
     own = 0.23 + 5.61 * alpha
@@ -50,6 +50,6 @@ def test_a_steeper_flow_tilts_the_lift_forward() -> None:
     flat = np.zeros(len(signals.airspeed))
     forces = forward_forces(signals, base, prior_means(), Flow(flat, flat, flat), AlphaUncertainty(mean_lift=0.23))
     nothing, one = np.array([1.0] * 5 + [0.0] * 7), np.array([1.0] * 5 + [0.0] * 5 + [1.0, 0.0])
-    off = forces.predicted(one)[0] - forces.predicted(nothing)[0]
+    off = forces.predict(one)[0] - forces.predict(nothing)[0]
     lift = 0.5 * 1.2 * 25.0**2 * 0.55 * 0.23
     assert off == pytest.approx(lift * math.radians(0.3) / 11.0, rel=1e-3)

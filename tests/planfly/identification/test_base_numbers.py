@@ -171,7 +171,7 @@ def test_the_published_wings_are_bases_with_their_sources_numbers(name: str) -> 
     for field, value in WINGS[name].items():
         assert getattr(numbers.coefficients, field) == pytest.approx(value, rel=3e-3, abs=1e-6), field
     assert is_flying_wing(aircraft)
-    assert not numbers.reacts
+    assert not numbers.has_torque_reaction
     # Full throttle at cruise and sea level, N: 0.5 rho S C (20^2 - 15^2), and 0.5 rho S C 37.42 (37.42 - 18).
     disc = {"zagi": 0.0314 * 175.0, "x8": 0.1017876 * 0.248 * 37.42 * 19.42}[name]
     thrust, _ = numbers.motor.thrust_and_current(np.full(1, aircraft.airspeed), np.ones(1), np.full(1, 1.225))
@@ -183,8 +183,8 @@ def test_a_flying_wing_from_a_data_sheet_is_a_base_without_the_propellers_torque
     assert is_flying_wing(wing)
     assert not is_flying_wing(load_aircraft("aerosonde"))
     numbers = base_model(wing)
-    assert not numbers.reacts
-    assert base_model(load_aircraft("aerosonde")).reacts
+    assert not numbers.has_torque_reaction
+    assert base_model(load_aircraft("aerosonde")).has_torque_reaction
     # The model that an estimate makes of it has none either, and flies level as the wing does.
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "mine.xml").write_text(identified_xml(wing, "mine", numbers, prior_means()), encoding="utf-8")

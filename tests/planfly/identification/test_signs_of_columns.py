@@ -8,7 +8,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.identification.alignment import Clocks
-from aircraft.identification.estimate import aligned_signals, fit_all
+from aircraft.identification.estimate import aligned_signals, fit_parameters
 from logs.importers.motion_log import read_motion
 from planfly.identification.base_numbers import base_model
 from planfly.identification.checks import check_estimate
@@ -27,7 +27,7 @@ def _check_signs(table: Path) -> None:
     base, log = base_model(aircraft), read_motion(table)
     part = flight_records(log, aircraft)[0].between(START_S, END_S)
     signals = aligned_signals([part], [Clocks(servo_lag=base.servo_lag)], base)
-    check_estimate(fit_all(signals, base), base, {}, table.name)
+    check_estimate(fit_parameters(signals, base), base, {}, table.name)
 
 
 def test_the_shipped_table_has_the_signs_of_the_flight() -> None:
