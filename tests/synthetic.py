@@ -17,7 +17,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.setups import route_along, setup_along, spec_around
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d, signed_turns
+from world.geometry import leg_courses, leg_runs, signed_turns
 from world.scenario import Scenario, scenario_from_spec
 from world.terrain import Terrain
 
@@ -212,7 +212,7 @@ def _horizontal(
 ) -> tuple[Floats, Floats, list[tuple[float, float]]]:
     """Rows of distance, east, north, course every 0.25 m; each waypoint's distance; each arc's start and end."""
     points = setup.route.waypoints
-    courses, runs, turns = leg_courses(points), leg_lengths_2d(points), signed_turns(points)
+    courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
     inner = len(points) - 2
     if radius is None:
         radius = bank_radius(setup.airspeed, math.degrees(setup.max_bank))
@@ -255,7 +255,7 @@ def _heights(
 ) -> tuple[Floats, Floats]:
     """Height and slope angle at distances s: the legs' own lines, joined across each arc by a cubic."""
     points = setup.route.waypoints
-    runs = leg_lengths_2d(points)
+    runs = leg_runs(points)
     rise = np.diff(points[:, 2]) / runs
     up, slope = np.empty_like(s), np.empty_like(s)
     begin = 0.0  # distance along the path at which the leg's line is at its own start

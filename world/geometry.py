@@ -58,12 +58,12 @@ def leg_courses(waypoints: ArrayLike) -> Floats:
     return np.asarray(np.arctan2(legs[..., 0], legs[..., 1]))
 
 
-def leg_lengths_2d(waypoints: ArrayLike) -> Floats:
+def leg_runs(waypoints: ArrayLike) -> Floats:
     """Return the horizontal length of each leg, m, shape (..., w - 1).
 
     waypoints: (..., w, 3) metres.
 
-    >>> leg_lengths_2d([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).tolist()
+    >>> leg_runs([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).tolist()
     [1000.0, 1000.0]
     """
     legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
@@ -79,7 +79,7 @@ def leg_slopes(waypoints: ArrayLike) -> Floats:
     [0.0, 0.0997]
     """
     altitude_changes = np.diff(np.asarray(waypoints, dtype=np.float64)[..., 2], axis=-1)
-    return np.asarray(np.arctan2(altitude_changes, leg_lengths_2d(waypoints)))
+    return np.asarray(np.arctan2(altitude_changes, leg_runs(waypoints)))
 
 
 def path_length(waypoints: ArrayLike) -> Floats:

@@ -20,7 +20,7 @@ from flight.mission.items import LANDINGS, PLACES, TAKEOFFS, Command, Mission, M
 from flight.mission.itinerary import pass_by_distance, stated_loiter
 from flight.mission.route import SHARPEST_FLY_BY_RAD, Route, ends_at_plain_waypoint
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d, signed_turns, tangent_length, wrap
+from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
 from world.kernels import Record, compiled, inner, record_dtype
 from world.terrain import Terrain
 
@@ -243,7 +243,7 @@ def fly_by_path(
     ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
-    courses, leg_lengths, turns = leg_courses(points), leg_lengths_2d(points), _turn_angles(route, fly_over_turn)
+    courses, leg_lengths, turns = leg_courses(points), leg_runs(points), _turn_angles(route, fly_over_turn)
     tangents, radii, return_lengths = _arcs_at_waypoints(route, limits, courses, leg_lengths, turns)
     return_lengths *= fly_over_turn != "none"
     pieces: list[tuple[float, ...]] = []

@@ -18,7 +18,7 @@ import numpy as np
 from flight.mission.items import Command, Mission, SurveyPlan, is_navigation
 from flight.mission.route import Route
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d
+from world.geometry import leg_courses, leg_runs
 
 # Maximum course difference between a leg and the first leg of its straight run, rad.
 _MAX_RUN_BEND_RAD = math.radians(3.0)
@@ -298,7 +298,7 @@ class _Runs:
     def __init__(self, points: Floats, runs: Sequence[tuple[int, int]]) -> None:
         """Store waypoints (w, 3) m, and runs as pairs of the index of their first and last waypoint."""
         self.points, self.runs = points, runs
-        self._distances = np.concatenate([[0.0], np.cumsum(leg_lengths_2d(points))]).tolist()
+        self._distances = np.concatenate([[0.0], np.cumsum(leg_runs(points))]).tolist()
         # Positions, directions and lengths are plain numbers: computing with arrays of two elements takes ten times as
         # long.
         self._positions: list[list[float]] = points[:, :2].tolist()
@@ -541,7 +541,7 @@ def _remove_leads(
             # If no line changes, the mission was edited after the ground station stored the length.
             if shortened != lines:
                 return shortened
-    lengths = leg_lengths_2d(points)
+    lengths = leg_runs(points)
     if any(line.ends - line.begins < _MIN_LEGS_WITH_LEADS for line in lines):
         return lines
     # Waypoints at equal distances along a line are not leads.

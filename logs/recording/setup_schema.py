@@ -20,7 +20,7 @@ from flight.mission.loiter_circles import UnjoinedStop
 from flight.mission.return_path import ReturnCircle
 from flight.mission.route import ROUTE_COLUMNS_WITH_NAN, Route
 from world.errors import LogError
-from world.geometry import leg_lengths_2d
+from world.geometry import leg_runs
 
 Data = TypeVar("Data")
 
@@ -160,7 +160,7 @@ class RouteTable(SetupModel):
         Raises LogError for inconsistent columns, and for a leg without length.
         """
         waypoints = np.array(self.waypoints)
-        if not (leg_lengths_2d(waypoints) > 0.0).all():
+        if not (leg_runs(waypoints) > 0.0).all():
             raise self.fault(file, "waypoints", "a leg without horizontal length")
         for field in (
             "airspeed",

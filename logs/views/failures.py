@@ -14,7 +14,7 @@ from logs.verdict.verdict import Verdict
 from logs.verdict.wording import place_text
 from logs.views.charts import Label
 from world.arrays import Floats
-from world.geometry import leg_lengths_2d
+from world.geometry import leg_runs
 from world.threats import Threats
 
 # Largest number of labels; more would cover the places that they describe.
@@ -92,7 +92,7 @@ def stop_rows(stops: Sequence[int]) -> list[int]:
 
 def route_distance(waypoints: Floats) -> Floats:
     """Return the horizontal distance of each waypoint along the route, (w,) m."""
-    return np.concatenate([[0.0], np.cumsum(leg_lengths_2d(waypoints))])
+    return np.concatenate([[0.0], np.cumsum(leg_runs(waypoints))])
 
 
 def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Open the mission, world, aircraft and dispersions that a campaign's flights share, and vary them by a draw."""
+"""Open the mission, world, aircraft and dispersions that a campaign's flights share, and vary them for each flight."""
 
 import hashlib
 import json
@@ -249,7 +249,11 @@ class GivenWind(NamedTuple):
 
 @dataclass(frozen=True)
 class VariedFlight:
-    """Setup with the wind and terrain of a draw, and the draw's other differences."""
+    """A flight with the values of a draw.
+
+    setup, airframe: setup and airframe in the drawn wind and terrain.
+    off_nominal: drawn differences that the autopilot does not know.
+    """
 
     setup: FlightSetup
     airframe: Airframe
@@ -332,9 +336,12 @@ def vary_terrain(terrain: Terrain, error: float, strip: LandingStrip | None, str
 
 
 def _limits_in_wind(airframe: Airframe, scenario: Scenario, *, is_drawn: bool) -> Limits:
-    """Return the airframe's limits in the wind of a scenario.  is_drawn: True if the flight's aircraft is drawn."""
+    """Return the airframe's limits in the wind of a scenario.
+
+    is_drawn: True if the model of the flight's aircraft is drawn at random.
+    """
     old_limits = airframe.limits
-    # The performance of a drawn aircraft is known exactly, so it has no standard deviations.
+    # The performance of a drawn aircraft is known exactly: its standard deviations are 0.
     exact_envelope = replace(old_limits.envelope, climb_sd=0.0, descent_sd=0.0, fastest_sd=0.0, power_sd=0.0)
     envelope = exact_envelope if is_drawn else old_limits.envelope
     limits = make_limits(scenario, envelope, old_limits.airspeed, max_turn_bank(scenario, airframe.autopilot))

@@ -25,7 +25,9 @@ _DEFAULTS = {"confidence": 0.95, "directions": 16, "most": 20.0}
 
 
 def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str:
-    """Return the ``planfly campaign`` command for a goal and options, without options that are None or empty.
+    """Return the ``planfly campaign`` command line for a goal and options; options that are None are omitted.
+
+    target: scenario, plan or mission of the campaign.
 
     >>> campaign_line("my plan.json", Goal(0.99, True, 5000), {"seed": 3, "wind": (8.0, 270.0), "fence": ["a", "b"]})
     "planfly campaign 'my plan.json' --prove 0.99 --flights 5000 --seed 3 --wind 8,270 --fence a --fence b"
@@ -37,7 +39,7 @@ def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str
 
 
 def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
-    """Return the ``planfly winds`` command for a goal and options, in the same way as `campaign_line`.
+    """Return the ``planfly winds`` command line for a goal and options; arguments as for `campaign_line`.
 
     >>> winds_line("jacksboro-air", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
     'planfly winds jacksboro-air --prove 0.9 --directions 8 --seed 1'

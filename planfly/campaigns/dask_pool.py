@@ -1,7 +1,7 @@
 """Fly a campaign on the workers of a running dask cluster; no other module of planfly imports dask.
 
-Each worker proves by its fingerprint that it would fly exactly like this process, receives the campaign once, and gets
-at most as many flights at a time as it has threads.
+Each worker shows by its fingerprint that its flights would be identical to this process's flights, receives the
+campaign once, and gets at most as many flights at a time as it has threads.
 """
 
 import contextlib
@@ -69,7 +69,11 @@ def fly_task(campaign: str, request: FlightRequest) -> FlightRow:
 
 
 class DaskPool:
-    """Workers of a cluster that fly the flights of a campaign.  client: a `distributed.Client`."""
+    """Workers of a cluster that fly the flights of a campaign.
+
+    client: a `distributed.Client`.
+    fly: function that flies a flight.
+    """
 
     def __init__(self, client: Any, base: CampaignBase, fly: FlyOne = fly_one) -> None:
         self._client, self._base = client, base

@@ -35,7 +35,7 @@ class Quantity(NamedTuple):
     """Number that is drawn once per flight.
 
     name: name of the quantity's table in a dispersions file, and of its column in the table of flights.
-    combine: "added" if it is added to the value of the scenario, or "factor" if it multiplies that value.
+    combine: "added" if the drawn number is added to the scenario's value, "factor" if it multiplies this value.
     unit: unit of an added value; "" for a factor.
     low, high: minimum and maximum value that may be drawn; values outside this range are unrealistic.
     integer: True for a number of steps, with a discrete distribution.
@@ -90,7 +90,7 @@ DEFAULT_DISPERSIONS_NAME = "planfly's default dispersions"
 
 
 class SpreadError(PlanflyError):
-    """Raised for a dispersions file that cannot be used."""
+    """Raised for dispersions that cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -257,7 +257,12 @@ def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
 
 
 def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> VaryingQuantity:
-    """Parse the table of a quantity.  Raises SpreadError for an invalid table.  name: name of the file in messages."""
+    """Parse the table of a quantity.
+
+    name: name of the file in messages.
+
+    Raises SpreadError for an invalid table.
+    """
     if not isinstance(quantity_table, dict):
         allowed = "expected a table, with distribution, its parameters, and source"
         raise SpreadError.at(name, quantity.name, quantity_table, allowed, shown="")
@@ -346,8 +351,9 @@ _QUANTILE_COUNT = 4096
 
 @dataclass(frozen=True, slots=True)
 class Draw:
-    """Draw of flight `index` of a campaign.
+    """The random numbers of one flight of a campaign.
 
+    index: number of the flight, from 0.
     seed: seed of the turbulence and the navigation error within the flight.
     values: values of all quantities, keyed by name; quantities that do not vary have their nominal value.
     """

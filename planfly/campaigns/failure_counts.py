@@ -20,7 +20,9 @@ class RuleFailures:
 
 
 def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[RuleFailures, ...]:
-    """Count flights by failed rule and place.  flights: failed rules and places of each flight.
+    """Count flights by failed rule and place.
+
+    flights: failed rules and places of each flight.
 
     >>> [one.flights for one in count_failures([[("slope", Place("leg", 1)), ("slope", Place("leg", 2))], []])]
     [1]

@@ -100,7 +100,7 @@ class CalmFailures:
 
 @dataclass(frozen=True, repr=False)
 class WindsResult:
-    """Boundary of each direction, and the flights from which it is estimated.
+    """Result of a search: the boundary of each direction, and the flights from which the boundaries are estimated.
 
     flights: direction, wind speed, m/s, and True if flyable, of each flight.
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
@@ -253,12 +253,15 @@ class _Search:
 
     def result_in_calm_air(self, calm: CalmFailures) -> WindsResult:
         """Return the result of a search that ends after its flights in calm air."""
-        boundaries = (WindBoundary(0.0, 0.0, 0.0, beyond=False),) * self.goal.directions
+        boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
         self.flown = [(0, 0.0, False)] * calm.flights
         return replace(self.result(), boundaries=boundaries, calm=calm)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
-        """Return the failures in the weakest wind flown, for directions whose boundary is calm air; otherwise None."""
+        """Return the failures in the weakest wind flown, over the directions whose boundary is calm air.
+
+        Returns None if there is no such direction.
+        """
         calm_directions = {number for number, boundary in enumerate(boundaries) if boundary.estimate < CALM_MPS}
         numbered_flights = [
             (number, flight) for number, flight in enumerate(self.flown) if flight[0] in calm_directions
@@ -274,8 +277,8 @@ class _Search:
 def _failures_in_calm_air(pool: WorkerPool, goal: WindsGoal) -> CalmFailures | None:
     """Fly the first draws in calm air, and return their failures if all of them fail, otherwise None.
 
-    If the mission flew with the target probability, so many flights would all fail with a probability of at most one
-    less the confidence.
+    The number of flights is chosen so that, if the mission had the target probability, all of them would fail with a
+    probability of at most 1 minus the confidence.
     """
     count = max(_MIN_CALM_FLIGHTS, math.ceil(math.log(1.0 - goal.confidence) / math.log(1.0 - goal.target)))
     if count > goal.flights:
@@ -354,7 +357,10 @@ def _fly_round(
 
 
 class _ProgressReport:
-    """Periodic progress report.  stored_count: number of flights in the table at the start."""
+    """Periodic progress report of a search.
+
+    stored_count: number of flights in the table at the start.
+    """
 
     def __init__(self, search: _Search, stored_count: int, advance: Advance | None) -> None:
         self._search, self._advance, self._rate = search, advance, FlightRate(stored_count)

@@ -27,7 +27,11 @@ MAX_WORKER_DEATHS = 3
 
 @dataclass(frozen=True, slots=True)
 class FlightRequest:
-    """Requested flight.  wind: mean wind that replaces the scenario's wind, or None."""
+    """Requested flight.
+
+    index: number of the flight's draw.
+    wind: mean wind that replaces the scenario's wind, or None.
+    """
 
     index: int
     wind: GivenWind | None = None
@@ -117,7 +121,10 @@ class CampaignCopy:
         return replace(fly(base, request.index, request.wind), worker=worker)
 
     def unpack(self, worker: str) -> tuple[CampaignBase, FlyOne]:
-        """Return the campaign and the function that flies it. Raises WorkerError if this worker's software differs."""
+        """Return the campaign and the function that flies a flight; unpack them at the first call.
+
+        Raises WorkerError if this worker's software differs.
+        """
         if self._unpacked is None:
             check_fingerprint(self._own_fingerprint, fingerprint(self._aircraft), worker)
             base, fly = pickle.loads(self._packed)

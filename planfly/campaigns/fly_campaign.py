@@ -16,10 +16,12 @@ Advance = Callable[[float, float, str], None]
 
 @dataclass
 class _FlightTally:
-    """Known flights of a campaign, and the tally of the flights before the first missing index.
+    """The known flights of a campaign; flights are counted in the order of their indices.
 
+    tally: outcomes of the flights before the first missing index.
     later_outcomes: outcomes of the known flights after the first missing index.
     next_index: index of the next flight to request.
+    is_decided: True if the tally decides the goal.
     """
 
     estimator: Estimator
@@ -127,7 +129,10 @@ def _store_flight(row: FlightRow, flight_tally: _FlightTally, store: Store) -> N
 
 
 class _ProgressReport:
-    """Periodic progress report.  stored_tally: tally of the flights in the table at the start."""
+    """Periodic progress report of a campaign.
+
+    stored_tally: tally of the flights in the table at the start.
+    """
 
     def __init__(self, goal: Goal, estimator: Estimator, stored_tally: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance

@@ -98,7 +98,11 @@ def _end_workers(workers: Iterable[_Worker]) -> None:
 
 
 class LocalPool:
-    """Processes on this machine that fly the flights of a campaign.  count: number of processes."""
+    """Processes on this machine that fly the flights of a campaign.
+
+    count: number of processes.
+    fly: function that flies a flight.
+    """
 
     def __init__(self, count: int, base: CampaignBase, fly: FlyOne = fly_one) -> None:
         self._base = base

@@ -108,7 +108,10 @@ class Bar:
 
 
 def group_by_speed(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
-    """Group flights by wind speed; ranges without a flight are omitted.  speed: wind speed, m/s, (n,).
+    """Group flights by wind speed; ranges of wind speeds without a flight are omitted.
+
+    speed: wind speed of each flight, m/s, (n,).
+    flyable: True for a flyable flight, (n,).
 
     >>> [one.flights for one in group_by_speed(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
     [2, 1]
@@ -300,7 +303,7 @@ def draw_clearance_fan(
 
 
 def draw_crossings(crossings: Floats, has_failed: NDArray[np.bool_]) -> Figure:
-    """Draw where the flights crossed each waypoint, one panel for each, seen along the path, with the 95 % ellipse.
+    """Draw where the flights crossed each waypoint, seen along the path, with the 95 % ellipse; one panel for each.
 
     crossings: distance right of and above each waypoint, m, (n, w, 2); NaN if not reached.
     has_failed: True for a flight that is not flyable, (n,).

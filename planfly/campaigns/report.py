@@ -66,7 +66,10 @@ _MAX_DRAWN_FLIGHTS = 3000
 
 
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
-    """Return the HTML page of a campaign's report as UTF-8.  command: the command line that repeats the campaign."""
+    """Return the HTML page of a campaign's report as UTF-8.
+
+    command: command line that repeats the campaign.
+    """
     pictures = [_draw_both_widths(figure, caption) for figure, caption in _draw_pictures(base, summary, store)]
     lines = campaign_lines(summary)
     text = _render_page(
@@ -272,7 +275,9 @@ class OutputDirectory:
 
 @contextmanager
 def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[OutputDirectory]:
-    """Yield the folder of a campaign.  out: path of the folder, or None for a folder that is removed at the end.
+    """Yield the folder of a campaign.
+
+    out: path of the folder, or None for a temporary folder, which is removed at the end.
 
     Raises ArgumentError if a campaign is to be resumed without a folder.
     """
@@ -357,7 +362,7 @@ def chart_directions(winds: WindsResult) -> list[ChartDirection]:
         marks = tuple((speed, len(outcomes), sum(outcomes)) for speed, outcomes in sorted(counts.items()))
         directions.append(
             ChartDirection(
-                winds.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.beyond, marks
+                winds.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.is_beyond_search, marks
             )
         )
     return directions
@@ -454,7 +459,11 @@ def _unsettled_directions(winds: WindsResult) -> list[int]:
 
 
 def answer_state(winds: WindsResult) -> str:
-    """Return the state of the answer: "missed" in calm air, "undecided" with too few flights, otherwise ""."""
+    """Return the state of the answer, which the page shows.
+
+    It is "missed" if the flights show that the mission is not flyable even in calm air with the target probability,
+    "undecided" if this is not certain or a direction has too few flights, and otherwise "".
+    """
     calm = winds.calm
     if calm is not None and wilson(calm.flights - calm.failed_count, calm.flights)[1] < winds.goal.target:
         return "missed"
@@ -489,9 +498,9 @@ def _lost_lines(winds: WindsResult) -> list[str]:
 
 
 def _lines_without_failures(winds: WindsResult) -> list[str]:
-    """Return a line about directions without a failure; empty if all directions have failures.
+    """Return a line about the directions in which no flight failed, if there are any.
 
-    The line states the probability of success that the flights in the maximum wind prove by themselves.
+    The line states the probability of success that the flights in the maximum wind of these directions prove alone.
     """
     max_speed, confidence = winds.goal.most, winds.goal.confidence
     counts_at_max = Counter(direction for direction, speed, _ in winds.flights if speed == max_speed)

@@ -193,7 +193,10 @@ def summary_json(summary: CampaignSummary) -> str:
 
 
 def _flight_data(row: FlightRow, log: str) -> dict[str, Any]:
-    """Return a flight as data for a JSON document.  log: path of its log, or "" for a flight without a log."""
+    """Return a flight as data for a JSON document.
+
+    log: path of the flight's log, or "" for a flight without a log.
+    """
     return {
         "flight": row.draw.index,
         "outcome": row.outcome,

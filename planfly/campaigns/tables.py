@@ -119,8 +119,8 @@ class TableKind:
     """Kind of a table file.
 
     name: name of the schema.
-    columns: name and kind of each column of the table of flights; the first is the key, the number of the flight. A
-    checksum of all columns follows them.
+    columns: SQL type of each column of the table of flights, by name; the first column is the key, the number of the
+        flight.  A column with a checksum of all columns is added at the end.
     fixed: settings that must stay the same when the table is resumed.
     """
 
@@ -338,7 +338,7 @@ def _read_settings(connection: sqlite3.Connection) -> dict[str, str]:
 
 
 def _check_settings_intact(settings: Mapping[str, str], path: Path) -> None:
-    """Raise StoreError for a file with settings that planfly did not write."""
+    """Raise StoreError if the settings of a table do not have their checksum."""
     if settings.get("checksum") != checksum(settings.get(name) for name in ("schema", "made_of", "settings")):
         reason = (
             "its settings are damaged or written by another version: the campaign cannot be resumed;"

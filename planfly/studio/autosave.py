@@ -31,8 +31,9 @@ _SAVED_TABLES = ("wind", "flight", "limits", "area")
 def autosave_text(
     context: EditContext, document: Document, mission: Mission, plan: Plan | None, *, is_in_file: bool
 ) -> str:
-    """Return the JSON text of the autosave file.
+    """Write the state of a session as the JSON text of its autosave file.
 
+    context, document: settings of the session, and the opened document.
     mission: the edited mission.
     plan: the plan of the mission, or None if the mission was changed after planning.
     is_in_file: True if the file of the document contains the edited mission.
@@ -132,6 +133,7 @@ def mission_data(mission: Mission) -> Json:
     """Convert a mission to plain data, from which `mission_from_data` makes the same mission; NaN becomes None."""
 
     def item_data(item: MissionItem) -> list[Any]:
+        """Return the fields of an item, with None for NaN."""
         numbers = [*item.params, item.lat_deg, item.lon_deg, item.alt]
         return [item.seq, item.command, item.frame, *(None if v != v else v for v in numbers), item.autocontinue]
 

@@ -28,8 +28,8 @@ _WORST_FIRST = {False: 0, None: 1, True: 2}
 class PlaceResult(NamedTuple):
     """Result of a rule at a place.
 
-    ok: True if it passes, None if not judged.
-    value, margin: in ``unit``, or None.
+    ok: True if the place passes the rule, False if it fails, None if it was not judged.
+    value, margin: value and margin in ``unit``, or None if there are none.
     place: description of the place, with the item numbers of its own mission.
     scale: smallest noticeable difference of the margin.
     """
@@ -53,7 +53,7 @@ _Results = dict[tuple[str, PlaceKey], PlaceResult]
 class FlightResults(NamedTuple):
     """Results of a flight, for a comparison with another flight.
 
-    items: contents of each item of its mission, in order.
+    items: command, latitude, longitude and altitude of each item of the mission, in order.
     results: worst result of each rule at each place.
     seconds: duration of the flight.
     """
@@ -163,7 +163,10 @@ _REMOVED_POSITION = -1
 
 
 def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
-    """Return the previous results, keyed by the current positions of items; a removed item gets a unique key."""
+    """Return the previous results, keyed by the current positions of the items.
+
+    Results at a removed item get a key that no current result has.
+    """
     new_positions, renumbered = match_items(previous.items, current.items), {}
     for number, ((rule, (kind, first, last)), result) in enumerate(previous.results.items()):
         if kind in _ITEM_PLACE_KINDS and first is not None and last is not None:
@@ -175,7 +178,7 @@ def _renumber(previous: FlightResults, current: FlightResults) -> _Results:
 
 
 def _state_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe each change of a place's state, with both values; places that became worse come first."""
+    """Describe each place that fails now, or that failed before and no longer fails; new failures come first."""
     worse, better = [], []
     for (rule, key), result in new_results.items():
         old_result = old_results.get((rule, key))
@@ -206,7 +209,7 @@ def _change_text(rule: str, result: PlaceResult, old_result: PlaceResult | None,
 
 
 def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
-    """Describe changed values of failures that remain, and then changed smallest margins of rules."""
+    """Describe the failures whose values changed, and then the rules whose smallest margins changed."""
     failures = [
         (rule, old_results[rule, key], result)
         for (rule, key), result in new_results.items()
@@ -240,7 +243,7 @@ def _value_changes(old_results: _Results, new_results: _Results) -> list[str]:
 
 
 def _closest_results(results: _Results) -> dict[str, PlaceResult]:
-    """Return the result with the smallest margin of each rule."""
+    """Return for each rule the result with the smallest margin; rules without a margin are omitted."""
     closest: dict[str, PlaceResult] = {}
     for (rule, _), result in results.items():
         if result.margin is not None and (rule not in closest or result.margin < (closest[rule].margin or 0.0)):

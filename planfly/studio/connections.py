@@ -44,7 +44,7 @@ class _UnknownConnection:
 
 
 class ShortLived(_UnknownConnection, H11Protocol):
-    """HTTP on a connection that ends after `HTTP_LIFETIME_S`, so that silent connections make room for others."""
+    """HTTP protocol that closes its connection after `HTTP_LIFETIME_S`, so that idle connections do not accumulate."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         """Register the connection, and schedule its closing, unless a websocket replaces HTTP before."""
@@ -53,14 +53,13 @@ class ShortLived(_UnknownConnection, H11Protocol):
         asyncio.get_running_loop().call_later(HTTP_LIFETIME_S, self._close_if_http, transport)
 
     def _close_if_http(self, transport: asyncio.Transport) -> None:
-        """Close the connection if it still speaks HTTP."""
-        # If a websocket has replaced this protocol, the connection stays open.
+        """Close the connection, unless a websocket has replaced HTTP."""
         if transport.get_protocol() is self:
             transport.abort()
 
 
 class FirstMessageBounded(_UnknownConnection, WebSocketsSansIOProtocol):
-    """Websocket that reads no message above `MAX_FIRST_MESSAGE_CHARACTERS` until the token is given."""
+    """Websocket protocol that refuses messages above `MAX_FIRST_MESSAGE_CHARACTERS` until the token is given."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)

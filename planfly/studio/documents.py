@@ -35,7 +35,7 @@ from world.scenario import Scenario, embedded_names
 
 # Maximum size of a file dropped on the page, bytes.
 MAX_DROPPED = 16 * 2**20
-# File types that may be dropped.  They are those that `planfly check` reads and that do not name other files.
+# File types that may be dropped: the types that `planfly check` reads and that do not name other files.
 DROPPED_SUFFIXES = (
     ".waypoints",
     ".txt",
@@ -71,7 +71,7 @@ class Document:
     setup: setup of the opened mission.
     kind: key in `KINDS`, or "" if the document was not a mission file.
     data: bytes of the file; an unchanged mission is saved as these bytes.
-    path: the file that the command named; None for any other document.
+    path: the file that the command named, which the page may overwrite; None for any other document.
     on_disk: bytes of this file when it was last read or written.
     to_plan: True for a scenario that has no path yet.
     """
@@ -87,7 +87,12 @@ class Document:
 
 
 def open_document(target: str, options: MissionOptions) -> Document:
-    """Open a scenario, a plan, a mission or a log.  target: name of a scenario, or path.  Raises PlanflyError."""
+    """Open a scenario, a plan, a mission or a log.
+
+    target: name of a scenario, or path of a file.
+
+    Raises PlanflyError if the target cannot be opened.
+    """
     if target in embedded_names() or target.lower().endswith(".toml"):
         return _scenario_document(load_scenario_with_options(target, options), options.get("seed"))
     path = Path(target)
@@ -99,9 +104,12 @@ def open_document(target: str, options: MissionOptions) -> Document:
 
 
 def open_dropped(name: str, data: bytes, options: MissionOptions) -> Document:
-    """Open a file that was dropped on the page.  name: its file name, whose suffix is its type.  data: its content.
+    """Open a file that was dropped on the page.
 
-    Raises PlanflyError.
+    name: name of the file; the suffix is its type.
+    data: content of the file.
+
+    Raises PlanflyError if the file cannot be opened, or names other files of this machine.
     """
     suffix = Path(name).suffix.lower()
     shown_name = (
@@ -230,11 +238,11 @@ class SavedFile:
 
 
 def save_document(document: Document, context: EditContext, judged_mission: JudgedMission, kind: str) -> SavedFile:
-    """Return the edited mission as a file.  kind: one of `SAVED_SUFFIXES`.
+    """Return the edited mission as a file; an unchanged mission in its original format is saved as the original bytes.
+
+    kind: one of `SAVED_SUFFIXES`.
 
     Raises PlanflyError if this kind of file cannot store the mission.
-
-    An unchanged mission in its original format is saved as the original bytes.
     """
     mission, name = judged_mission.mission, f"{document.stem}{SAVED_SUFFIXES[kind]}"
     if kind == "parm":
@@ -329,7 +337,7 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
 
 
 def _check_plain_waypoints(mission: Mission) -> None:
-    """Raise MissionError for items that a plan cannot store: take-off, landing and speed changes en route."""
+    """Raise MissionError for the first item that a plan cannot store: take-off, landing or a speed change en route."""
     first = next((index for index, item in enumerate(mission.items) if item.has_position), 0)
     for index, item in enumerate(mission.items):
         lost_content = "its take-off" if item.command in TAKEOFFS else "its landing" if item.command in LANDINGS else ""
@@ -372,7 +380,7 @@ def make_certified_plan(context: EditContext, judged_mission: JudgedMission) -> 
 
 
 def _certified_plan(context: EditContext, waypoints: Floats) -> Plan:
-    """Return the plan of waypoints (w, 3), m, in the scenario of the page."""
+    """Return a certified plan with the given waypoints, (w, 3) m, in the scenario of the page."""
     return certify_waypoints(context.scenario, context.airframe.limits.with_margin(), waypoints, seed=context.seed)
 
 

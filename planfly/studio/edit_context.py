@@ -1,4 +1,4 @@
-"""Editing context of a mission: settings in which it is judged, and its route and its parts while it is dragged."""
+"""Hold the settings in which an edited mission is judged, and compute its route while it is dragged."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,8 +25,8 @@ _DEFAULT_PARAMETERS = SetParameters()
 class EditContext(MissionContext):
     """Settings in which an edited mission is judged.
 
-    terrain: elevation file named for a mission without a scenario, or None.
-    fences: fences named with the mission; their zones are added to every scenario that is made around it.
+    terrain: elevation file that the user named for a mission without a scenario, or None.
+    fences: fences that the user named; their zones are added to every scenario that is made around the mission.
     parameters: autopilot parameters that were set in the studio.
     """
 

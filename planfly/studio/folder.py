@@ -47,7 +47,9 @@ def home_relative_text(path: Path) -> str:
 
 
 def find_file_in_folder(folder: Path | None, name: str) -> Path:
-    """Return a file by its path in the folder. Raises MissionError for a file outside the folder or of another type.
+    """Return the path of a file in the folder, by its name.
+
+    Raises MissionError for a file that does not exist, is outside the folder, or has an unknown type.
 
     >>> find_file_in_folder(Path("/tmp"), "../etc/passwd")
     Traceback (most recent call last):

@@ -19,7 +19,7 @@ from world.terrain import Terrain
 
 Range = tuple[float, float]
 
-# Pixels of the longer side.
+# Pixels along the longer side of the picture.
 _PICTURE_PIXELS = 1_400
 # Maximum number of contours.
 _MAX_CONTOURS = 16
@@ -45,13 +45,20 @@ class GroundGrid:
 
 
 def sample_ground_grid(terrain: Terrain, east: Range, north: Range) -> GroundGrid:
-    """Return a coarse grid of terrain altitudes.  east, north: extent of the map, m."""
+    """Return a coarse grid of terrain altitudes.
+
+    east, north: ranges of the map, m.
+    """
     heights = _sample_heights(terrain, east, north, _GRID_SIZE)
     return GroundGrid(east, north, heights.astype(np.float32))
 
 
 def draw_ground(terrain: Terrain, east: Range, north: Range, *, dark: bool) -> bytes:
-    """Draw terrain as a WebP picture, north up.  east, north: extent of the map, m.  dark: True for dark colours."""
+    """Draw terrain as a WebP picture, north up.
+
+    east, north: ranges of the map, m.
+    dark: True for dark colours.
+    """
     heights = _sample_heights(terrain, east, north, _PICTURE_PIXELS)
     is_known = np.isfinite(heights)
     unknown = np.array(theme.rgba("unknown", dark=dark)[:3])
@@ -100,7 +107,10 @@ def _draw_contours(picture: Floats, heights: Floats, step: float, *, dark: bool)
 
 
 def _to_webp(picture: Floats) -> bytes:
-    """Encode a picture as WebP.  picture: colours from 0 to 1, (rows, columns, 3), with the southern row first."""
+    """Encode a picture as WebP.
+
+    picture: colours from 0 to 1, (rows, columns, 3), with the southern row first.
+    """
     pixels = np.round(np.clip(picture[::-1], 0.0, 1.0) * 255.0).astype(np.uint8)
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, "WEBP", quality=_WEBP_QUALITY, method=2)

@@ -18,10 +18,10 @@ from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from planfly.studio.edit_context import EditContext
 from planfly.studio.moved_route import update_moved_route
-from world.geometry import leg_lengths_2d
+from world.geometry import leg_runs
 
-# Distance along the legs within which a move can change the verdict, m.  The route is judged for twice this distance,
-# and the outer half is discarded, because the end of the part is not the end of the route.
+# Distance along the legs within which the move of an item can change the verdict, m.  The route is judged for twice
+# this distance, and the outer half is discarded, because the end of the judged part is not the end of the route.
 REACH = 450.0
 # Minimum number of legs within which a move can change the verdict.
 LEGS = 4
@@ -33,7 +33,7 @@ _APPENDED_LEG_LENGTH_M = 3_000.0
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """Judged legs and corners of a route.
+    """A judged part of a route.
 
     first, last: first and last waypoint of the judged legs and corners.
     start: waypoint of the whole route at which the judged part starts.
@@ -50,9 +50,9 @@ class Window:
 def judge_windows(
     context: EditContext, mission: Mission, index: int, previous_setup: FlightSetup | None = None
 ) -> tuple[Route, tuple[Window, ...]]:
-    """Judge the parts of a mission's route near a moved item, or the whole route if this is necessary or no slower.
+    """Judge the parts of a mission's route near a moved item, and return the route and the judged parts (windows).
 
-    Returns the route and the judged parts (windows).
+    The whole route is judged as one part if it may contain surveys, or if the parts together would be as long.
 
     index: index of the item in the mission's list.
     previous_setup: setup before the move, if known.
@@ -194,7 +194,7 @@ def _consecutive_runs(numbers: np.ndarray) -> Iterator[tuple[int, int]]:
 
 def _extend_span(route: Route, first: int, last: int) -> tuple[int, int]:
     """Return a span extended by at least `REACH` and `LEGS` on both sides, without cutting a loiter."""
-    distance = np.concatenate([[0.0], np.cumsum(leg_lengths_2d(route.waypoints))])
+    distance = np.concatenate([[0.0], np.cumsum(leg_runs(route.waypoints))])
     start = min(first - LEGS, int(np.searchsorted(distance, distance[first] - REACH, side="right")) - 1)
     end = max(last + LEGS, int(np.searchsorted(distance, distance[last] + REACH)))
     start, end = max(0, start), min(route.legs, end)

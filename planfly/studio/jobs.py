@@ -28,8 +28,10 @@ LONG_WORKER = "long"
 
 @dataclass
 class _ActiveTask:
-    """Task in progress.
+    """A task that a worker process is doing.
 
+    number: number of the task, unique in a session.
+    name: kind of the task: "fly", "plan", "trials" or a long task.
     rev: revision of the mission for which the task is done.
     item_range: first and last item between which a path is planned; None for other tasks, and for the whole mission.
     report_time: time of the last progress report, s.
@@ -53,7 +55,8 @@ class _ActiveTask:
 class Jobs:
     """Both worker processes, their tasks in progress, and the results of the newest flight.
 
-    on_answer: called with the name of a process and its answer, from the thread of the process's pipe.
+    on_answer: function that is called with the name of a worker process and its answer, in the thread that reads from
+        the process.
     pack: see `WorkerProcess`.
     """
 
@@ -120,7 +123,7 @@ class Jobs:
     # Requests.
 
     def fly(self, session: Session) -> None:
-        """Fly the current mission; a flight in progress is cancelled."""
+        """Fly the current mission and cancel a flight in progress; do nothing for a scenario without a path."""
         if session.document.to_plan and not session.is_changed:
             return
         self._submit_task(
@@ -136,14 +139,17 @@ class Jobs:
             self._active[LONG_WORKER].item_range = (message.first, message.last)
 
     def start_task(self, kind: str, session: Session) -> None:
-        """Start a flight of the current mission, or a long task.  kind: "fly" or the name of the long task."""
+        """Start a flight of the current mission, or a long task.
+
+        kind: "fly", or the name of a long task: "returns" or "campaign".
+        """
         if kind == "fly":
             self.fly(session)
             return
         self._submit_task(
             LONG_WORKER,
             kind,
-            f"planfly.studio.long_worker_tasks.{kind}",
+            f"planfly.studio.long_worker_tasks.run_{kind}_task",
             (session.context, session.mission),
             session.rev,
         )
@@ -202,9 +208,9 @@ class Jobs:
     # Answers.
 
     def handle_answer(self, worker: str, answer: Answer, session: Session) -> list[Json]:
-        """Return the messages for the pages after an answer of a worker.
+        """Return the messages that the pages get after an answer of a worker.
 
-        The end of a task that was replaced by another gives only the message that it has stopped.
+        For a task that was replaced by another task, this is only the message that it has stopped.
         """
         task = self._active.get(worker)
         if task is None or task.number != answer.number:
@@ -268,7 +274,7 @@ class Jobs:
         return message
 
     def pop_initial_plan(self, session: Session) -> bool:
-        """Return True, only once, when the path planned for the opened scenario has arrived."""
+        """Return True once: at the first call after the path planned for the opened scenario has arrived."""
         has_path = self._uses_first_path and bool(session.plans[0])
         if has_path:
             self._uses_first_path = False
@@ -294,7 +300,7 @@ def paths_json(plans: Sequence[FrontPlan]) -> list[Json]:
 
 
 def _path_json(front_plan: FrontPlan) -> Json:
-    """Return length (m), radar exposure (s), minimum height (m), time (s) and energy (Wh) of a path."""
+    """Return page data of a planned path: length (m), radar exposure (s), minimum height (m), time (s), energy (Wh)."""
     plan, (length, exposure, clearance, seconds, energy) = (
         front_plan.plan,
         round_to_json(

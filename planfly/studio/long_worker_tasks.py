@@ -1,4 +1,4 @@
-"""Judge RTL flights along the route, and fly campaigns, in the studio's second process."""
+"""Judge returns to launch along the route, and fly campaigns, in the studio's second worker process."""
 
 from collections import Counter
 from pathlib import Path
@@ -25,8 +25,11 @@ _MAX_LISTED_RANGES = 6
 FLIGHT_COUNT = 24
 
 
-def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
-    """Fly a mission, judge returns to launch from points along the flight, and return the outcome as page data."""
+def run_returns_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
+    """Fly a mission, judge returns to launch from points along the flight, and return the outcome as page data.
+
+    payload: editing context, and mission.
+    """
     context, mission = payload
     setup = context.setup(mission)
     if mission.home is None or context.scenario.terrain is None:
@@ -54,10 +57,12 @@ def returns(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str,
     }
 
 
-def campaign(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
+def run_campaign_task(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any]:
     """Fly a mission `FLIGHT_COUNT` times with varied conditions, and return the outcome as page data.
 
     Wind, aircraft, terrain error and start position vary.
+
+    payload: editing context, and mission.
     """
     require_extra("campaigns")
     from planfly.campaigns.statistics.decision import wilson

@@ -50,7 +50,9 @@ class Look(_Message):
 class Drag(_Message):
     """Position of an item during a drag, which changes nothing yet.
 
-    rev: revision that is dragged.  n: increasing number.  k: index of the item.
+    rev: revision of the mission that is dragged.
+    n: number of the message, which increases.
+    k: index of the item.
     whole: true to judge the whole mission.
     """
 
@@ -195,7 +197,9 @@ _ADAPTER: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 
 
 def read_message(text: str | bytes) -> Message:
-    """Parse a message from a page. Raises ValidationError, a ValueError, for a message of no known kind.
+    """Parse a message from a page.
+
+    Raises ValueError for a message that is too long, and ValidationError, a ValueError, for an invalid message.
 
     >>> read_message('{"kind": "undo"}').kind
     'undo'

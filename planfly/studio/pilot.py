@@ -19,7 +19,7 @@ from world.errors import PlanflyError
 
 # Maximum time for a cancelled task or its process to end, s; kernels may have to be compiled in this time.
 CANCEL_TIMEOUT_S = 60.0
-# Function called with the amount done, the total amount and a remark.
+# Function that reports progress: it is called with the amount done, the total amount and a remark.
 Advance = Callable[[float, float, str], None]
 
 
@@ -40,8 +40,10 @@ class Task:
 class Answer:
     """Answer to a task.
 
+    number: number of the task.
     kind: "progress" with (done, total, remark), "done" with the result of the function, "cancelled" with None, or
-    "fault" with a line for the user.
+        "fault" with a line for the user.
+    value: the value that belongs to the kind.
     """
 
     number: int
@@ -77,10 +79,11 @@ class WorkerProcess:
     ) -> None:
         """Prepare a worker; nothing is started before `submit`.
 
-        on_answer: called from its own thread.
+        name: name of the process.
+        on_answer: function that gets the answers, called in a thread of the worker.
         cancel_timeout: maximum time for a cancelled task to end, s.
-        pack: pickles a task; called from the sending thread, it must pickle objects that another thread may change in
-        that other thread.
+        pack: function that pickles a task, called in the sending thread; objects that another thread may change must be
+            pickled in that other thread.
         """
         self._name, self._on_answer, self._cancel_timeout, self._pack = name, on_answer, cancel_timeout, pack
         self._condition = threading.Condition(threading.RLock())

@@ -67,8 +67,12 @@ NOT_UNDERSTOOD = 1007
 class Page:
     """Page that has sent its token.
 
-    sent_ground: hash of the terrain that was sent last, and whether that page was dark.
-    has_overflowed: set when the queue of frames has overflowed.
+    dark: True if the page has dark colours.
+    frames: queue of frames to send.
+    drag: newest position of a drag that is not judged yet, or None.
+    drag_received: event that is set when a position arrives.
+    sent_ground: hash of the terrain that was sent last, and True if it was drawn for a dark page.
+    has_overflowed: event that is set when the queue of frames has overflowed.
     """
 
     socket: WebSocket
@@ -93,7 +97,12 @@ class Server:
     """The server, without the listening sockets."""
 
     def __init__(self, session: Session, token: str, autosave_file: Path | None, folder: Path | None) -> None:
-        """Prepare the server.  folder: folder of the files that the page may open, or None."""
+        """Prepare the server.
+
+        token: token that a page must send first.
+        autosave_file: autosave path of the first document; None to save nothing automatically.
+        folder: folder of the files that the page may open, or None.
+        """
         self.session, self._token, self._autosave_file = session, token, autosave_file
         self._folder = folder
         self._pages: set[Page] = set()

@@ -53,8 +53,10 @@ class Session:
     judged: the current mission with its verdict.
     plans: planned paths to choose from, and the first and last item between which they replace items, or None.
     flown_trials: flown revision, and the missions with a suggestion that passed a trial flight, keyed by the numbers of
-    finding and suggestion.
+        finding and suggestion.
     world_rev: revision of the world, which increases with every change of the world.
+    autosaved_rev: revision of the last autosave.
+    unreadable: autosave files that cannot be read.
     document_rev: number that increases with every opened document.
     named_file: file named on the command line, the only file that may be overwritten.
     saved_mission: the mission as saved last.
@@ -73,7 +75,6 @@ class Session:
     plans: tuple[list[Plan], tuple[int, int] | None] = field(default_factory=lambda: ([], None))
     flown_trials: tuple[int, dict[tuple[int, int], Mission]] = field(default_factory=lambda: (0, {}))
     autosaved_rev: int = 0
-    # Autosave files that cannot be read.
     unreadable: list[Path] = field(default_factory=list)
     named_file: Path | None = None
     saved_mission: Mission | None = None
@@ -150,7 +151,11 @@ class Session:
     # Edits.
 
     def edit(self, message: Edit) -> None:
-        """Apply an edit. Raises StaleEdit, or MissionError for an invalid mission; then nothing is changed."""
+        """Apply an edit.
+
+        Raises StaleEdit for an edit of an older revision, and MissionError if the edited mission would be invalid; in
+        both cases nothing is changed.
+        """
         if message.rev != self.rev:
             raise StaleEdit
         mission, text = self._apply_edit(message)
@@ -504,7 +509,7 @@ class Session:
 def open_session(target: str, options: MissionOptions, autosave_file: Path | None = None) -> tuple[Session, bool]:
     """Open the target of the command; return the session, and True if an autosave was restored.
 
-    Raises PlanflyError.
+    Raises PlanflyError if the target cannot be opened.
     """
     session = Session.from_document(open_document(target, options), options)
     return session, autosave_file is not None and session.restore(autosave_file)

@@ -42,7 +42,10 @@ class SetParameters:
         return parameters_text(self.values, title)
 
     def airframe(self, scenario: Scenario) -> Airframe:
-        """Load the airframe of a scenario, with these parameters in its autopilot. Raises PlanflyError."""
+        """Load the airframe of a scenario with these parameters in its autopilot.
+
+        Raises PlanflyError if the airframe cannot be loaded.
+        """
         airframe = load_airframe(scenario, self.values)
         stored_autopilot = airframe.autopilot.store()
         if not self.values or stored_autopilot.parameters is None:
@@ -109,7 +112,9 @@ def apply_parameter_settings(current: SetParameters, scenario: Scenario, setting
 
 
 def read_parameters(scenario: Scenario, text: str, name: str) -> SetParameters:
-    """Parse the text of a parameter file for the autopilot of a scenario.  name: file name for messages.
+    """Parse the text of a parameter file for the autopilot of a scenario; the scenario's own parameters are left out.
+
+    name: file name for messages.
 
     Raises PlanflyError for an invalid file.
     """

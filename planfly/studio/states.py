@@ -21,6 +21,7 @@ _SEVERITY_ORDER = {"fail": 0, "open": 1, "near": 2, "ok": 3}
 class State(NamedTuple):
     """State of a place.
 
+    state: "fail", "open", "near" or "ok".
     closeness: margin as a multiple of a noticeable difference; below 1 is near the limit, below 0 beyond the limit.
     text: short text of the finding, shown at the pointer.
     """

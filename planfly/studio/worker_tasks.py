@@ -71,11 +71,12 @@ def fly(payload: tuple[EditContext, Mission], advance: Advance) -> dict[str, Any
 
 
 def try_suggestions(payload: tuple[EditContext, bytes], advance: Advance) -> dict[str, Any]:
-    """Try the suggestions of a failed flight; return its findings with the suggestions that passed, and missions.
+    """Try the suggestions of a failed flight in trial flights, and return those that passed.
+
+    The result has the findings with these suggestions, as page data, and the missions with a suggestion applied, keyed
+    by the numbers of finding and suggestion; a suggestion that moves no item has no mission.
 
     payload: the editing context, and the pickled flight.
-    The findings are page data.  The missions have a suggestion applied, and are keyed by the numbers of finding and
-    suggestion; a suggestion that moves no item has no mission.
     """
     context, pickled = payload
     judged_mission: JudgedMission = pickle.loads(pickled)
@@ -126,7 +127,7 @@ class PlanRequest:
     ends: start and destination, (2, 3), m; None for the ends of the scenario.
     algorithm: name of the algorithm; None for the default.
     ways: maximum number of paths; if there are several, no path is better than another in all of length, exposure,
-    clearance and energy.
+        clearance and energy.
     """
 
     scenario: Scenario
@@ -138,7 +139,7 @@ class PlanRequest:
 
 
 def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
-    """Plan one or several paths, the shortest first; if no path is safe, return the best one."""
+    """Plan one or several paths, and return them with the shortest first; if no path is safe, return the best path."""
     scenario = request.scenario if request.ends is None else with_ends(request.scenario, *request.ends)
     seconds = MAX_SEARCH_SECONDS if request.ways == 1 else MAX_SEARCH_SECONDS_FOR_SEVERAL
     airframe, seed, stop = request.airframe, request.seed, partial(_stop_reason, time.monotonic() + seconds)

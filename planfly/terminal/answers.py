@@ -1,6 +1,6 @@
-"""Answers of the commands with ``--json``.
+"""Define the answers of the commands with ``--json``.
 
-Paths are as the command names them; numbers carry their unit.
+Paths are written as the user named them; the names of numbers contain their units.
 """
 
 import math
@@ -42,16 +42,16 @@ class ModeEntry:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class AircraftDetail:
-    """Facts computed for one aircraft."""
+    """Quantities computed for one aircraft."""
 
     model_sha256: str
     level_speed_min_mps: float
-    """At sea level, m/s."""
+    """Lowest airspeed of level flight at sea level, m/s."""
     level_speed_max_mps: float
     trims: list[TrimEntry]
     modes: list[ModeEntry]
     lacking: list[str]
-    """Files that a flight needs and the folder of the aircraft does not have."""
+    """Files that a flight needs, but that the aircraft's folder does not contain."""
     files: list[str]
     """Pictures that were written."""
 
@@ -85,7 +85,10 @@ class AircraftAnswer:
 
 
 def aircraft_entry(aircraft: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
-    """Return the metadata of an aircraft, and the facts computed for it."""
+    """Return the answer's entry for an aircraft, with its metadata.
+
+    detail: quantities computed for the aircraft; None in a list of aircraft.
+    """
     return AircraftEntry(
         name=aircraft.name,
         title=aircraft.title,
@@ -103,7 +106,7 @@ def aircraft_entry(aircraft: Aircraft, detail: AircraftDetail | None) -> Aircraf
 
 
 def aircraft_detail(numbers: AircraftNumbers) -> AircraftDetail:
-    """Return the facts computed for an aircraft, in the units of the answer."""
+    """Return the quantities computed for an aircraft, in the units of the answer."""
     min_speed, max_speed = numbers.envelope.level_speeds(0.0)
     trims = [
         TrimEntry(
@@ -160,7 +163,7 @@ class FailedRule:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class SensitivityEntry:
-    """Share of the deciding margin's variance that a quantity explains."""
+    """Fraction of the deciding margin's variance that a quantity explains."""
 
     quantity: str
     first_order: float | None
@@ -199,7 +202,7 @@ class CampaignDocument:
     conditions: Conditions
     """Nominal conditions, which the draws of each flight vary."""
     made_of: str
-    """Hash of the inputs of the campaign."""
+    """Hash of the inputs of all flights of the campaign."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
@@ -249,7 +252,7 @@ class WindsDocument:
     """Flights without an outcome, numbered from 0 in the order of their requests; counted as not flyable."""
     directions: list[WindDirection]
     calm: CalmFlights | None
-    """Failures in calm air, if the mission does not fly in it with the target probability."""
+    """Failures in calm air, if the mission is not flyable in calm air with the target probability."""
     spread: dict[str, Any]
     conditions: Conditions
     """Nominal conditions, except the wind, which is the result."""
@@ -408,7 +411,7 @@ class ReflyAnswer:
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
 class PredictedQuantity:
-    """A quantity of a prediction; numbers are null for a quantity that the log does not hold."""
+    """A quantity of a prediction; the numbers are null for a quantity that the log does not contain."""
 
     name: str
     unit: str

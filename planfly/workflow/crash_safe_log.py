@@ -15,7 +15,7 @@ from logs.verdict.returns.drawn_returns import DrawnReturns
 from logs.verdict.verdict import Verdict
 from planfly.flight_options import MAX_HOURS, MAX_MEGABYTES
 from world.files import lock_path
-from world.geometry import leg_lengths_2d
+from world.geometry import leg_runs
 from world.interruption import delay_signals
 
 # ----------------------------------------------------------------------
@@ -57,7 +57,7 @@ def predicted_seconds(setup: FlightSetup) -> float:
     >>> bool(abs(predicted_seconds(flown.setup) - flown.track.time[-1]) < 5.0)
     True
     """
-    leg_lengths = leg_lengths_2d(setup.route.waypoints)
+    leg_lengths = leg_runs(setup.route.waypoints)
     speed = leg_lengths.sum() / (leg_lengths / setup.demanded_route.airspeed).sum()
     return float(setup.path.length / speed)
 

@@ -25,7 +25,7 @@ from planner.evaluation.leg_constraints import MIN_CERTIFIED_LEG_M, slope_limits
 from planner.evaluation.problem import ANGLE_MARGIN_RAD, Problem, ProblemArrays
 from planner.plan import Certificate, path_digest
 from world.arrays import Floats
-from world.geometry import leg_lengths_2d, leg_slopes, turning_angles
+from world.geometry import leg_runs, leg_slopes, turning_angles
 
 # Tolerance for rounding of a waypoint on a limit, rad and m.
 _EPSILON = 1e-9
@@ -111,7 +111,7 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
     problems += _summarise_faults(
         [
             (length, f"leg {i}", f"{length:.1f} m long, at least {MIN_CERTIFIED_LEG_M:g} m are required")
-            for i, length in enumerate(leg_lengths_2d(waypoints).tolist())
+            for i, length in enumerate(leg_runs(waypoints).tolist())
             if length < MIN_CERTIFIED_LEG_M
         ]
     )
@@ -120,7 +120,7 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
     if not data.legs_hold_turns:
         return min_margin
     lengths = turn_and_roll_lengths(data, waypoints)
-    for i, (length, turns_length, roll_length) in enumerate(zip(leg_lengths_2d(waypoints), *lengths, strict=True)):
+    for i, (length, turns_length, roll_length) in enumerate(zip(leg_runs(waypoints), *lengths, strict=True)):
         if turns_length == 0.0:
             continue
         min_margin = min(min_margin, float(length - turns_length - roll_length))

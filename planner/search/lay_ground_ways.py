@@ -35,7 +35,7 @@ from planner.search.pose_chains import (
 )
 from world.airfield import STEEPEST_STRIP_SLOPE, LandingStrip, Launch, strip_slopes
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d
+from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 from world.terrain import Terrain
 
@@ -724,7 +724,7 @@ def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> 
 
     turn_point: end of the go-around's climb, (3,) m.  Returns -inf if the ground is unknown.
     """
-    length = float(leg_lengths_2d(np.stack([turn_point, line_up]))[0])
+    length = float(leg_runs(np.stack([turn_point, line_up]))[0])
     fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))
     east, north = (turn_point[axis] + fractions * (line_up[axis] - turn_point[axis]) for axis in range(2))
     if line_up[2] > turn_point[2]:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d
+from world.geometry import leg_courses, leg_runs
 
 # East and north, m.
 MapPoint = tuple[float, float]
@@ -189,7 +189,7 @@ def climb_altitudes(
     point_array = np.array(points)
     climbs = [
         climb(course) * leg_length
-        for course, leg_length in zip(leg_courses(point_array), leg_lengths_2d(point_array), strict=True)
+        for course, leg_length in zip(leg_courses(point_array), leg_runs(point_array), strict=True)
     ]
     reachable_altitudes = start_altitude + np.concatenate([[0.0], np.cumsum(climbs)])
     altitudes = np.maximum(min_altitude, np.minimum(reachable_altitudes, end_altitude))
@@ -212,7 +212,7 @@ def descent_altitudes(
         return climb_altitudes(points, start_altitude, climb, start_altitude, end_altitude)
     descents = [
         dive(course) * leg_length
-        for course, leg_length in zip(leg_courses(point_array), leg_lengths_2d(point_array), strict=True)
+        for course, leg_length in zip(leg_courses(point_array), leg_runs(point_array), strict=True)
     ]
     reachable_altitudes = end_altitude + np.concatenate([np.cumsum(descents[::-1])[::-1], [0.0]])
     return np.minimum(start_altitude, reachable_altitudes)

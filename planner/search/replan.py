@@ -17,7 +17,7 @@ from planner.search.search_state import SearchProgress, StopCondition
 from planner.search.shared_budget import Search, SharedBudget
 from world.arrays import Floats
 from world.errors import MissionError
-from world.geometry import leg_courses, leg_lengths_2d
+from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
 
 # Function that completes a plan, with a search that it may call for a changed scenario or for other limits.
@@ -151,6 +151,6 @@ def with_waypoints(path: Floats, count: int) -> Floats:
     """Return a path (w, 3) with its longest legs halved until it has `count` waypoints."""
     waypoints = [np.asarray(point, dtype=np.float64) for point in path]
     while len(waypoints) < count:
-        longest_leg = int(np.argmax(leg_lengths_2d(np.array(waypoints))))
+        longest_leg = int(np.argmax(leg_runs(np.array(waypoints))))
         waypoints.insert(longest_leg + 1, 0.5 * (waypoints[longest_leg] + waypoints[longest_leg + 1]))
     return np.array(waypoints)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from world.geometry import (
     MIN_RANGE_M,
     leg_courses,
-    leg_lengths_2d,
+    leg_runs,
     leg_slopes,
     path_length,
     segment_exposure,
@@ -68,7 +68,7 @@ def test_a_leg_without_length_counts_as_straight(ends: list[tuple[float, float, 
 @given(st.lists(POINT, min_size=3, max_size=6), st.floats(-10.0, 10.0))
 def test_angles_slopes_and_lengths_survive_rotation(points: list[tuple[float, float, float]], angle: float) -> None:
     way = np.array(points)
-    if leg_lengths_2d(way).min() < 1.0:
+    if leg_runs(way).min() < 1.0:
         return
     turned = _rotated(way, angle)
     assert turning_angles(turned) == pytest.approx(turning_angles(way), abs=1e-7)
@@ -83,7 +83,7 @@ def test_angles_slopes_and_lengths_survive_rotation(points: list[tuple[float, fl
 
 def test_many_paths_at_once_equal_one_by_one() -> None:
     ways = np.random.default_rng(3).normal(size=(4, 5, 7, 3)) * 1000
-    for function in (turning_angles, signed_turns, leg_courses, leg_lengths_2d, leg_slopes, path_length):
+    for function in (turning_angles, signed_turns, leg_courses, leg_runs, leg_slopes, path_length):
         together = function(ways)
         assert together[2, 3] == pytest.approx(function(ways[2, 3]), abs=0.0)
 

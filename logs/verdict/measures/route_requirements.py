@@ -33,7 +33,7 @@ from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Zone
 from world.arrays import Floats
 from world.errors import MissionError
-from world.geometry import fly_by_offset, leg_courses, leg_lengths_2d, leg_slopes, signed_turns, tangent_length
+from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes, signed_turns, tangent_length
 
 # ----------------------------------------------------------------------
 # The zones by which a flight is judged: the scenario's zones, then the zones of the mission's own fence.
@@ -162,7 +162,7 @@ def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceT
 def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> TurnRequirements:
     """Compute the length that each turn uses, from the aircraft's performance at the route's airspeeds."""
     points = np.asarray(route.waypoints, dtype=np.float64)
-    courses, runs, count = leg_courses(points), leg_lengths_2d(points), len(points)
+    courses, runs, count = leg_courses(points), leg_runs(points), len(points)
     turns = np.zeros(count)
     if count > 2:
         turns[1:-1] = signed_turns(points)
@@ -427,7 +427,7 @@ def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteReq
     points = np.asarray(route.waypoints, dtype=np.float64)
     tables = performance_tables(route, limits)
     turns = turn_requirements(route, tables)
-    courses, runs = leg_courses(points), leg_lengths_2d(points)
+    courses, runs = leg_courses(points), leg_runs(points)
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
     certain_limits = limits.with_margin()
     certain_climb, certain_dive = climb, dive

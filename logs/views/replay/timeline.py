@@ -17,7 +17,7 @@ from logs.recording.reader import FlightLog
 from logs.verdict.measures.path_sweeps import Passage, passages, segment_clearances
 from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
-from world.geometry import leg_courses, leg_lengths_2d, leg_slopes, signed_turns
+from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
 
 # Width of a line, columns.
 WIDTH = 100
@@ -149,7 +149,7 @@ def _leg_entries(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """List the start of each leg with course, length, slope and airspeed; one entry for a whole loiter."""
     route = log.setup.route
     points = log.setup.display_waypoints
-    courses, runs, slopes = leg_courses(points), leg_lengths_2d(points), leg_slopes(points)
+    courses, runs, slopes = leg_courses(points), leg_runs(points), leg_slopes(points)
     entries = []
     for group in _group_by_loiter(parts, route):
         part = group[0]

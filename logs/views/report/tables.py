@@ -17,7 +17,7 @@ from logs.verdict.measures.path_sweeps import passages
 from logs.views.report.text import NOTHING, number, quantity
 from planner.plan import GIVEN_WAYPOINTS
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d, leg_slopes, path_length, signed_turns
+from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
 from world.scenario import lat_lon_of_points
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -
     """List the legs of the route: planned shape and flown values."""
     waypoints = setup.display_waypoints
     runs, courses, slopes = (
-        leg_lengths_2d(waypoints),
+        leg_runs(waypoints),
         np.degrees(leg_courses(waypoints)),
         np.degrees(leg_slopes(waypoints)),
     )

@@ -82,6 +82,8 @@ class BinaryLink(Protocol):
 
 
 class _Probit:
+    """Link of a normally distributed threshold."""
+
     def log_cdf(self, x: Floats) -> Floats:
         """Return the logarithm of the normal probability of failure."""
         from scipy.special import log_ndtr
@@ -137,6 +139,8 @@ class _Probit:
 
 
 class _ComplementaryLogLog:
+    """Complementary log-log link, of a threshold with Gumbel's distribution for minima."""
+
     def log_cdf(self, x: Floats) -> Floats:
         """Return the logarithm of the probability of failure, 1 - exp(-exp(x))."""
         with np.errstate(divide="ignore"):
@@ -220,11 +224,12 @@ _SEED = 1
 
 
 def importance_sample(log_density: Callable[[Floats], Floats], mean: Floats, covariance: Floats, count: int) -> Floats:
-    """Return (count, k) equally likely points of a distribution, in random order.
+    """Return equally likely points of a distribution in random order, (count, k).
 
     The points are spread most evenly in the first coordinate.
     log_density: log-density (n,) of points (n, k), up to a constant; -inf for zero density.
-    mean, covariance: (k,) and (k, k), approximate mean and covariance of the distribution.  count: a power of two.
+    mean, covariance: approximate mean (k,) and covariance (k, k) of the distribution.
+    count: a power of two.
     Raises LinAlgError if the covariance is not positive definite.
 
     >>> sample = importance_sample(lambda x: -0.5 * x[:, 0] ** 2, np.ones(1), np.eye(1), 256)
@@ -322,7 +327,8 @@ class Outcomes:
 class RegressionFit:
     """Posterior of a regression.
 
-    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the terms' coefficients, as a normal approximation about the mode.
+    mean, covariance: mean (2 + d,) and covariance (2 + d, 2 + d) of the terms' coefficients, from a normal
+        approximation about the mode.
     log_evidence: logarithm of the evidence of the outcomes.
     margin_coefficient: decrease of the predictor per scale of margin; 0 if no margin is known.
     """
@@ -335,7 +341,7 @@ class RegressionFit:
     _mode: Floats
 
     def sample(self) -> Floats:
-        """Return equally likely coefficients of the terms from the posterior, (s, 2 + d); the wind's is positive."""
+        """Return s equally likely sets of coefficients from the posterior, (s, 2 + d); the wind's is positive."""
         return self._posterior.sample(self._mode)
 
 
@@ -344,15 +350,15 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionF
 
     link: link function between the predictor and the probability of failure.
     nearby_fit: a fit of the same coefficients, whose mode is an additional start; the posterior of margins only may
-    have two modes.
+        have two modes.
 
-        >>> from planfly.campaigns.statistics.censored_regression import PROBIT
-        >>> wind = np.linspace(-5.0, 5.0, 200)
-        >>> margin = 2.0 - wind
-        >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), margin < 0.0, margin.clip(0.0, 1.0))
-        >>> fit = fit_regression(outcomes, PROBIT)
-        >>> round(float(-fit.mean[0] / fit.mean[1]), 1)
-        2.0
+    >>> from planfly.campaigns.statistics.censored_regression import PROBIT
+    >>> wind = np.linspace(-5.0, 5.0, 200)
+    >>> margin = 2.0 - wind
+    >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), margin < 0.0, margin.clip(0.0, 1.0))
+    >>> fit = fit_regression(outcomes, PROBIT)
+    >>> round(float(-fit.mean[0] / fit.mean[1]), 1)
+    2.0
     """
     # Without drawn quantities there are no coefficients to put a prior on: fit once.
     priors = _DRAW_SIGMAS if outcomes.terms.shape[1] > 2 else _DRAW_SIGMAS[:1]
@@ -365,9 +371,10 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, nearby_fit: RegressionF
 
 
 class _Posterior:
-    """Posterior of coefficients, with the logarithm of the wind's coefficient.
+    """Posterior of the coefficients of a regression, with the logarithm of the wind's coefficient.
 
-    The margin's coefficient is last, if any margin is known.
+    If any margin is known, the margin's coefficient is the last one.
+
     draw_deviation: standard deviation of the prior of the draws' coefficients.
     """
 
@@ -408,7 +415,8 @@ class _Posterior:
         predictor_without_margin = (
             self._outcomes.terms @ beta[:, : self.size].T if self.margin_coefficient else predictor
         )
-        # Practically impossible, and its logarithm is so large that the other terms would be lost to rounding.
+        # Points with a larger predictor are practically impossible; their logarithm is so large that the other terms
+        # would be lost to rounding.
         is_possible = (predictor_without_margin[~has_failed] < _MAX_PREDICTOR).all(axis=0)
         predictor, predictor_without_margin = (
             np.where(is_possible, predictor, 0.0),

@@ -17,7 +17,7 @@ from world.arrays import Floats
 
 
 class Interval(NamedTuple):
-    """Interval of a probability."""
+    """Interval of a probability, from 0 to 1."""
 
     low: float
     high: float
@@ -212,7 +212,10 @@ def _times_log(count: int, p: float) -> float:
 
 
 def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, failures: int) -> float:
-    """Return the log-likelihood of outcomes under a mixture of beta distributions.  parts: weight, a and b of each."""
+    """Return the log-likelihood of outcomes under a mixture of beta distributions.
+
+    parts: weight, a and b of each distribution.
+    """
     from scipy.special import betaln
 
     terms = [math.log(w) + float(betaln(successes + a, failures + b) - betaln(a, b)) for w, a, b in parts]

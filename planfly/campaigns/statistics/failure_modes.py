@@ -1,10 +1,10 @@
-"""Failure modes of flights: for each a binary regression on the wind and the drawn quantities.
+"""Fit the failure modes of flights, each by a binary regression on the wind and the drawn quantities.
 
 A flight fails in some mode, such as the slope of leg 12.  Its drawn quantities (drag, mass, ...) are known and often
 decisive: an aircraft of low drag is too fast down one leg, an aircraft of high drag strays on another.  The probability
 of each mode is a link function of a + b * wind + c . draws.  The modes are ordered, and each is fitted to the flights
-that did not fail in an earlier mode, so that by the chain rule the probability of success is the product of their
-complements, even if modes are correlated.
+that did not fail in an earlier mode.  Then, by the chain rule, the probability of success is the product of the modes'
+probabilities of not failing, even if the modes are correlated.
 """
 
 from collections import Counter
@@ -42,10 +42,11 @@ _GRID_ABOVE_MPS = 10.0
 
 @dataclass(frozen=True)
 class FailureLaws:
-    """Distributions on the grid: (n,) arrays, normal ones first.
+    """Distributions of the wind at which a flight fails, on the grid: n distributions, the normal ones first.
 
-    location, scale: m/s; mean and standard deviation of a normal distribution.
-    normal_count: number of normal distributions; the others are Gumbel distributions of the same means and deviations.
+    location, scale: parameters of the distributions, m/s, (n,); mean and standard deviation of a normal distribution.
+    normal_count: number of normal distributions; the others are Gumbel distributions with the same means and standard
+        deviations.
     """
 
     location: Floats
@@ -87,10 +88,11 @@ class FailureLaws:
     def posterior_quantiles(
         self, fraction: float, speeds: Floats, flyable: NDArray[np.bool_], probabilities: Floats
     ) -> Floats:
-        """Return posterior quantiles (k,) of the wind in which a fraction of flights fails, m/s.
+        """Return posterior quantiles of the wind in which a fraction of flights fails, m/s, (k,).
 
-        speeds, flyable: (m,) winds and outcomes of the flights.
-        probabilities: (k,) probabilities of the quantiles, 0 to 1.
+        speeds: wind of each flight, m/s, (m,).
+        flyable: True for a flyable flight, (m,).
+        probabilities: probabilities of the quantiles, 0 to 1, (k,).
         """
         log_weights = np.zeros(self.location.size)
         for speed, counts in _count_by_wind(speeds, flyable).items():
@@ -125,8 +127,8 @@ def _count_by_wind(speeds: Floats, flyable: NDArray[np.bool_]) -> dict[float, tu
 class FailureMode:
     """One failure mode.
 
-    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of its terms.
-    sample: returns (s, 2 + d) equally likely coefficients; rarely needed.
+    mean, covariance: mean (2 + d,) and covariance (2 + d, 2 + d) of the coefficients of the mode's terms.
+    sample: function that returns s equally likely sets of coefficients, (s, 2 + d).
     log_evidence: logarithm of the evidence of the outcomes, for this link.
     margin_coefficient: decrease of the predictor per scale of margin; 0 if margins say nothing about failure.
     """
@@ -144,7 +146,7 @@ def fit_mode(terms: Floats, has_failed: Bools, margin: Floats, link: BinaryLink)
 
     The margins of passed flights are used if the joint model of failures and margins has more evidence than separate
     models.
-    terms: terms of each flight: one, the wind relative to some origin, and the draws, (n, 2 + d).
+    terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     has_failed: True for each flight that failed in this mode, (n,).
     margin: margin of each passed flight as a fraction of the rule's scale, (n,): 1 for a scale or more, 0 for unknown.
 
@@ -175,15 +177,17 @@ def _make_mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> Fai
     return FailureMode(link, fit.mean, fit.covariance, fit.sample, log_evidence, fit.margin_coefficient)
 
 
-# Origin of the wind in the terms, m/s, to which the prior of the constant applies.
+# Origin of the wind in the regressors, m/s; the prior of the constant applies at this wind.
 WIND_ORIGIN_MPS = 10.0
 
 
-def make_terms(speeds: Floats | float, draws: Floats) -> Floats:
-    """Return the regressors of n flights, (n, 2 + d): a constant 1, the wind speed minus the origin, and the draws.
+def make_regressors(speeds: Floats | float, draws: Floats) -> Floats:
+    """Return the regressors of n flights: a constant 1, the wind speed minus an origin, and the draws, (n, 2 + d).
 
-    speeds: wind speeds, (n,) or a single value for all flights, m/s; the origin is `WIND_ORIGIN_MPS`.
-    draws: (n, d) in standard deviations from their means.
+    The origin is `WIND_ORIGIN_MPS`.
+
+    speeds: wind speeds, m/s, (n,) or a single value for all flights.
+    draws: drawn quantities, in standard deviations from their means, (n, d).
     """
     terms = np.empty((len(draws), 2 + draws.shape[1]))
     terms[:, 0] = 1.0
@@ -201,16 +205,16 @@ def fit_modes(
     """Fit the failure modes of n flights one after another, the most frequent mode first.
 
     A flight that failed in a fitted mode is left out when the other modes are fitted.
-    terms: terms of each flight, (n, 2 + d), as made by `make_terms`.
+    terms: regressors of each flight, see `make_regressors`, (n, 2 + d).
     failed_modes: modes in which each flight failed; empty for a flyable flight.
     margin: for each flight, the modes that it passed with a small margin, and the margin as a fraction of the rule's
-    scale, 0 to 1, or 0 for an unknown margin.  All other modes were passed with a scale or more.  None for a flight
-    without known margins.
+        scale, 0 to 1, or 0 for an unknown margin.  All other modes were passed with a scale or more.  None for a flight
+        without known margins.
 
     >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> speeds = np.linspace(0.0, 20.0, 200)
     >>> ways = [frozenset({"slope"}) if speed > 12.0 else frozenset() for speed in speeds]
-    >>> (mode,) = fit_modes(make_terms(speeds, np.empty((200, 0))), ways, PROBIT)
+    >>> (mode,) = fit_modes(make_regressors(speeds, np.empty((200, 0))), ways, PROBIT)
     >>> round(float(10.0 - mode.mean[0] / mode.mean[1]), 1)
     12.0
     """
@@ -254,7 +258,7 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
     Returns `max_speed` if a smaller fraction is expected to fail there.
     """
     mode_predictors = [
-        (mode.link, make_terms(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
+        (mode.link, make_regressors(WIND_ORIGIN_MPS, draws) @ mode.mean, float(mode.mean[1])) for mode in modes
     ]
 
     def exceeds_fraction(speed: float) -> bool:
@@ -274,9 +278,10 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, failing_fraction
 
 @dataclass(frozen=True)
 class FailureFraction:
-    """Fraction of flights that fail in a wind, and its derivatives.
+    """Fraction of flights that fail in a wind, and the derivatives of this fraction.
 
-    slopes: (2 + d,) derivatives with respect to the coefficients of each mode.
+    share: the fraction, 0 to 1.
+    slopes: derivatives with respect to the coefficients of each mode, arrays (2 + d,).
     wind_slope: derivative with respect to the wind, 1/(m/s).
     """
 
@@ -287,7 +292,7 @@ class FailureFraction:
 
 def failure_fraction(modes: Sequence[FailureMode], draws: Floats, speed: float) -> FailureFraction:
     """Return the fraction of draws (m, d) that is expected to fail in a wind (m/s), and its derivatives."""
-    terms = make_terms(speed, draws)
+    terms = make_regressors(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]
     success = [mode.link.survival(predictor) for mode, predictor in zip(modes, predictors, strict=True)]
     slopes, wind_slope = [], 0.0
@@ -303,7 +308,8 @@ def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -
 
     The derivatives follow from the implicit function theorem.
 
-    draws: (m, d).  speed: wind speed at the boundary, m/s.
+    draws: (m, d).
+    speed: wind speed at the boundary, m/s.
     """
     failing = failure_fraction(modes, draws, speed)
     # If more wind does not cause more failures, nothing is known about the boundary.

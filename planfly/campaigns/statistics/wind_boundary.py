@@ -21,7 +21,7 @@ from planfly.campaigns.statistics.failure_modes import (
     boundary_speed,
     failure_probabilities,
     fit_modes,
-    make_terms,
+    make_regressors,
 )
 from world.arrays import Floats
 
@@ -114,11 +114,15 @@ def _boundary_speeds(modes: Sequence[FailureMode], draws: Floats, failing_fracti
 
 
 class _FailureFractions:
-    """Failing fraction of each sample; draws: (m, d)."""
+    """Fraction of flights that fail, for each posterior sample of the modes' coefficients.
+
+    samples: coefficients of each mode, (n, 2 + d).
+    draws: (m, d).
+    """
 
     def __init__(self, modes: Sequence[FailureMode], samples: list[Floats], draws: Floats) -> None:
         self._modes, self._samples = modes, samples
-        self._at_origin = [make_terms(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
+        self._at_origin = [make_regressors(WIND_ORIGIN_MPS, draws) @ sample.T for sample in samples]
 
     def logarithms(self, speeds: Floats) -> Floats:
         """Return the logarithm of the failing fraction for each sample at its own wind (n,), m/s."""
@@ -154,14 +158,15 @@ class DrawnNumbers:
 class WindBoundary:
     """Largest wind with the target probability, m/s.
 
-    estimate: median of the posterior.  low, high: its two-sided interval.
-    beyond: True if the estimate is beyond the largest wind of the search.
+    estimate: median of the posterior.
+    low, high: two-sided interval of the posterior.
+    is_beyond_search: True if the estimate is beyond the largest wind of the search.
     """
 
     estimate: float
     low: float
     high: float
-    beyond: bool
+    is_beyond_search: bool
 
     @property
     def width(self) -> float:
@@ -184,8 +189,13 @@ class FailureFit(WeightedModes):
 class Direction:
     """Flights in wind from one direction.
 
-    max_speed: largest wind of the search, m/s.  target, confidence: above 0 and below 1.
-    speeds: wind of each flight, m/s.  draws: index of each flight's draw.  failed_modes: failure modes of each flight.
+    max_speed: largest wind of the search, m/s.
+    target: required probability of success, above 0 and below 1.
+    confidence: probability of the boundary's interval, above 0 and below 1.
+    numbers: drawn quantities of the flights.
+    speeds: wind of each flight, m/s.
+    draws: index of each flight's draw.
+    failed_modes: failure modes of each flight.
     margin: modes that each flight passed narrowly, with the margin as a fraction of a scale, 0 to 1; None if unknown.
     """
 
@@ -230,7 +240,7 @@ class Direction:
         The direction must have both failed and flyable flights.
         """
         if self._fits is None or self._fits[0] != len(self.speeds):
-            terms = make_terms(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
+            terms = make_regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
             modes_by_link = [fit_modes(terms, self.failed_modes, link, self.margin) for link in LINKS]
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in modes_by_link])
             weights = np.exp(evidence - evidence.max())
@@ -250,7 +260,7 @@ class Direction:
         return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
 
     def boundary(self) -> WindBoundary:
-        """Return the wind at which the target is just met: estimate and interval, m/s.
+        """Return the largest wind with the target probability: estimate and interval, m/s.
 
         >>> numbers = DrawnNumbers(np.zeros((8, 0)), lambda start, stop: np.zeros((stop - start, 0)))
         >>> direction = Direction(20.0, 0.99, numbers)
@@ -366,7 +376,7 @@ def _extreme_draws(direction: Direction) -> list[int]:
 
 
 def _choose_most_informative(direction: Direction, count: int) -> list[tuple[float, int]]:
-    """Return wind (m/s) and draw of `count` flights, each chosen as if the flights before it had been flown."""
+    """Return the wind (m/s) and the draw of `count` flights; each is chosen as if the previous ones had been flown."""
     fits, max_speed, flown_count = direction.fits(), direction.max_speed, len(direction.draws)
     min_speeds, max_speeds = (
         [boundary_speed(fit.modes, direction.numbers.population, failing_fraction, max_speed) for fit in fits]
@@ -383,7 +393,7 @@ def _choose_most_informative(direction: Direction, count: int) -> list[tuple[flo
         used_draws = [draw for _, draw in flights]
         draws = _next_draws(direction, 1 if number % _NEXT_DRAW_INTERVAL == 0 else draw_count, used_draws)
         draw_values = direction.numbers.first(max(draws) + 1)[draws]
-        terms = make_terms(np.repeat(speeds, len(draws)), np.tile(draw_values, (speeds.size, 1)))
+        terms = make_regressors(np.repeat(speeds, len(draws)), np.tile(draw_values, (speeds.size, 1)))
         best_index = int(
             np.argmax(sum(posterior.expected_gains(terms) for posterior in posteriors) + _gains_between(fits, terms))
         )

@@ -31,7 +31,7 @@ from tests.sampled_paths import sample_path
 from tests.setups import MakeSetup
 from tests.soak import scaled
 from world.arrays import Floats
-from world.geometry import leg_lengths_2d, turning_angles
+from world.geometry import leg_runs, turning_angles
 from world.kernels import Record, field_names
 
 # All fields of a piece but where its leg changes, which may be nowhere.
@@ -183,7 +183,7 @@ def test_any_route_with_long_legs_is_whole_smooth_and_at_the_bank_limit(make_set
 )
 def test_any_route_on_short_legs_stays_whole(make_setup: MakeSetup, points: list[tuple[float, float, float]]) -> None:
     way = np.array(points)
-    assume(leg_lengths_2d(way).min() >= 1.0)
+    assume(leg_runs(way).min() >= 1.0)
     setup = make_setup(way)
     path = _path(setup)
     turns = turning_angles(way)

@@ -14,7 +14,7 @@ from flight.mission_files.formats import read_mission
 from tests.mission_lines import mission, wp
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin
-from world.geometry import leg_lengths_2d, leg_slopes, turning_angles
+from world.geometry import leg_runs, leg_slopes, turning_angles
 from world.scenario import scenario_from_spec
 
 SAMPLES = Path(__file__).parents[1] / "missions"
@@ -56,7 +56,7 @@ def test_samples_fly_over_the_tile(name: str) -> None:
     # A way back is drawn as it is flown: its turns begin at the last place of the mission, and it comes down.
     last = None if flown.rtl_start < 0 else flown.rtl_start + 1
     there, circling = flown.waypoints[:last], flown.arcs[:last] > 0.0
-    assert leg_lengths_2d(there)[~(circling[1:] | circling[:-1])].min() >= 600.0
+    assert leg_runs(there)[~(circling[1:] | circling[:-1])].min() >= 600.0
     assert np.degrees(turning_angles(flown.waypoints)).max() < 105.0
     assert np.degrees(np.abs(leg_slopes(there))).max() < 2.5
     assert scenario.terrain is not None

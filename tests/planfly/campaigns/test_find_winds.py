@@ -76,7 +76,7 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
     for direction, boundary in enumerate(found.boundaries):
         assert boundary.estimate == pytest.approx(truth[direction], abs=0.5)
         assert boundary.low <= boundary.estimate <= boundary.high
-        assert not boundary.beyond
+        assert not boundary.is_beyond_search
     assert len(found.flights) <= goal.flights
     assert found.from_deg(3) == 270.0
     assert found.lost == ()

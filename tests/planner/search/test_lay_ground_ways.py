@@ -15,7 +15,7 @@ from planner.plan import Certificate, Plan
 from planner.search.lay_ground_ways import FinalModel, with_ground_ways
 from tests.setups import spec_around
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d
+from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario, scenario_from_spec
 from world.terrain import Terrain, make_gridded_terrain
 
@@ -91,11 +91,11 @@ def test_the_climb_is_flown_from_the_ground_at_seven_tenths_of_the_steepest() ->
     assert climb.gradient <= 0.7 * steepest + 1e-9
     way = np.concatenate([climb.home[None], climb.waypoints, PATH[:1]])
     assert degrees(float(leg_courses(way)[0])) == pytest.approx(degrees(climb.course), abs=1e-6)
-    reached = BASE + np.cumsum(climb.gradient * leg_lengths_2d(way))
+    reached = BASE + np.cumsum(climb.gradient * leg_runs(way))
     assert (reached >= way[1:, 2] - 1e-6).all()
     # Never below the take-off's height, and no first leg that is over before that is reached.
     assert (climb.waypoints[:, 2] >= climb.up).all()
-    assert leg_lengths_2d(way)[0] * climb.gradient > 40.0
+    assert leg_runs(way)[0] * climb.gradient > 40.0
 
 
 @pytest.mark.parametrize("course_deg", [60.0, 120.0, 180.0, 215.0, 270.0, 330.0])
@@ -106,7 +106,7 @@ def test_what_the_take_off_leaves_of_its_leg_holds_the_turn_at_its_end(course_de
     climb = plan.ways.climb
     assert climb is not None
     way = np.concatenate([climb.home[None], climb.waypoints, PATH[:1]])
-    left = leg_lengths_2d(way)[0] - 0.8 * (climb.up - BASE) / climb.gradient
+    left = leg_runs(way)[0] - 0.8 * (climb.up - BASE) / climb.gradient
     turn = abs(math.remainder(float(np.diff(leg_courses(way))[0]), math.tau))
     made = limits()
     radius = made.airspeed**2 / (9.80665 * math.tan(made.max_bank))
@@ -196,7 +196,7 @@ def test_a_high_start_is_climbed_to_in_laps() -> None:
     assert found.ways is not None
     assert found.ways.climb is not None
     way = np.concatenate([found.ways.climb.home[None], found.ways.climb.waypoints, path[:1]])
-    assert leg_lengths_2d(way).sum() * found.ways.climb.gradient >= 800.0 - 1e-6
+    assert leg_runs(way).sum() * found.ways.climb.gradient >= 800.0 - 1e-6
 
 
 # ----------------------------------------------------------------------

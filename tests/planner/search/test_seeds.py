@@ -29,7 +29,7 @@ from planner.seeding.grids import GridRoute
 from tests.instances import random_scenario
 from tests.soak import some
 from world.arrays import Floats
-from world.geometry import leg_courses, leg_lengths_2d
+from world.geometry import leg_courses, leg_runs
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario, load_scenario, scenario_from_spec
 from world.scenario_file import parse_scenario
@@ -241,7 +241,7 @@ def test_traps_are_left_by_short_ways_that_no_straight_frame_holds(
     frame = rotated_frame(scenario.start, scenario.destination)
     assert np.diff(frame.to_frame(plan.waypoints)[:, 0]).min() < -100.0
     shortest, share = TRAPS[name]
-    assert leg_lengths_2d(plan.waypoints).sum() < share * shortest
+    assert leg_runs(plan.waypoints).sum() < share * shortest
 
 
 def test_it_is_not_looked_for_where_a_straight_frame_holds_a_short_path(

@@ -16,7 +16,7 @@ from planfly.campaigns.statistics.failure_modes import (
     failure_fraction,
     fit_mode,
     fit_modes,
-    make_terms,
+    make_regressors,
 )
 from world.arrays import Floats
 
@@ -122,7 +122,7 @@ FIRST, SECOND = np.array([-1.0, 0.6, 1.5, 0.0]), np.array([-1.5, 0.3, -1.0, 0.5]
 def made_flights(count: int, seed: int, link: BinaryLink = PROBIT) -> tuple[np.ndarray, list[frozenset[Hashable]]]:
     """Flights that fail by slope, by threat, by both or not at all, whatever the other does."""
     random = np.random.default_rng(seed)
-    terms = make_terms(random.uniform(2.0, 18.0, count), random.normal(size=(count, 2)))
+    terms = make_regressors(random.uniform(2.0, 18.0, count), random.normal(size=(count, 2)))
     ways: list[set[Hashable]] = [set() for _ in range(count)]
     for name, beta in (("slope", FIRST), ("threat", SECOND)):
         for k in np.flatnonzero(np.log(random.random(count)) < link.log_cdf(terms @ beta)):
@@ -146,7 +146,7 @@ def test_coefficients_are_found(link: BinaryLink) -> None:
 def test_each_way_has_the_margin_that_flights_had_of_it() -> None:
     """Room of the slope, of the slope's law, sharpens the slope's fit and leaves the threat's; another's, neither."""
     random = np.random.default_rng(2)
-    terms = make_terms(random.uniform(2.0, 18.0, 600), random.normal(size=(600, 2)))
+    terms = make_regressors(random.uniform(2.0, 18.0, 600), random.normal(size=(600, 2)))
     slope, threat = (random.normal(size=600) - terms @ beta for beta in (FIRST, SECOND))
     ways: list[frozenset[Hashable]] = [
         frozenset(name for name, margin in (("slope", one), ("threat", other)) if margin < 0.0)
@@ -165,7 +165,7 @@ def test_each_way_has_the_margin_that_flights_had_of_it() -> None:
 def test_a_margin_that_is_not_known_is_not_taken_for_much() -> None:
     """A flight that passed by a scale or more tells that; one of which it is not known, that it passed."""
     random = np.random.default_rng(4)
-    terms = make_terms(random.uniform(2.0, 18.0, 1500), random.normal(size=(1500, 2)))
+    terms = make_regressors(random.uniform(2.0, 18.0, 1500), random.normal(size=(1500, 2)))
     slope = 0.5 * (random.normal(size=1500) - terms @ FIRST)
     ways: list[frozenset[Hashable]] = [frozenset({"slope"} if margin < 0.0 else ()) for margin in slope]
     shares: list[dict[Hashable, float] | None] = [{"slope": margin} if 0.0 <= margin < 1.0 else {} for margin in slope]
@@ -222,7 +222,7 @@ def test_the_share_that_fails_and_its_derivatives(link: BinaryLink) -> None:
     """Of two ways of which either often comes: against the share itself, a little moved."""
     draws, betas = np.random.default_rng(1).normal(size=(4096, 2)), [FIRST, SECOND]
     found = failure_fraction([mode_of(beta, link) for beta in betas], draws, 11.0)
-    flies = np.prod([link.survival(make_terms(11.0, draws) @ beta) for beta in betas], axis=0)
+    flies = np.prod([link.survival(make_regressors(11.0, draws) @ beta) for beta in betas], axis=0)
     assert found.share == pytest.approx(1.0 - flies.mean())
     assert 0.3 < found.share < 0.9
     for which in (0, 1):

@@ -264,7 +264,7 @@ def test_what_always_flies_lies_beyond_what_was_looked_at() -> None:
     fly(direction, 120, lambda *_: frozenset())
     assert max(direction.speeds) == 10.0
     found = direction.boundary()
-    assert found.beyond
+    assert found.is_beyond_search
     assert found.estimate == found.high == 10.0
 
 
@@ -285,7 +285,7 @@ def test_a_boundary_surely_beyond_all_that_was_looked_at_is_settled() -> None:
         direction.add(speed, draw, frozenset() if speed < random.normal(12.0, 1.0) else frozenset({"slope"}))
     assert any(direction.failed_modes)
     found = direction.boundary()
-    assert found.beyond
+    assert found.is_beyond_search
     assert found.width < 0.2
 
 
