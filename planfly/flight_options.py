@@ -40,7 +40,7 @@ class FlightOptions(TypedDict, total=False):
     time are ignored.  None keeps all zones.
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
     guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
-    autopilot: the simulated autopilot: "ardupilot" (in the release of the parameter file, or the newest release),
+    autopilot: the simulated autopilot: "ardupilot" (in the release that saved the parameter file, or else the newest),
     "ardupilot-4.6", "ardupilot-4.7", "px4" (the newest release), "px4-1.16", "px4-1.17" or "planfly".
     nav: "perfect", "rtk" or "gnss".
     """

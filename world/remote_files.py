@@ -114,7 +114,8 @@ class RemoteFile:
                     raise _IncompleteAnswer("the file has changed since the fetch began: try again")
                 begin, end = 0, self.size
             elif answer.headers.get("Content-Range") != f"bytes {begin}-{end - 1}/{self.size}":
-                raise _IncompleteAnswer(f"the server answers with {answer.headers.get('Content-Range')!r}")
+                sent_range = answer.headers.get("Content-Range", "nothing")
+                raise _IncompleteAnswer(f"bytes {begin}-{end - 1} were requested, and the server sent {sent_range}")
             with self.copy.open("r+b") as file:
                 file.seek(begin)
                 position, digest, start_time, is_slow = begin, sha256(), time.monotonic(), False

@@ -53,7 +53,7 @@ class Place(DocumentConfig):
     kind: PlaceKind
     """flight, mission, plan, leg, waypoint, missile, radar, exclusion or inclusion."""
     index: int | None = None
-    """Index of the leg, waypoint, threat or zone, from 0; a fence's zones follow the scenario's. Null for the whole."""
+    """Index of the leg, waypoint, threat or zone, from 0; fence zones follow the scenario's. Null for anything else."""
     item: int | None = None
     """Mission item of a waypoint, or the item that a check names."""
     name: str = ""
@@ -81,7 +81,7 @@ class Change(DocumentConfig):
     """Value that passes, or the step (positive for higher, further and shorter), or the factor."""
     unit: str
     most: float | None = None
-    """Upper end of a range of passing values, of which wanted is the lower end."""
+    """Upper end of the range of passing values; `wanted` is its lower end."""
 
 
 # Changes to make together.  A finding has alternative suggestions, any of which would make it pass.

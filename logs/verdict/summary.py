@@ -25,7 +25,7 @@ _MAX_NAMED_FINDINGS = 4
 # Introductions of the lines on the other levels.
 _LEVEL_TITLES = {
     "geometry": "By geometry only",
-    "airframe": "By the airframe (planfly's guidance, exact navigation)",
+    "airframe": "Airframe alone (planfly's guidance, exact navigation)",
 }
 
 

@@ -18,7 +18,7 @@ LinkQuality = Literal["kept", "weak", "lost", "unknown"]
 # Role and name of the path by the quality of the link; the first is drawn lowest.
 _LOOKS: dict[LinkQuality, tuple[str, str]] = {
     "kept": ("return-safe", "link kept"),
-    "weak": ("return-low", f"less than {WEAK_MARGIN_DB:.0f} dB over the fade margin"),
+    "weak": ("return-low", f"less than {WEAK_MARGIN_DB:.0f} dB above the fade margin"),
     "unknown": ("return-unknown", "terrain below the radio path unknown"),
     "lost": ("return-ground", "below the fade margin"),
 }
@@ -68,7 +68,7 @@ def link_map(setup: FlightSetup, along: LinkAlongPath, antenna: Floats) -> MapCh
 
     def point_text(k: int) -> str:
         """Describe the link margin at point k."""
-        return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB over the fade margin"
+        return f"{along.time[k]:.0f} s: {points.margin[k]:.1f} dB above the fade margin"
 
     layers = path_layers(segments, _LOOKS, position, point_text)
     layers.append(Layer("dots", "station", "waypoint", antenna[:1], antenna[1:2], hover_texts=("station",)))

@@ -184,7 +184,7 @@ def fly(
 
     The aircraft and its control:
     aircraft: a name, or a folder.  airspeed: m/s.  params: a file of the autopilot's parameters.
-    autopilot: the simulated autopilot: "ardupilot" (in the release of the parameter file, or the newest release),
+    autopilot: the simulated autopilot: "ardupilot" (in the release that saved the parameter file, or else the newest),
     "ardupilot-4.6", "ardupilot-4.7", "px4" (the newest release), "px4-1.16", "px4-1.17" or "planfly".
     guidance: planfly's own guidance ("path", "l1", "vector-field") instead of the simulated ArduPlane.
     nav: "perfect", "rtk" or "gnss".

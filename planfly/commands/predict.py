@@ -37,7 +37,7 @@ def add_predict_parser(command_line: LineParser) -> None:
     group.add_argument(
         "--by",
         choices=("controls", "mission"),
-        help="follow the logged controls over windows of 2 s, or fly the mission with the autopilot's model in the"
+        help="follow the logged controls over windows of 2 s, or fly the mission with the simulated autopilot in the"
         " logged wind (default: controls, if the log has them)",
     )
     group.add_argument(

@@ -128,7 +128,7 @@ def add_time_option(group: OptionGroup) -> None:
         "--at",
         metavar="TIME",
         help=(
-            "time of the flight, START or START/END by ISO 8601, as in 2026-05-01T10:00+02:00: zones "
+            "time of the flight, START or START/END in ISO 8601 format, as in 2026-05-01T10:00+02:00: zones "
             "that are not active then are ignored (default: all zones are active)"
         ),
     )
@@ -185,9 +185,9 @@ def add_autopilot_options(parser: CommandParser) -> OptionGroup:
         "--autopilot",
         choices=CHOICES["autopilot"],
         help=(
-            "simulated autopilot: ArduPlane (ardupilot, the default: the release of the parameter file or the newest; "
-            "ardupilot-4.6, ardupilot-4.7), PX4 for fixed wing (px4, the newest release; px4-1.16, px4-1.17), or "
-            "planfly's own guidance (planfly)"
+            "simulated autopilot: ArduPlane (ardupilot, the default: the release that saved the parameter file, or the "
+            "newest; ardupilot-4.6, ardupilot-4.7), PX4 for fixed wing (px4, the newest release; px4-1.16, px4-1.17), "
+            "or planfly's own guidance (planfly)"
         ),
     )
     group.add_argument(

@@ -254,7 +254,7 @@ def _period_texts(applicability: Any, source: str) -> list[str]:
             schedule = entry.get("schedule") or entry.get("dailyPeriod") or [{}]
             periods += [_daily_period(start, end, day_entry) for day_entry in schedule]
         except (AttributeError, KeyError, TypeError, ValueError, OverflowError) as error:
-            allowed = "expected dates and times by ISO 8601, and days MON to SUN or ANY"
+            allowed = "expected dates and times in ISO 8601 format, and days MON to SUN or ANY"
             raise _value_error(source, "", "applicability", allowed) from error
     if any(period == Period() for period in periods):
         return []

@@ -306,7 +306,9 @@ def _check_not_frozen(log: ColumnLog, quantity: str, grid: Floats) -> None:
         flight_time = np.count_nonzero((grid > start) & (grid < end)) * _STEP_S
         if flight_time > limit and not (quantity == "current" and values[firsts[k]] == 0.0):
             hint = "expected a sensor that works; leave its cells empty, or read a part (span_s)"
-            raise _contradiction(log, quantity, f"keeps one value from {start:.6g} to {end:.6g} s, in flight", hint)
+            raise _contradiction(
+                log, quantity, f"is stuck at one value from {start:.6g} to {end:.6g} s, in flight", hint
+            )
 
 
 def _check_pair(log: ColumnLog, pair: _Pair, grid: Floats) -> None:

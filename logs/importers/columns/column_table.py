@@ -128,7 +128,7 @@ class LogTable(_Table):
                 raise ValueError(f"clocks.{name}.align: the other clocks are aligned to this one")
             partners = self.columns.get(clock.align.partner, []) if clock.align is not None else []
             if any(entry.value is None and self.clocks[entry.clock].align is not None for entry in partners):
-                raise ValueError(f"clocks.{name}.align.with: expected a quantity on a clock that is not aligned itself")
+                raise ValueError(f"clocks.{name}.align.with: expected a quantity whose clock has no `align` of its own")
         if self.span_s is not None and not self.span_s[0] < self.span_s[1]:
             raise ValueError(f"span_s: {list(self.span_s)}: expected a start before an end")
         return self

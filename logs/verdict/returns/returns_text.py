@@ -303,8 +303,8 @@ def _range_outcome_text(
             return f"{prefix}flies where the terrain is unknown"
         case "unsure":
             return (
-                f"{prefix}{height_text} by the point mass, but JSBSim's flight of this return, or of a similar"
-                f" return, differs by more than {POINT_MASS_ERROR_M:.0f} m"
+                f"{prefix}{height_text} according to the point-mass model, but this return or a similar one, flown in"
+                f" JSBSim, differs by more than {POINT_MASS_ERROR_M:.0f} m"
             )
     if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: the return begins below the required height)"

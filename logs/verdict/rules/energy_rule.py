@@ -62,9 +62,8 @@ def energy_findings(
         if not geometric and math.isfinite(planned_energy):
             reason += f"; {planned_energy:.1f} Wh by prediction"
         if is_guessed:
-            reason = (
-                f"the battery is guessed: state --battery with the aircraft, or the scenario's battery_wh; {reason}"
-            )
+            remedy = "give --battery when the aircraft is made, or battery_wh in the scenario"
+            reason = f"the battery's capacity is a guess: {remedy}; {reason}"
         elif energy > limit:
             reason += f"; {ENERGY_RESERVE_FRACTION:.0%} must be left"
         elif max_energy > energy:

@@ -152,7 +152,7 @@ def _link_finding(
     facts = []
     if judged.worst >= 0:
         facts = [
-            Fact("least margin over the fade margin", float(points.margin[judged.worst]), "dB"),
+            Fact("smallest margin left after the fade margin", float(points.margin[judged.worst]), "dB"),
             Fact("time below the fade margin", judged.time_below_margin, "s"),
             Fact("greatest distance from the station", float(points.distance.max()), "m"),
             Fact("least clearance in radii of the first Fresnel zone", float(np.nanmin(points.fresnel_clearance)), ""),

@@ -33,13 +33,13 @@ def test_the_map_has_a_line_for_each_quality_and_no_gap() -> None:
     lines = {layer.name: layer for layer in chart.panel.layers if layer.role.startswith("return-")}
     assert list(lines) == [
         "link kept",
-        "less than 6 dB over the fade margin",
+        "less than 6 dB above the fade margin",
         "terrain below the radio path unknown",
         "below the fade margin",
     ]
     # Kept from 0 to the first weak point at 200 m, weak to 300 m, lost to 400 m.
     assert lines["link kept"].y[:3].tolist() == [0.0, 100.0, 200.0]
-    assert lines["less than 6 dB over the fade margin"].y[:2].tolist() == [200.0, 300.0]
+    assert lines["less than 6 dB above the fade margin"].y[:2].tolist() == [200.0, 300.0]
     assert lines["below the fade margin"].y[:2].tolist() == [300.0, 400.0]
 
 

@@ -79,7 +79,11 @@ def said(path: Path, read: Callable[[Path], object] = read_motion) -> str:
             "velocity_east: ve varies opposite to the change of",
         ),
         ('"r", unit = "deg/s"', '"ail", unit = "deg/s"', "yaw_rate: ail does not follow the change of .* check column"),
-        ('"tas", unit = "m/s"', '"tas", unit = "m/s", scale = 0', "airspeed: tas keeps one value from 0 to 239.5 s"),
+        (
+            '"tas", unit = "m/s"',
+            '"tas", unit = "m/s", scale = 0',
+            "airspeed: tas is stuck at one value from 0 to 239.5 s",
+        ),
         ('"tas", unit = "m/s"', '"tas", unit = "km"', "airspeed.unit: km: expected m/s, km/h"),
         (
             '"tas", unit = "m/s"',
@@ -152,9 +156,12 @@ def late(name: str, delay: float) -> np.ndarray:
         ({"vn": np.full(len(TIME), np.nan)}, "columns.velocity_north: vn: holds no numbers"),
         ({"alt": np.full(len(TIME), np.inf)}, "columns.altitude: alt: holds no numbers"),
         # Sensors that freeze, and signals that come late.
-        ({"tas": frozen("tas", 100.0, 130.0)}, "airspeed: tas keeps one value from 100 to 130 s, in flight: .*span_s"),
-        ({"tas": 0.0 * TIME + 18.0}, r"airspeed: tas keeps one value from 0 to 239.5 s, in flight"),
-        ({"r": frozen("r", 50.0, 80.0)}, "yaw_rate: r keeps one value from 50 to 80 s, in flight"),
+        (
+            {"tas": frozen("tas", 100.0, 130.0)},
+            "airspeed: tas is stuck at one value from 100 to 130 s, in flight: .*span_s",
+        ),
+        ({"tas": 0.0 * TIME + 18.0}, r"airspeed: tas is stuck at one value from 0 to 239.5 s, in flight"),
+        ({"r": frozen("r", 50.0, 80.0)}, "yaw_rate: r is stuck at one value from 50 to 80 s, in flight"),
         ({"vn": late("vn", 1.0)}, "velocity_north: vn comes 1 s after the change of latitude: check its clock"),
         ({"lat": late("lat", 2.0)}, "velocity_north: vn comes 2 s before the change of latitude: check its clock"),
     ],
@@ -220,7 +227,7 @@ def test_clocks_that_do_not_correlate_are_refused(tmp_path: Path) -> None:
 def test_a_clock_is_not_aligned_with_its_own_quantity(tmp_path: Path) -> None:
     table = write_motor(tmp_path, shift=0.0)
     table.write_text(table.read_text().replace('with = "throttle"', 'with = "current"'))
-    assert "clocks.motor.align.with: expected a quantity on a clock that is not aligned itself" in said(table)
+    assert "clocks.motor.align.with: expected a quantity whose clock has no `align` of its own" in said(table)
 
 
 def test_clocks_without_a_common_time_are_refused(tmp_path: Path) -> None:

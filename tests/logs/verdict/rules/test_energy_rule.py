@@ -115,7 +115,7 @@ def test_a_guessed_battery_is_not_judged() -> None:
         flown = [judge(setup, fly_path(setup)), judge_geometry(setup)]
         for item in (of(verdict, "energy") for verdict in flown):
             assert (item.ok, item.margin) == (None, None)
-            assert item.reason.startswith("the battery is guessed: state --battery")
+            assert item.reason.startswith("the battery's capacity is a guess: give --battery")
     stated = make_scenario(ROUTE, battery_wh=1.0)
     assert of(judge_geometry(replace(real_setup(table=guess, scenario=stated), battery=1.0)), "energy").ok is False
 

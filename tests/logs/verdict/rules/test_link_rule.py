@@ -44,7 +44,7 @@ def test_an_outage_is_as_long_as_the_leg_beyond_the_range(accepted: float, ok: b
     assert item.limit == pytest.approx(accepted)
     facts = {fact.what: fact.value for fact in item.facts}
     # At its end it is 6003.3 m away: 20 log(6003.3 / 4000) = 3.53 dB too far.
-    assert facts["least margin over the fade margin"] == pytest.approx(-3.53, abs=0.02)
+    assert facts["smallest margin left after the fade margin"] == pytest.approx(-3.53, abs=0.02)
     assert facts["greatest distance from the station"] == pytest.approx(6003.3, abs=0.1)
     flown = of(judge(setup, fly_path(setup)), "link")
     assert flown.ok is ok
