@@ -264,7 +264,7 @@ def fit_parameters(
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
     level: error of the autopilot's level, rad.
     dynamics: True to estimate the moments as well.
-    nominal: refinement of which the values are changed to first order, instead of refining the moments anew.
+    nominal: refinement whose values are changed to first order; None to refine the moments.
     """
     values, covariance = prior_means(), np.diag(np.square(prior_sds()))
     fits: dict[Group, Fit] = {}

@@ -106,10 +106,14 @@ def new_aircraft(
     its class, and a list of unknown properties; mass, span, cruise and stall are required, the others are estimated if
     missing.
 
-    mass: kg.  span: wing span, m.  area: wing area, m^2.
+    mass: kg.
+    span: wing span, m.
+    area: wing area, m^2.
     cruise, stall, top: airspeeds of usual, slowest and fastest level flight, m/s.
-    bank: maximum bank in turns, degrees.  climb: steepest climb at cruise, degrees.
-    battery: voltage and capacity, such as "14.8V,5Ah" or "14.8V,74Wh".  motor: rpm per volt.
+    bank: maximum bank in turns, degrees.
+    climb: steepest climb at cruise, degrees.
+    battery: voltage and capacity, such as "14.8V,5Ah" or "14.8V,74Wh".
+    motor: rpm per volt.
     prop: diameter and pitch in inches, such as "12x6".
     layout: "tail" (default), "wing" for a flying wing with elevons, "vtail" for a V-tail.
     fuel: fuel carried by an aircraft without a battery, kg.
@@ -156,8 +160,8 @@ def describe_aircraft(
 
     name: name of a built-in aircraft, or a folder.
     motor_braking: True lets the motor brake in descents.
-    out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``, in which {name} stands for the aircraft's name;
-    None writes no pictures.
+    out: a folder for ``envelope.png``, ``trims.png`` and ``steps.png``, in whose name {name} stands for the aircraft's
+    name; None writes no pictures.
     overwrite: True replaces existing pictures.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 

@@ -44,7 +44,8 @@ from world.extras import require_extra, requires_extra
 class CampaignFlight:
     """Result of `planfly.campaign_flight`: a flight of a campaign that was flown again, with the same result.
 
-    row: outcome, reason for the end, and failed rules.  log: the file of its flight log.
+    row: outcome, reason for the end, and failed rules.
+    log: the file of the flight log.
     """
 
     row: FlightRow
@@ -56,7 +57,8 @@ def _open_base(
 ) -> CampaignBase:
     """Open the mission of a campaign, and prepare the campaign's folder.
 
-    A scenario is planned if the folder has no plan for it.  Raises PlanflyError; then the folder is not changed.
+    For a scenario a path is planned, unless the folder of a resumed campaign contains the plan.  Raises PlanflyError
+    for bad input; then the folder is not changed.
     """
     campaign_target, flight_options = (
         target if isinstance(target, Plan) else str(target),
@@ -172,7 +174,10 @@ def campaign(
 def _fly_and_summarise(
     base: CampaignBase, goal: Goal, workers: Workers, directory: OutputDirectory, command_line: str, *, keep: bool
 ) -> CampaignResult:
-    """Fly the remaining flights of a campaign, and summarise the campaign.  keep: True keeps its folder and files."""
+    """Fly the remaining flights of a campaign, and summarise the campaign.
+
+    keep: True to write the campaign's files into its folder, which is kept.
+    """
     table_path = directory.folder / CAMPAIGN_DATABASE
     with open_store(base, goal, directory.folder, resume=directory.resume) as store:
         with stage("flying", "flying a campaign") as advance:
@@ -240,7 +245,7 @@ def winds(
     overwrite: bool = False,
     **options: Unpack[WindsOptions],
 ) -> WindsResult:
-    """For each wind direction, find the strongest wind in which a mission is flyable with a given probability.
+    """Find the strongest wind from each direction in which a mission is flyable with a given probability.
 
     target: a built-in scenario's name, a scenario's TOML file, a `Plan`, or a plan.json, .waypoints or .plan file.
     prove: the probability.

@@ -89,7 +89,10 @@ def _parse_box(edges: Sequence[float]) -> Box:
 
 
 def _mission_box(file: Path) -> Box:
-    """Return the smallest box around all items, home, fences and rally points of a mission.  Raises PlanflyError."""
+    """Return the smallest box around all items, home, fences and rally points of a mission.
+
+    Raises PlanflyError for a mission without positions, or with positions too far apart or too close to a pole.
+    """
     mission = read_mission(file)
     positions = [
         (item.lat_deg, item.lon_deg) for item in (*mission.items, *mission.fences, *mission.rally) if item.has_position
@@ -109,7 +112,7 @@ def _mission_box(file: Path) -> Box:
 
 
 def _add_margin_to_box(box: Box, margin: float) -> Box:
-    """Add a margin to every side of a box.  margin: km."""
+    """Return a box with a margin (km) added to every side."""
     lat_margin = margin / _DEGREE_KM
     lon_margin = lat_margin / math.cos(math.radians(min(_MAX_LATITUDE_DEG, max(abs(box.south), abs(box.north)))))
     return Box(box.south - lat_margin, box.west - lon_margin, box.north + lat_margin, box.east + lon_margin)

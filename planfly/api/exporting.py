@@ -74,7 +74,7 @@ class ExportedFiles:
 
 @dataclass(frozen=True, slots=True)
 class _SourceContent:
-    """Content of an input.
+    """Content of the source of an export.
 
     mission: items of the mission, and the threats of a plan as fences.
     name: title of a map.
@@ -163,7 +163,7 @@ def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary
 
 
 def _check_suffix(target: Path) -> None:
-    """Raise MissionError if the suffix of a file is not that of a mission file."""
+    """Raise MissionError if the suffix of a file is not the suffix of a mission file."""
     try:
         mission_kind(target)
     except MissionError:
@@ -200,7 +200,7 @@ def _needs_kml(targets: tuple[Path, ...]) -> bool:
 
 
 def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | None) -> _SourceContent:
-    """Add returns and glides from a few points of the flight or path, if they can be judged."""
+    """Return a source with the returns and glides from a few points of the flight or path, if they can be judged."""
     with stage("flying returns for the map"):
         drawn_returns = return_summary(setup, track).data_for_pictures()
     if drawn_returns is None:
@@ -209,7 +209,10 @@ def _with_returns(source: _SourceContent, setup: FlightSetup, track: Track | Non
 
 
 def _read_log(path: Path, *, needs_returns: bool) -> _SourceContent:
-    """Read a flight log.  needs_returns: True to add returns from a few points of the flight."""
+    """Read a flight log.
+
+    needs_returns: True to add returns from a few points of the flight.
+    """
     log = read_log(path)
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):
@@ -243,7 +246,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
 
 
 def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
-    """Add the zones of the scenario to the fences of the mission."""
+    """Return a source with the zones of its scenario added to the fences of its mission."""
     fence_items, notes = zone_fences(scenario.zones, scenario.origin)
     mission = replace(source.mission, fences=number_items([*source.mission.fences, *fence_items]))
     return replace(source, mission=mission, fence_notes=tuple(notes))

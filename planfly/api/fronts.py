@@ -123,7 +123,10 @@ def table_rows(front: Front) -> list[dict[str, Any]]:
 
 
 def _table_row(number: int, front_plan: FrontPlan) -> dict[str, Any]:
-    """Return a row of the table of a front, keyed by `COLUMNS`.  number: number of the plan, from 1."""
+    """Return a row of the table of a front, keyed by `COLUMNS`.
+
+    number: number of the plan, from 1.
+    """
     values = (
         front_plan.length,
         front_plan.exposure,

@@ -41,7 +41,7 @@ from world.extras import requires_extra
 from world.files import absolute_path
 from world.scenario_tables import names_folder
 
-# Maximum ratio between the stated and the base's mass or span, in either direction, for which the base is a usable
+# Maximum ratio of the stated mass or span to the base's mass or span, or its inverse, for which the base is a usable
 # prior.
 _MAX_SIZE_RATIO = 1.6
 # Allowed range and unit of each stated number, for small aircraft.
@@ -218,7 +218,7 @@ def _check_stated(stated_numbers: dict[str, float], prior: Aircraft) -> None:
 
 
 def _check_distinct(logs: Sequence[MotionLog]) -> None:
-    """Raise LogError if rows of a log are given twice, or if the check log has rows used for identification."""
+    """Raise LogError if two logs, of which the last may be the check log, contain the same rows."""
     for number, log in enumerate(logs):
         for other in logs[:number]:
             overlap = min(log.span[1], other.span[1]) - max(log.span[0], other.span[0])
@@ -272,7 +272,11 @@ def _is_same_output(first: ServoOutput, second: ServoOutput) -> bool:
 
 
 def _report_page(identified: Identified, predicted: PredictedLog, check: str | Path | None, name: str) -> str:
-    """Return the HTML page of an identification.  check: log that was predicted.  name: name of the aircraft."""
+    """Return the HTML page of an identification.
+
+    check: log that was predicted; None if the logs of the identification were predicted.
+    name: name of the aircraft.
+    """
     from logs.views.report.identification import IdentificationFacts, identification_page
 
     numbers = tuple(
@@ -323,7 +327,7 @@ def _performance_intervals(identified: Identified) -> tuple[Interval, Interval, 
 
 
 def without_current(records: Sequence[FlightRecord]) -> tuple[str, ...]:
-    """Return the names of the logs without battery current; empty if none of the logs has it."""
+    """Return the names of the logs without battery current; empty if no log has battery current."""
     lacking = {record.source: None for record in records if not record.has_current}
     return tuple(lacking) if any(record.has_current for record in records) else ()
 

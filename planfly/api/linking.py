@@ -85,9 +85,13 @@ def link(
     what: a `Plan`, or the path of a plan.json, .waypoints or .plan; or a flight, which is a result of `planfly.fly`, a
     flight log or its path, or an autopilot's log.
     A scenario's [link] describes the link; these replace its entries, None keeps them:
-    frequency: MHz.  power: output of the transmitter, dBm.  sensitivity: of the receiver, dBm.
-    station: latitude and longitude of the station's antenna; by default it stands at the mission's home.
-    antenna: height of that antenna above ground, m.  fade_margin: power to keep above the sensitivity, dB.
+    frequency: MHz.
+    power: output power of the transmitter, dBm.
+    sensitivity: sensitivity of the receiver, dBm.
+    station: latitude and longitude of the station's antenna, degrees; by default the antenna stands at the mission's
+    home.
+    antenna: height of the station's antenna above ground, m.
+    fade_margin: required power above the sensitivity, dB.
     out: folder for pictures of the link over time and on the map; None writes none.  overwrite: True replaces them.
     options: see `planfly.judge`.
     Raises a `planfly.PlanflyError` for bad input, and for a scenario without [link] if frequency, power or sensitivity

@@ -47,7 +47,7 @@ class BestFound:
 
 
 class Optimiser:
-    """A search within a box, made by `planfly.optimise`.  `ask` returns points, and `tell` takes their values."""
+    """A search within a box, made by `planfly.optimise`: `ask` returns points, and `tell` takes the points' values."""
 
     def __init__(
         self,
@@ -232,7 +232,12 @@ def _priority_levels(violations: int, objectives: int) -> tuple[Level, ...]:
 
 
 def _parse_columns(name: str, numbers: ArrayLike, row_count: int) -> Floats:
-    """Return numbers as an array (row_count, columns), with infinity in place of NaN.  Raises ValueError."""
+    """Return numbers as an array (row_count, columns), with infinity in place of NaN.
+
+    name: name of the argument, for messages.
+
+    Raises ValueError for another number of rows.
+    """
     columns = np.array(numbers, dtype=np.float64)
     columns = columns[:, np.newaxis] if columns.ndim == 1 else columns
     if columns.ndim != 2 or len(columns) != row_count:

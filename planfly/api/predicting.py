@@ -65,8 +65,10 @@ class Predicted:
     draws: number of flights that make the bands.
     windows: number of judged windows; 0 by the mission.
     start, end: judged part of the log, s.
-    source: file of the log.  aircraft: name of the aircraft.
-    heading: what was predicted, by what, and how often.  lines: description for people, the heading first.
+    source: file of the log.
+    aircraft: name of the aircraft.
+    heading: line with the predicted part of the log, the inputs of the model and the number of flights.
+    lines: description in lines, the heading first.
     files: written files.
     leg_ends: distance along the legs at which each ends, m; empty by the controls.
     """
@@ -137,7 +139,7 @@ def predict(
 
 
 def _check_options_by_controls(options: LogOptions) -> None:
-    """Raise PlanflyError for an option that changes nothing if the logged controls are followed."""
+    """Raise PlanflyError for an option that has no effect if the logged controls are followed."""
     defaults = option_defaults(LogOptions)
     for name, value in options.items():
         if name != "aircraft" and value != defaults[name]:
@@ -226,8 +228,9 @@ def _judged_start(motion: MotionLog, aircraft: Aircraft, records: Sequence[Fligh
 def _used_until(aircraft: Aircraft, sha256: str, start: float) -> float | None:
     """Return the end of the parts of a log from which an aircraft was identified, s; infinity for the whole log.
 
-    start: first time that is read, s of the log; parts that end before it do not count.
-    Return None for a log of which no part was used.  A log is recognised by the bytes of its data.
+    Returns None for a log of which no part was used.  Logs are identified by the hash of their data.
+
+    start: first time that is read, s of the log; parts that end earlier are ignored.
     """
     file = aircraft.folder / "posterior.toml"
     if not file.is_file():

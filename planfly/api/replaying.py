@@ -113,7 +113,10 @@ def replay(
 def _play_frames(
     instruments_shown: Instruments, start_time: float, end_time: float, speed: float, width: int | Callable[[], int]
 ) -> Iterator[tuple[float, list[str]]]:
-    """Yield flight time and instrument lines at `_FRAME_RATE_HZ` until the end.  speed: multiple of real time."""
+    """Yield flight time and instrument lines at `_FRAME_RATE_HZ` until the end.
+
+    speed: multiple of real time.
+    """
     clock, flight_time = RunningClock(), start_time
     while True:
         yield flight_time, instruments_shown.frame(flight_time, width=width() if callable(width) else width)

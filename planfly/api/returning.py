@@ -53,7 +53,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class RemedyTrial:
-    """A remedy and the returns with it, flown by the simulated ArduPlane; the least certain returns also in JSBSim."""
+    """A remedy, and the outcome of the returns after the remedy.
+
+    The returns are flown by the simulated ArduPlane, those closest to a limit also in JSBSim.
+    """
 
     remedy: Remedy
     returns: Returns
@@ -95,7 +98,7 @@ class ReturnsResult:
 
     @property
     def cause_lines(self) -> tuple[str, ...]:
-        """Lines on the failsafes that trigger a return, those that do not, and on how a return ends."""
+        """Lines on the events that trigger a return, on the events that do not, and on the end of a return."""
         return (*describe_causes(self.returns.causes), *describe_landing(self.returns))
 
     @property
