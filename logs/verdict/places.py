@@ -70,6 +70,20 @@ PLAN = Place("plan")
 
 
 @dataclass(frozen=True, slots=True)
+class ItemMove(DocumentConfig):
+    """Move of one mission item."""
+
+    item: int
+    """Number of the mission item."""
+    east: float
+    """Move east, m."""
+    north: float
+    """Move north, m."""
+    up: float
+    """Change of the altitude, m."""
+
+
+@dataclass(frozen=True, slots=True)
 class Change(DocumentConfig):
     """One change of the plan."""
 
@@ -82,6 +96,8 @@ class Change(DocumentConfig):
     unit: str
     most: float | None = None
     """Upper end of the range of passing values; `wanted` is its lower end."""
+    moves: tuple[ItemMove, ...] = field(default=(), compare=False)
+    """Moves of items with which the suggestion passed its trial, stated with its last change; all else is unmoved."""
 
 
 # Changes to make together.  A finding has alternative suggestions, any of which would make it pass.

@@ -29,6 +29,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
 from logs.verdict.places import FLIGHT, Change, Quantity, Suggestion
 from logs.verdict.tolerances import (
+    LEVEL_SLOPE_RAD,
     MIN_EVIDENCE_FLIGHT_S,
     MIN_LEG_LENGTH_M,
     MIN_SUGGESTED_RISE_M,
@@ -39,6 +40,7 @@ from logs.verdict.tolerances import (
     SUGGESTION_SPEED_MARGIN_FRACTION,
     SUGGESTION_SPEED_STEP_MPS,
     SUGGESTION_TRIAL_COUNT,
+    UNDECIDED_FRACTION,
     ZONE_SUGGESTION_TRIAL_COUNT,
 )
 from logs.verdict.trials import first_that_passes
@@ -165,6 +167,10 @@ def suggest_gentler_slope(
     if planned_slope <= limit and finding.flown is not None:
         # The geometry passes and the flight failed: the slope that was flown is the limit.
         limit = min(limit, abs(math.radians(finding.flown)))
+    if source == "aircraft":
+        # Within its uncertainty the aircraft's limit leaves a slope undecided, unless the leg is nearly level.
+        certain_limits = requirements.certain_climb if requirements.slopes[leg] >= 0.0 else requirements.certain_dive
+        limit = min(limit, max(float(certain_limits[leg]), LEVEL_SLOPE_RAD))
     max_slope = limit - SUGGESTION_ANGLE_MARGIN_RAD
     if max_slope <= 0.0 or planned_slope <= max_slope:
         return _gentler_arc(requirements, leg)
@@ -299,11 +305,12 @@ def _true_airspeed_ratio(requirements: RouteRequirements, leg: int) -> float:
 def _level_speeds(requirements: RouteRequirements, altitude: float, current_speed: float, factor: float) -> list[float]:
     """Return the airspeeds to command for level flight at an altitude (m AMSL), m/s, in steps of 0.5 m/s.
 
-    The airspeed nearest to ``current_speed`` comes first.
+    The airspeed nearest to ``current_speed`` comes first.  If the maximum airspeed is uncertain, only airspeeds that
+    are certainly possible are returned.
 
     factor: ratio of true airspeed to commanded airspeed.
     """
-    envelope = requirements.setup.envelope
+    envelope = requirements.setup.envelope.with_margin()
     min_speed, max_speed = envelope.level_speeds(altitude)
     min_speed, max_speed = (
         max(min_speed * MIN_SUGGESTED_SPEED_RATIO, float(envelope.airspeed[0])),
@@ -326,11 +333,11 @@ def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> flo
     """
     course, direction = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
     altitudes = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
-    factor = _true_airspeed_ratio(requirements, leg)
+    factor, certain_limits = _true_airspeed_ratio(requirements, leg), requirements.limits.with_margin()
 
     def can_hold_slope(speed: float) -> bool:
-        """Return True if the aircraft holds the slope at both ends of the leg at a commanded airspeed, m/s."""
-        table = requirements.limits.performance(speed * factor)
+        """Return True if the aircraft certainly holds the slope at both ends of the leg at an airspeed, m/s."""
+        table = certain_limits.performance(speed * factor)
         return min(aircraft_slopes(table, course, altitude)[direction] for altitude in altitudes) >= slope
 
     commanded = float(requirements.setup.demanded_route.airspeed[leg])
@@ -427,13 +434,17 @@ def suggest_using_less_energy(
 ) -> tuple[Suggestion, ...]:
     """Suggest a shorter flight, or a battery or tank with more energy."""
     energy = finding.planned if finding.flown is None else finding.flown
-    if energy is None or finding.limit is None or finding.margin is None or energy <= finding.limit:
+    if energy is None or finding.limit is None or finding.margin is None:
         return ()
     if finding.planned is not None and finding.flown is not None and finding.flown >= requirements.setup.battery:
         # The flight ended with an empty battery or tank; only the prediction covers the whole mission.
         energy = np.fmax(finding.planned, finding.flown)
-    ratio = energy / finding.limit
     envelope = requirements.setup.envelope
+    # The energy of an imported log is measured; other energies may be as large as their upper limit with 95 %.
+    is_measured = requirements.setup.source is not None and finding.flown is not None
+    ratio = energy / finding.limit * math.exp(0.0 if is_measured else UNDECIDED_FRACTION * envelope.power_sd)
+    if ratio <= 1.0:
+        return ()
     storage: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter_flight = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / ratio))), "%")
     larger_storage = Change(storage, FLIGHT, None, math.ceil(100.0 * ratio) / 100.0, "1")

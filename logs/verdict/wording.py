@@ -1,8 +1,9 @@
 """Describe places, changes and disagreements in texts that no code of planfly parses."""
 
 import math
+from collections.abc import Sequence
 
-from logs.verdict.places import Change, DecidingParameter, Disagreement, Place, Suggestion
+from logs.verdict.places import Change, DecidingParameter, Disagreement, ItemMove, Place, Suggestion
 from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from world.threats import threat_label
 
@@ -156,8 +157,50 @@ def suggestion_text(suggestion: Suggestion) -> str:
     'make leg 1 260 m long instead of 150 m and leg 2 260 m long instead of 150 m'
     """
     if all(change.what == "length" for change in suggestion):
-        return "make " + " and ".join(map(_length_text, suggestion))
-    return " and ".join(map(change_text, suggestion))
+        text = "make " + " and ".join(map(_length_text, suggestion))
+    else:
+        text = " and ".join(map(change_text, suggestion))
+    moves = [move for change in suggestion for move in change.moves]
+    return f"{text} (move {moves_text(moves)})" if moves else text
+
+
+def moves_text(moves: Sequence[ItemMove]) -> str:
+    """List moves of items; items that move alike are named together.
+
+    >>> moves_text([ItemMove(8, -1.96, 48.9, 0.0), ItemMove(9, 0.0, 0.0, -6.5), ItemMove(10, 0.0, 0.0, -6.5)])
+    'item 8 48.9 m north and 2 m west, items 9 and 10 6.5 m down'
+    >>> moves_text([ItemMove(item, 40.0, 0.0, 12.0) for item in (3, 4, 5, 9)])
+    'items 3 to 5 and 9 40 m east and 12 m up'
+    """
+    items_by_offset: dict[str, list[int]] = {}
+    for move in sorted(moves, key=lambda move: move.item):
+        sides = (move.north, "north", "south"), (move.east, "east", "west"), (move.up, "up", "down")
+        steps = [
+            f"{round(abs(step), 1):g} m {positive if step > 0.0 else negative}"
+            for step, positive, negative in sides
+            if round(abs(step), 1) > 0.0
+        ]
+        items_by_offset.setdefault(_join_with_and(steps), []).append(move.item)
+    return ", ".join(f"{_items_text(items)} {offset}" for offset, items in items_by_offset.items())
+
+
+def _items_text(items: Sequence[int]) -> str:
+    """Name items in increasing order, three or more consecutive items as a range."""
+    runs: list[list[int]] = []
+    for item in items:
+        if runs and item == runs[-1][-1] + 1:
+            runs[-1].append(item)
+        else:
+            runs.append([item])
+    names = [
+        name for run in runs for name in ([f"{run[0]} to {run[-1]}"] if len(run) > 2 else [str(item) for item in run])
+    ]
+    return f"item{'s' if len(items) > 1 else ''} {_join_with_and(names)}"
+
+
+def _join_with_and(texts: Sequence[str]) -> str:
+    """Join texts by commas, the last one by "and"."""
+    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
 def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:

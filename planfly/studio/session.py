@@ -12,6 +12,7 @@ import numpy as np
 
 from flight.mission import edits
 from flight.mission.items import LANDINGS, Mission
+from logs.verdict.wording import moves_text
 from planfly.flight_options import MissionOptions
 from planfly.named_fences import read_named_fences
 from planfly.studio.autosave import autosave_text, read_autosave, sibling_autosave_path
@@ -338,7 +339,8 @@ class Session:
                 field="suggestion",
             )
         mission = replace(trial.setup.mission, autopilot=self.mission.autopilot)
-        return mission, f"apply a suggestion of {finding.rule}"
+        moves = [move for change in trial.suggestion for move in change.moves]
+        return mission, f"apply a suggestion of {finding.rule}" + (f": move {moves_text(moves)}" if moves else "")
 
     def _apply_flown_suggestion(self, message: Apply) -> tuple[Mission, str]:
         """Return the mission as flown in the trial of a suggestion, and a description of the edit.

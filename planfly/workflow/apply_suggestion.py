@@ -1,21 +1,24 @@
 """Apply a suggestion of a failed finding to the items of the mission.
 
 A suggestion states a change of the path.  This module chooses the items to move, as few as possible and by the minimum
-distance that the finding requires.  Suggestions about the aircraft, such as a larger battery, change no mission.
+distance that the finding requires.  An item of a landing sequence is not moved to a side, because the landing point
+would remain where it is.  Suggestions about the aircraft, such as a larger battery, change no mission.
 """
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
 from flight.mission.edits import movable_indices, move_item, set_airspeed, set_altitude
-from flight.mission.items import LANDINGS, Mission
+from flight.mission.items import LANDINGS, Command, Mission
 from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.measures.violated_legs import violated_legs
-from logs.verdict.places import Change, Suggestion
+from logs.verdict.places import Change, ItemMove, Suggestion
+from logs.verdict.tolerances import MIN_LEG_LENGTH_M
 from logs.verdict.trials import first_that_passes
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from world.arrays import Floats
@@ -54,20 +57,31 @@ def apply_suggestion(
     source = judged_mission.mission.source
     if not can_apply(suggestion):
         raise MissionError(f"{source}: this suggestion cannot be made by moving items", field="suggestion")
-    missions = []
+    missions, errors = [], []
     # Away from a missile, try a single waypoint and all waypoints, because each moved waypoint may fail elsewhere; both
     # in the direction of the nearest point, and each in its own direction, for a path that bends around the missile.
-    is_away_from_missile = any(change.what == "distance" for change in suggestion)
-    for max_moves, radially in product((1, None), (False, True)) if is_away_from_missile else ((None, False),):
-        edited_mission = _EditedMission(context, judged_mission, max_moves, radially)
-        for change in suggestion:
-            _CHANGE_FUNCTIONS[change.what](edited_mission, change, finding)
-        if not edited_mission.is_changed:
-            raise MissionError(
-                f"{source}: the mission has no item at the place of this suggestion: change it by hand",
-                field="suggestion",
-            )
-        missions.append(edited_mission.mission)
+    # To reduce the rise of one leg, try both of its ends, and either of them, because the neighbouring legs may fail.
+    choices = [_Choice()]
+    if any(change.what == "distance" for change in suggestion):
+        choices = [_Choice(max_moves, radially) for max_moves, radially in product((1, None), (False, True))]
+    elif [change.what for change in suggestion] == ["rise"]:
+        choices = [_Choice(end_fraction=end_fraction) for end_fraction in (0.5, 1.0, 0.0)]
+    for choice in choices:
+        edited_mission = _EditedMission(context, judged_mission, choice)
+        try:
+            for change in suggestion:
+                _CHANGE_FUNCTIONS[change.what](edited_mission, change, finding)
+        except MissionError as error:
+            errors.append(error)
+            continue
+        if edited_mission.is_changed:
+            missions.append(edited_mission.mission)
+    if not missions and errors:
+        raise errors[0]
+    if not missions:
+        raise MissionError(
+            f"{source}: the mission has no item at the place of this suggestion: change it by hand", field="suggestion"
+        )
     return (
         min(missions, key=lambda mission: len(context.judge(mission).verdict.failed))
         if len(missions) > 1
@@ -75,13 +89,59 @@ def apply_suggestion(
     )
 
 
+def item_moves(context: MissionContext, before: Mission, after: Mission) -> tuple[ItemMove, ...]:
+    """Return the moves of the items between two missions; () if items were inserted, as for a change of airspeed."""
+    if len(before.items) != len(after.items):
+        return ()
+    offsets = context.item_positions(after) - context.item_positions(before)
+    moves = []
+    for index, (east, north, up) in zip(movable_indices(before), offsets.tolist(), strict=True):
+        old, new = before.items[index], after.items[index]
+        if new.frame == old.frame and math.isfinite(old.alt):
+            # The altitude of a stop above terrain changes with the ground, although its item states the same height.
+            up = new.alt - old.alt
+        if (old.lat_deg, old.lon_deg, old.alt) != (new.lat_deg, new.lon_deg, new.alt):
+            moves.append(ItemMove(old.seq, east, north, up))
+    return tuple(moves)
+
+
+def _approach_indices(mission: Mission) -> frozenset[int]:
+    """Return the indices of the items of landing sequences.
+
+    A sequence begins at its DO_LAND_START, or else with the last position before the landing.
+    """
+    indices: set[int] = set()
+    for landing in (index for index, item in enumerate(mission.items) if item.command in LANDINGS):
+        starts = [index for index in range(landing) if mission.items[index].command == Command.DO_LAND_START]
+        positions = [index for index in movable_indices(mission) if index < landing]
+        indices.update(range((starts or positions or [landing])[-1], landing + 1))
+    return frozenset(indices)
+
+
+@dataclass(frozen=True, slots=True)
+class _Choice:
+    """Choice between the moves that make one suggestion.
+
+    max_moves, radially: greatest number of waypoints to move away from a missile, and True if each moves in its own
+        direction.
+    end_fraction: share of a change of a leg's rise that is made at the leg's end; the rest is made at its start.
+    """
+
+    max_moves: int | None = None
+    radially: bool = False
+    end_fraction: float = 0.5
+
+
 class _EditedMission:
     """Mission whose items are moved one by one."""
 
-    def __init__(self, context: MissionContext, judged: JudgedMission, max_moves: int | None, radially: bool) -> None:
+    def __init__(self, context: MissionContext, judged: JudgedMission, choice: _Choice) -> None:
         self.context, self.mission, self.route = context, judged.mission, judged.setup.route
-        self.requirements, self.max_moves, self.radially = judged.requirements, max_moves, radially
+        self.requirements, self.choice = judged.requirements, choice
         self.is_changed = False
+        self.approach_indices = _approach_indices(judged.mission)
+        # Offset of each moved item so far, east, north and up, m, by its index.
+        self.offsets: dict[int, Floats] = {}
 
     def item_index(self, waypoint: int) -> int | None:
         """Return the index of a waypoint's item in the mission's list, or None if the waypoint has no item."""
@@ -93,11 +153,26 @@ class _EditedMission:
         """Return the waypoints of the route before the change, (w, 3), m."""
         return np.asarray(self.route.waypoints)
 
+    def current_position(self, waypoint: int) -> Floats:
+        """Return a waypoint of the route as moved so far, (3,) m."""
+        index = self.item_index(waypoint)
+        offset = np.zeros(3) if index is None else self.offsets.get(index, np.zeros(3))
+        return np.asarray(self.route.waypoints[waypoint] + offset)
+
     def move_items(self, waypoints: Sequence[int], offset: Floats) -> None:
-        """Move the items of waypoints, except landings, each item once.  offset: east, north and up, m."""
+        """Move the items of waypoints, except landings, each item once.  offset: east, north and up, m.
+
+        Raises MissionError for a move to a side of an item of a landing sequence.
+        """
         for index in dict.fromkeys(self.item_index(waypoint) for waypoint in waypoints):
             if index is None or self.mission.items[index].command in LANDINGS:
                 continue
+            if (offset[0] or offset[1]) and index in self.approach_indices:
+                raise MissionError(
+                    f"{self.mission.source}: this suggestion moves item {self.mission.items[index].seq} of the landing"
+                    " sequence to a side: change it by hand",
+                    field="suggestion",
+                )
             position = self.context.item_positions(self.mission)[movable_indices(self.mission).index(index)]
             if offset[0] or offset[1]:
                 self.mission = move_item(
@@ -105,6 +180,7 @@ class _EditedMission:
                 )
             if offset[2] and math.isfinite(position[2]):
                 self.mission = set_altitude(self.mission, index, float(position[2] + offset[2]), float(position[2]))
+            self.offsets[index] = self.offsets.get(index, np.zeros(3)) + offset
             self.mission, self.is_changed = self.context.with_updated_radii(self.mission, index), True
 
     def end_waypoints(self, legs: Sequence[int]) -> list[int]:
@@ -125,20 +201,24 @@ def _changed_leg(change: Change, route: Route) -> int:
 
 
 def _lengthen_leg(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Lengthen a leg by moving the rest of the route along the leg's course, so that no other leg changes."""
+    """Lengthen a leg by moving only its end along the leg's course."""
     leg = _changed_leg(change, edited.route)
-    course = float(leg_courses(edited.waypoint_positions())[leg])
-    extra_length = change.wanted - (change.current or 0.0)
-    later_waypoints = range(leg + 1, len(edited.waypoint_positions()))
-    edited.move_items(list(later_waypoints), extra_length * np.array([math.sin(course), math.cos(course), 0.0]))
+    start, end = edited.current_position(leg), edited.current_position(leg + 1)
+    step = end[:2] - start[:2]
+    length = math.hypot(*step)
+    if length < MIN_LEG_LENGTH_M:
+        course = float(leg_courses(edited.waypoint_positions())[leg])
+        step, length = np.array([math.sin(course), math.cos(course)]), 1.0
+    target = start[:2] + change.wanted / length * step
+    edited.move_items([leg + 1], np.array([*(target - end[:2]), 0.0]))
 
 
 def _reduce_rise(edited: _EditedMission, change: Change, _finding: Finding) -> None:
-    """Reduce the climb or descent of a leg by moving both ends by half, or one end if the other ends the route."""
-    leg, points = _changed_leg(change, edited.route), edited.waypoint_positions()
-    excess = float(points[leg + 1, 2] - points[leg, 2]) - change.wanted
+    """Reduce the climb or descent of a leg by moving its ends, or one end if the other ends the route."""
+    leg = _changed_leg(change, edited.route)
+    excess = float(edited.current_position(leg + 1)[2] - edited.current_position(leg)[2]) - change.wanted
     is_first, is_last = leg == 0, leg + 1 == edited.route.legs
-    end_fraction = 0.0 if is_last and not is_first else 1.0 if is_first and not is_last else 0.5
+    end_fraction = 0.0 if is_last and not is_first else 1.0 if is_first and not is_last else edited.choice.end_fraction
     edited.move_items([leg], np.array([0.0, 0.0, (1.0 - end_fraction) * excess]))
     edited.move_items([leg + 1], np.array([0.0, 0.0, -end_fraction * excess]))
 
@@ -212,8 +292,8 @@ def _move_away_from_missile(edited: _EditedMission, change: Change, finding: Fin
         return
     offsets = points[:, :2] - missile
     distance = np.hypot(*offsets.T)
-    waypoints = sorted(edited.end_waypoints(legs), key=lambda end: float(distance[end]))[: edited.max_moves]
-    if edited.radially:
+    waypoints = sorted(edited.end_waypoints(legs), key=lambda end: float(distance[end]))[: edited.choice.max_moves]
+    if edited.choice.radially:
         for waypoint in waypoints:
             scale = (change.wanted + _SPHERE_MARGIN_M) / max(float(distance[waypoint]), 1.0)
             edited.move_items([waypoint], np.array([*(scale * offsets[waypoint]), 0.0]))

@@ -1,8 +1,8 @@
 """Trials of the suggestions of a verdict; a suggestion is offered only if its trial passes.
 
 A suggestion is applied to the mission, judged by geometry, and flown if the verdict is on a flight.  It passes if its
-finding is gone and no more findings fail than before.  A step that is too small, such as a height, is enlarged by the
-missing part.
+finding is then ok, no more findings fail than before, and none becomes undecided.  A step that is too small, such as a
+height, is enlarged by the missing part.  A suggestion that passed states the moves of the items.
 """
 
 import math
@@ -13,13 +13,13 @@ from itertools import islice
 
 from flight.mission.items import Mission
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding
+from logs.verdict.findings import Finding, undecided_findings
 from logs.verdict.judge_geometry import judge_geometry, with_passing_suggestions
 from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import Change, Suggestion, TriedSuggestions
 from logs.verdict.trials import first_that_passes
 from logs.verdict.verdict import Verdict
-from planfly.workflow.apply_suggestion import apply_suggestion
+from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
 from planfly.workflow.mission_context import JudgedMission, MissionContext
 from planfly.workflow.trial_flight import AbortCheck, Trial, TrialAborted, max_explaining_flights, never_abort
 from world.errors import PlanflyError
@@ -54,6 +54,14 @@ def is_improved(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) ->
     return len(new_verdict.failed) <= len(old_verdict.failed) and finding_key(finding) not in map(
         finding_key, new_verdict.failed
     )
+
+
+def is_passed(old_verdict: Verdict, new_verdict: Verdict, finding: Finding) -> bool:
+    """Return True if a change improves the verdict, and leaves neither the finding nor a passed finding undecided."""
+    open_before = {finding_key(item) for item in old_verdict.findings if item.ok is not True}
+    undecided_after = set(map(finding_key, undecided_findings(new_verdict.findings)))
+    is_decided = all(item.ok for item in new_verdict.findings if finding_key(item) == finding_key(finding))
+    return is_improved(old_verdict, new_verdict, finding) and is_decided and undecided_after <= open_before
 
 
 @dataclass(frozen=True)
@@ -144,18 +152,20 @@ class SuggestionTrials:
         """Return a passing trial of a suggestion, enlarged if necessary, or None."""
         candidates = islice(self._growing_suggestions(finding, finding.suggestions[number]), _MAX_STEPS)
         passed_candidate = first_that_passes(candidates, lambda candidate: self._passes(finding, candidate[1]))
-        return (
-            None if passed_candidate is None else PassedTrial(finding, passed_candidate[0], passed_candidate[1].setup)
-        )
+        if passed_candidate is None:
+            return None
+        (*first_changes, last_change), trial = passed_candidate
+        moves = item_moves(self.context, self.judged.mission, trial.setup.mission)
+        return PassedTrial(finding, (*first_changes, replace(last_change, moves=moves)), trial.setup)
 
     def _passes(self, finding: Finding, trial: Trial) -> bool:
+        if self.judged.verdict.level != "flown":
+            return is_passed(self._current_trial.geometry_verdict, trial.geometry_verdict, finding)
         if not is_improved(self._current_trial.geometry_verdict, trial.geometry_verdict, finding):
             return False
-        if self.judged.verdict.level != "flown":
-            return True
         if "flight_verdict" not in vars(trial):
             self._flights_left -= 1
-        return self._flights_left >= 0 and is_improved(self.judged.verdict, trial.flight_verdict, finding)
+        return self._flights_left >= 0 and is_passed(self.judged.verdict, trial.flight_verdict, finding)
 
     def _growing_suggestions(self, finding: Finding, suggestion: Suggestion) -> Iterator[tuple[Suggestion, Trial]]:
         """Yield a suggestion and then larger suggestions, each with its trial.
@@ -198,16 +208,20 @@ def _larger_suggestion(finding: Finding, suggestion: Suggestion, verdict: Verdic
     """
     kinds = {change.what for change in suggestion}
     same_finding = [
-        failed_finding for failed_finding in verdict.failed if finding_key(failed_finding) == finding_key(finding)
+        open_finding
+        for open_finding in verdict.findings
+        if open_finding.ok is not True and finding_key(open_finding) == finding_key(finding)
     ]
     same_rule_legs = [
         failed_finding
         for failed_finding in verdict.failed
         if failed_finding.rule == finding.rule and failed_finding.place.kind == "leg"
     ]
-    for failed_finding in (*same_finding, *same_rule_legs):
-        for needed_suggestion in failed_finding.suggestions:
+    for open_finding in (*same_finding, *same_rule_legs):
+        for needed_suggestion in open_finding.suggestions:
             if {change.what for change in needed_suggestion} == kinds:
+                if kinds == {"length"}:
+                    return _merge_lengths(suggestion, needed_suggestion)
                 if kinds <= _STEP_KINDS:
                     return _merge_steps(suggestion, needed_suggestion)
                 if kinds <= _ENERGY_KINDS:
@@ -224,6 +238,15 @@ def _merge_steps(suggestion: Suggestion, needed_steps: Suggestion) -> Suggestion
         previous_step = steps[key].wanted if key in steps else 0.0
         steps[key] = replace(change, wanted=float(round(previous_step + change.wanted)))
     return tuple(steps.values())
+
+
+def _merge_lengths(suggestion: Suggestion, needed_lengths: Suggestion) -> Suggestion:
+    """Return the lengths of legs with those that are still needed; each keeps its present length as ``current``."""
+    lengths = {change.place: change for change in suggestion}
+    for change in needed_lengths:
+        current = lengths[change.place].current if change.place in lengths else change.current
+        lengths[change.place] = replace(change, current=current)
+    return tuple(sorted(lengths.values(), key=lambda change: change.place.index or 0))
 
 
 def _merge_energy_changes(change: Change, needed_change: Change) -> Change:

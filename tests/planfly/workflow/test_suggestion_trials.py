@@ -8,7 +8,7 @@ import pytest
 
 from flight.mission.edits import movable_indices, raise_items
 from flight.simulation.setup import FlightSetup
-from logs.verdict.findings import Finding, make_finding
+from logs.verdict.findings import UNKNOWN_AIRCRAFT, Finding, make_finding
 from logs.verdict.places import Change, Place, Suggestion
 from logs.verdict.verdict import Verdict
 from planfly.workflow import suggestion_trials
@@ -19,6 +19,7 @@ from planfly.workflow.suggestion_trials import (
     MAX_TRIED_FINDINGS,
     SuggestionTrials,
     is_improved,
+    is_passed,
     tried_suggestions,
     with_tried_suggestions,
 )
@@ -48,6 +49,18 @@ def test_a_finding_that_is_gone_is_worth_no_other() -> None:
     assert not is_improved(before, verdict_of(low(2), low(3), low(4)), low(1))
     # An item that was inserted shifts the numbers of those behind it.
     assert not is_improved(before, verdict_of(low(1, item=7)), low(1, item=6))
+
+
+def undecided(leg: int) -> Finding:
+    return make_finding("clearance", Place("leg", leg), ok=None, reason="", check=UNKNOWN_AIRCRAFT)
+
+
+def test_what_is_undecided_has_not_passed() -> None:
+    passed = make_finding("clearance", Place("leg", 3), ok=True, reason="")
+    before = verdict_of(low(1), undecided(2), passed)
+    assert is_passed(before, verdict_of(undecided(2), passed), low(1))
+    assert not is_passed(before, verdict_of(undecided(1), passed), low(1))
+    assert not is_passed(before, verdict_of(undecided(3)), low(1))
 
 
 @dataclass

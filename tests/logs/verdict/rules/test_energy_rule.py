@@ -107,6 +107,18 @@ def test_a_flight_that_ends_with_an_empty_battery_needs_what_is_predicted(flown:
     assert (battery.what, battery.wanted) == ("battery", ratio)
 
 
+def test_a_suggested_battery_holds_the_energy_that_may_be_needed() -> None:
+    """A logarithm with a deviation of 0.25: 1.25 times exp(1.645 x 0.25) is 1.886; 0.8 times it is 1.207."""
+    unsure = replace(load_envelope(AEROSONDE), source="a data sheet", power_sd=0.25)
+    requirements = route_requirements(replace(real_setup(table=unsure), battery=12.5))
+    for energy, ok, ratio in ((12.0, False, 1.89), (7.68, None, 1.21)):
+        finding = make_finding("energy", FLIGHT, ok=ok, reason="", planned=energy, limit=9.6, margin=9.6 - energy)
+        [[_], [battery]] = suggest_using_less_energy(requirements, None, finding)
+        assert battery.wanted == ratio
+    finding = make_finding("energy", FLIGHT, ok=None, reason="", planned=6.3, limit=9.6, margin=3.3)
+    assert suggest_using_less_energy(requirements, None, finding) == ()
+
+
 def test_a_guessed_battery_is_not_judged() -> None:
     guess = replace(load_envelope(AEROSONDE), battery_guessed=True)
     # Neither a battery that would do nor one that would not.

@@ -1,0 +1,92 @@
+"""The moves of items with which a suggestion is tried, applied in the studio, and stated in its text."""
+
+import re
+
+import pytest
+
+from flight.mission.edits import movable_indices
+from flight.mission.items import Command, Frame, Mission, MissionItem
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.places import Change, Place, Suggestion
+from logs.verdict.wording import suggestion_text
+from planfly.workflow.apply_suggestion import apply_suggestion, item_moves
+from planfly.workflow.mission_context import JudgedMission, MissionContext
+from planfly.workflow.suggestion_trials import SuggestionTrials
+from tests.planfly.studio.drafts import drawn_session, world_of
+from world.errors import MissionError
+from world.frames import to_geo
+
+SCENARIO, AIRFRAME = world_of("jacksboro")
+HOME = drawn_session(5, 12).mission.home
+# East and north, m: three waypoints with a leg of 80 m to the north, the approach, and the landing point.
+PLACES = (
+    (0.0, 0.0),
+    (1500.0, 0.0),
+    (1500.0, 80.0),
+    (4000.0, 80.0),
+    (4000.0, 2000.0),
+    (2500.0, 2000.0),
+    (1000.0, 2000.0),
+)
+KINDS = (16, 16, 16, 16, 16, 16, 21)
+
+
+def judged_mission() -> tuple[MissionContext, JudgedMission]:
+    assert SCENARIO.terrain is not None
+    ground = float(SCENARIO.terrain.height(0.0, 0.0))
+    items = []
+    for seq, (kind, (east, north)) in enumerate(zip(KINDS, PLACES, strict=True), 1):
+        lat, lon = (round(float(angle), 7) for angle in to_geo(SCENARIO.origin, east - 2000.0, north - 1000.0))
+        up = float(SCENARIO.terrain.height(east - 2000.0, north - 1000.0)) if kind == 21 else ground + 700.0
+        items.append(MissionItem(seq, kind, int(Frame.GLOBAL), (0.0,) * 4, lat, lon, round(up, 3)))
+    start = MissionItem(5, int(Command.DO_LAND_START), int(Frame.MISSION), (0.0,) * 4, 0.0, 0.0, 0.0)
+    numbered = [*items[:4], start, *items[4:]]
+    mission = Mission(HOME, tuple(MissionItem(k, *vars_of(item)) for k, item in enumerate(numbered, 1)))
+    context = MissionContext.from_setup(
+        MissionContext(SCENARIO, AIRFRAME, 1, drawn_session(5, 12).judged.setup).setup(mission)
+    )
+    return context, context.judge(mission)
+
+
+def vars_of(item: MissionItem) -> tuple[object, ...]:
+    return item.command, item.frame, item.params, item.lat_deg, item.lon_deg, item.alt
+
+
+def longer(leg: int, metres: float) -> tuple[Finding, Suggestion]:
+    place = Place("leg", leg)
+    return make_finding("slope", place, ok=False, reason=""), (Change("length", place, None, metres, "m"),)
+
+
+def test_a_longer_leg_moves_its_end_and_nothing_else() -> None:
+    context, judged = judged_mission()
+    changed = apply_suggestion(context, judged, *longer(1, 200.0))
+    [move] = item_moves(context, judged.mission, changed)
+    assert (move.item, move.up) == (3, 0.0)
+    assert (move.east, move.north) == pytest.approx((0.0, 120.0), abs=0.05)
+
+
+@pytest.mark.parametrize("leg", [3, 4])
+def test_no_item_of_an_approach_is_moved_to_a_side(leg: int) -> None:
+    """The landing point remains, so that the final approach would turn."""
+    context, judged = judged_mission()
+    with pytest.raises(MissionError, match="of the landing sequence to a side"):
+        apply_suggestion(context, judged, *longer(leg, 3000.0))
+
+
+def test_the_text_of_a_suggestion_that_passed_moves_the_items_as_its_trial_did() -> None:
+    context, judged = judged_mission()
+    told = []
+    for trial in SuggestionTrials(context, judged).find_passing():
+        text = suggestion_text(trial.suggestion)
+        after = trial.setup.mission
+        match = re.fullmatch(r".* \(move item (\d+) (.*)\)", text)
+        if match is None:
+            continue
+        step = {side: float(metres) for metres, side in re.findall(r"([\d.]+) m (\w+)", match[2])}
+        index = int(match[1]) - 1
+        row = movable_indices(after).index(index)
+        offset = (context.item_positions(after) - context.item_positions(judged.mission))[row]
+        east, north = step.get("east", 0.0) - step.get("west", 0.0), step.get("north", 0.0) - step.get("south", 0.0)
+        assert (east, north) == pytest.approx(offset[:2].tolist(), abs=0.06)
+        told.append(trial.suggestion[0].what)
+    assert "length" in told
