@@ -353,7 +353,7 @@ def test_what_is_sure_goes_with_the_wind() -> None:
 
 @pytest.mark.parametrize("slope", [14.5, -8.5])
 def test_a_suggestion_passes_with_what_is_sure_of_an_unsure_aircraft(slope: float) -> None:
-    """Within 13.7 less 1.645 x 3 degrees up, or 7.8 less 1.645 down: 8.8 and 6.2; 2,000 m rise or fall 308 m or 216 m."""
+    """Within 13.7 less 1.645 x 3 degrees up, or 7.8 less 1.645 x 1 down: 8.8 and 6.2."""
     setup = make_setup([[e, n, u + 400] for e, n, u in hill(slope)], table=unsure())
     item = of(judge_geometry(setup), "slope", leg(1))
     [rise] = [change.wanted for one in item.suggestions for change in one if change.what == "rise"]
