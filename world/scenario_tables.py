@@ -449,7 +449,7 @@ class FlightTable(ScenarioTable):
     params: file with the autopilot's parameters.
     arduplane_version: release of autopilot = "ardupilot", as releases fly differently; None for the release of the
         parameter file, or otherwise for the newest.
-    px4_version: release of autopilot = "px4"; None for the newest.
+    px4_version: release of autopilot = "px4"; None for the release of the parameter file, or otherwise for the newest.
     guidance: guidance law of "planfly".
     nav: navigation accuracy, see `flight.guidance.navigation_error`.
     """
@@ -508,7 +508,7 @@ class FlightTable(ScenarioTable):
         )
         if autopilot == _ARDUPILOT and self.params is None:
             autopilot_entries["arduplane_version"] = self.arduplane_version or NEWEST_ARDUPLANE
-        if autopilot == _PX4:
+        if autopilot == _PX4 and self.params is None:
             autopilot_entries["px4_version"] = self.px4_version or NEWEST_PX4
         return self.model_copy(update={**autopilot_entries, "nav": nav})
 

@@ -25,6 +25,11 @@ AREA_MARGIN_M = 2000.0
 _MAX_HOME_DISTANCE_M = 100_000.0
 
 
+# Bank limit of a scenario that states none, degrees: the largest of any scenario, so that aircraft and autopilot
+# decide.
+_MAX_BANK_DEG = 60.0
+
+
 @dataclass(frozen=True, slots=True)
 class ImpliedScenario:
     """Scenario built around a mission, and the placed mission."""
@@ -38,7 +43,7 @@ def implied_scenario(
 ) -> ImpliedScenario:
     """Build a scenario around a mission that came without one: an area, no threats and default limits.
 
-    The scenario's ``external`` is True.
+    The scenario's ``external`` is True, and it limits no bank unless ``flight`` states a limit.
 
     terrain_path: an elevation file or a built-in name; None for no terrain.
     flight: the scenario's [flight] table; None for the defaults.
@@ -60,6 +65,8 @@ def implied_scenario(
     (True, [[-2000.0, 2000.0], [-2000.0, 3110.0]])
     """
     flight = flight or FlightTable(aircraft_by_default=True)
+    if "max_bank_deg" not in flight.model_fields_set:
+        flight = flight.model_copy(update={"max_bank_deg": _MAX_BANK_DEG})
     itinerary = make_itinerary(mission)
     origin = mission_origin(mission, itinerary.stops)
     area, flown_box = _area_and_flown_box(mission, itinerary, origin)

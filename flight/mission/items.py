@@ -78,6 +78,11 @@ PLACES = frozenset(
 TAKEOFFS = frozenset({C.NAV_TAKEOFF, C.NAV_VTOL_TAKEOFF})
 # Commands that land.
 LANDINGS = frozenset({C.NAV_LAND, C.NAV_VTOL_LAND})
+# Commands that switch the camera on or off along a leg.
+CAMERA_SWITCHES = frozenset(
+    {C.DO_SET_CAM_TRIGG_DIST, C.IMAGE_START_CAPTURE, C.VIDEO_START_CAPTURE}
+    | {C.IMAGE_STOP_CAPTURE, C.VIDEO_STOP_CAPTURE}
+)
 # Commands that jump to another item.
 JUMPS = frozenset({C.DO_JUMP, C.DO_JUMP_TAG})
 # Navigation commands for other vehicles, with the kind of vehicle. ArduPlane continues with the next command

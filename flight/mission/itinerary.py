@@ -15,6 +15,7 @@ from typing import NamedTuple
 from flight.mission.commands import CAMERA_REASON, MARKS, Command, Treatment, command_support
 from flight.mission.items import (
     AMSL,
+    CAMERA_SWITCHES,
     JUMPS,
     LANDINGS,
     OVER_HOME,
@@ -161,12 +162,14 @@ class Gate(NamedTuple):
 
     item: seq of the mission item.
     airspeed: airspeed until the gate is passed, m/s; NaN for the autopilot's default.
+    switches_camera: True if a command at the gate switches the camera.
     """
 
     item: int
     lat_deg: float
     lon_deg: float
     airspeed: float
+    switches_camera: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -564,6 +567,8 @@ class _ItineraryBuilder:
         elif item.command == Command.CONDITION_GATE:
             self._add_gate(item)
         else:
+            if item.command in CAMERA_SWITCHES and self.gates:
+                self.gates[-1] = self.gates[-1]._replace(switches_camera=True)
             self._note_unsimulated_command(item, as_px4=True)
 
     def _note_unsimulated_command(self, item: MissionItem, *, as_px4: bool) -> None:

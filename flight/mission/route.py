@@ -648,7 +648,7 @@ def _append_return(
 
 
 def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoint]:
-    """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed.
+    """Return the stops of a mission, and the gates between them at which PX4 changes the airspeed or the camera.
 
     Each gate is placed where its plane cuts the leg, because an aircraft on the leg passes the gate there. The plane is
     perpendicular to the line from the gate to the next stop.
@@ -658,11 +658,13 @@ def _insert_gates(placed_mission: PlacedMission, notes: Notes) -> list[RoutePoin
         previous, gates, last_fraction = placed_stops[-1], next_stop.gates, 0.0
         for index, gate in enumerate(gates):
             next_airspeed = gates[index + 1].airspeed if index + 1 < len(gates) else next_stop.px4_airspeed
-            if gate.airspeed == next_airspeed or (math.isnan(gate.airspeed) and math.isnan(next_airspeed)):
+            keeps_airspeed = gate.airspeed == next_airspeed or (math.isnan(gate.airspeed) and math.isnan(next_airspeed))
+            if keeps_airspeed and not gate.switches_camera:
                 continue
             if not all(leg_end.loiter is None and leg_end.command in PLACES for leg_end in (previous, next_stop)):
-                text = "CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"
-                notes.add(text, gate.item)
+                if not keeps_airspeed:
+                    text = "CONDITION_GATE not between waypoints: the speed after it applies from the leg's start"
+                    notes.add(text, gate.item)
                 continue
             start, end = np.array(previous.map_position), np.array(next_stop.map_position)
             fraction = _gate_fraction(start, end, to_map(placed_mission.origin, gate.lat_deg, gate.lon_deg))

@@ -116,7 +116,7 @@ def with_layout(
     items, lines = _survey_items(mission, route, survey), list[_Line]()
     for photo_line, (first, end) in zip(survey.lines, items.lines, strict=True):
         corners, line_items = route.waypoints[photo_line.first : photo_line.last + 1, :2], mission.items[first:end]
-        steps = [item for item in line_items if is_navigation(item.command)]
+        steps = [item for item in line_items if _is_step(item)]
         if _waypoint_of_item(mission, route)[steps[0].seq] != photo_line.first:
             line_items = (_make_waypoint(steps[0], corners[0], origin), *line_items)
         lines.append(_Line(corners, line_items))
@@ -139,6 +139,11 @@ def with_layout(
     return renumber_items(replace(mission, items=tuple(numbered)))
 
 
+def _is_step(item: MissionItem) -> bool:
+    """Return True if an item is a point of a line: a navigation item, or a gate that switches the camera."""
+    return is_navigation(item.command) or item.command == Command.CONDITION_GATE
+
+
 def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItems:
     """Return the indices of a survey's items.
 
@@ -159,12 +164,12 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
         first = max(
             item_index
             for item_index in range(index(line.first), index(line.first + 1))
-            if is_navigation(mission.items[item_index].command)
+            if _is_step(mission.items[item_index])
         )
-        if mission.items[first].command != Command.NAV_WAYPOINT:
+        if mission.items[first].command not in (Command.NAV_WAYPOINT, Command.CONDITION_GATE):
             first += 1
         end_index = index(line.last) + 1
-        while end_index < item_count and not is_navigation(mission.items[end_index].command):
+        while end_index < item_count and not _is_step(mission.items[end_index]):
             end_index += 1
         lines.append((first, end_index))
     first_line, last_line = survey.lines[0], survey.lines[-1]
@@ -173,13 +178,13 @@ def _survey_items(mission: Mission, route: Route, survey: Survey) -> _SurveyItem
 
 
 def _waypoint_of_item(mission: Mission, route: Route) -> dict[int, int]:
-    """Return the waypoint of each navigation item, by number of the item.
+    """Return the waypoint of each navigation item and gate, by number of the item.
 
     An item without a waypoint gets the previous waypoint.
     """
     waypoint_by_seq, waypoint, waypoints = {int(seq): i for i, seq in enumerate(route.items)}, 0, dict[int, int]()
     for item in mission.items:
-        if is_navigation(item.command):
+        if _is_step(item):
             waypoint = waypoint_by_seq.get(item.seq, waypoint)
             waypoints[item.seq] = waypoint
     return waypoints
@@ -231,28 +236,31 @@ def _reverse_line(line: _Line) -> _Line:
 
     Its waypoints are reversed; the commands between them keep their positions in the list.
     """
-    steps = [item for item in line.items if is_navigation(item.command)]
-    reversed_steps = iter(reversed(steps))
-    return _Line(
-        line.corners[::-1], tuple(next(reversed_steps) if is_navigation(item.command) else item for item in line.items)
-    )
+    reversed_steps = iter([item for item in reversed(line.items) if _is_step(item)])
+    return _Line(line.corners[::-1], tuple(next(reversed_steps) if _is_step(item) else item for item in line.items))
 
 
 def _items_with_turn_arounds(line: _Line, turn_around: float, lead_in: float, origin: GeoOrigin) -> list[MissionItem]:
     """Return a line's items with the waypoints of its turn-arounds and of a longer lead-in."""
-    steps = [item for item in line.items if is_navigation(item.command)]
+    steps = [item for item in line.items if _is_step(item)]
     entry_direction, exit_direction = line.corners[0] - line.corners[1], line.corners[-1] - line.corners[-2]
     entry_direction, exit_direction = (
         direction / max(float(np.hypot(*direction)), 1e-9) for direction in (entry_direction, exit_direction)
     )
     leads = sorted({turn_around, max(turn_around, lead_in)} - {0.0}, reverse=True)
     items = [_make_waypoint(steps[0], line.corners[0] + length * entry_direction, origin) for length in leads]
-    items += line.items
-    return (
-        items
-        if turn_around <= 0.0
-        else [*items, _make_waypoint(steps[-1], line.corners[-1] + turn_around * exit_direction, origin)]
-    )
+    if turn_around > 0.0:
+        exit_waypoint = _make_waypoint(steps[-1], line.corners[-1] + turn_around * exit_direction, origin)
+        return [*items, *line.items, exit_waypoint]
+    # Without waypoints beyond them, gates lead to no end of the line.
+    return [*items, *(_as_waypoint(item) for item in line.items)]
+
+
+def _as_waypoint(item: MissionItem) -> MissionItem:
+    """Return a gate as a waypoint at the same position; any other item is unchanged."""
+    if item.command != Command.CONDITION_GATE:
+        return item
+    return replace(item, command=int(Command.NAV_WAYPOINT), params=(0.0, 0.0, 0.0, math.nan))
 
 
 def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin) -> MissionItem:
@@ -264,7 +272,7 @@ def _make_waypoint(model_item: MissionItem, position: Floats, origin: GeoOrigin)
 
 def _lines_on_course(lines: Sequence[_Line], survey: Survey, course: float, origin: GeoOrigin) -> list[_Line] | None:
     """Return lines on another course over the hull of the present lines, or None if that is impossible."""
-    waypoint_items = [item for line in lines for item in line.items if is_navigation(item.command)]
+    waypoint_items = [item for line in lines for item in line.items if _is_step(item)]
     if len({(item.frame, item.alt) for item in waypoint_items}) != 1 or any(_is_bent(line.corners) for line in lines):
         return None
     hull = convex_hull(np.concatenate([line.corners for line in lines]))
@@ -347,7 +355,7 @@ def _move_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -
 
     ends: ends of the other line, (2, 2) m.
     """
-    waypoint_indices = [index for index, item in enumerate(items) if is_navigation(item.command)]
+    waypoint_indices = [index for index, item in enumerate(items) if _is_step(item)]
     moved = []
     for index, item in enumerate(items):
         if index in (waypoint_indices[0], waypoint_indices[-1]):
@@ -356,7 +364,7 @@ def _move_items(items: Sequence[MissionItem], ends: Floats, origin: GeoOrigin) -
                 for value in to_geo(origin, *ends[0 if index == waypoint_indices[0] else 1].tolist())
             )
             item = replace(item, lat_deg=lat, lon_deg=lon)
-        elif is_navigation(item.command):
+        elif _is_step(item):
             continue
         moved.append(item)
     return tuple(moved)

@@ -1,9 +1,9 @@
 """Find surveys in a route, which consist of parallel photo lines and the turn-arounds between them.
 
 No mission item marks a survey: QGroundControl's survey and Mission Planner's grid are waypoints, with items that switch
-the camera between them. Surveys are therefore found by their geometry, whichever program wrote them: three or more
-parallel runs at equal spacing with short links between them. A run is straight, or bends like its neighbors, as in
-QGroundControl's corridor scan.
+the camera between them, for PX4 also at gates (CONDITION_GATE). Surveys are therefore found by their geometry,
+whichever program wrote them: three or more parallel runs at equal spacing with short links between them. A run is
+straight, or bends like its neighbors, as in QGroundControl's corridor scan.
 """
 
 import itertools
@@ -188,8 +188,8 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
     """Return the distance between photos on the leg that begins at each of the route's w waypoints, m: (w,).
 
     The distance is 0 with the camera off, and NaN if the camera is on and no item states the distance. Items after a
-    waypoint's item switch the camera as soon as the waypoint is reached. If several items lead to a waypoint by jumps,
-    the legs to the waypoint are assigned to the waypoint's own item.
+    waypoint's item, or after a gate on the route, switch the camera as soon as the aircraft is there. If several items
+    lead to a waypoint by jumps, the legs to the waypoint are assigned to the waypoint's own item.
     """
     route_items = set(route.items.tolist())
     spacing_after, spacing, waypoint_seq = dict[int, float](), 0.0, None
@@ -197,6 +197,8 @@ def camera_spacing(mission: Mission, route: Route) -> Floats:
         if is_navigation(item.command):
             # An item without a waypoint of its own belongs to the previous waypoint.
             waypoint_seq = item.seq if item.seq in route_items else waypoint_seq
+        elif item.command == Command.CONDITION_GATE and item.seq in route_items:
+            waypoint_seq = item.seq
         elif item.command == Command.DO_SET_CAM_TRIGG_DIST:
             spacing = max(0.0, item.params[0]) if math.isfinite(item.params[0]) else 0.0
         elif item.command in (Command.IMAGE_START_CAPTURE, Command.VIDEO_START_CAPTURE):

@@ -38,7 +38,7 @@ from world.scenario_file import first_fault
 # QGroundControl's ComplexItems as the simple items that they stand for.
 #
 # Surveys and corridor scans contain their items (TransectStyleComplexItem.Items); a fixed-wing landing pattern is three
-# items. Any other kind can be expanded only by its ground station.
+# to seven items. Any other kind can be expanded only by its ground station.
 
 # Kinds of ComplexItem that contain their items.
 _TRANSECT_KINDS = ("survey", "CorridorScan")
@@ -195,9 +195,10 @@ def _last_number(items: list[Any]) -> int:
 
 
 def _landing_items(item: dict[str, Any], source: str, location: str, number: int) -> list[Any]:
-    """Return the items of a landing pattern as QGC sends them: DO_LAND_START, the approach, NAV_LAND.
+    """Return the items of a landing pattern as QGC sends them (`LandingComplexItem::appendMissionItems`).
 
-    The approach is a descending loiter or a waypoint.
+    They are DO_LAND_START, a change of speed, commands that stop photos and video, the approach, and NAV_LAND; the
+    change of speed and the stops are optional. The approach is a descending loiter or a waypoint.
 
     location: location of the item in the file, for messages.
     number: number of the first returned item.
@@ -211,7 +212,10 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
     if approach is None or land is None:
         key = "landCoordinate" if land is None else "landingApproachCoordinate"
         raise MissionError.at(source, f"{location}.{key}", None, _COORDINATE_TEXT, shown="missing")
-    relative = item.get("altitudesAreRelative", True)
+    relative = item.get("altitudesAreRelative")
+    if relative is None:
+        # The first version of the pattern states the altitudes separately; QGC reads different ones as relative.
+        relative = item.get("loiterAltitudeRelative", True) or item.get("landAltitudeRelative", True)
     frame = Frame.GLOBAL_RELATIVE_ALT if relative else Frame.GLOBAL
     radius = item.get("loiterRadius", 0.0)
     if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0.0 <= radius <= 1e5:
@@ -226,8 +230,9 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
     )
     simple_items: list[tuple[int, int, list[Any]]] = [
         (Command.DO_LAND_START, Frame.MISSION, [0.0] * 7),
+        *_landing_commands(item, source, location),
         (approach_command[0], frame, [*approach_command[1], *approach]),
-        (Command.NAV_LAND, frame, [0.0, 0.0, 0.0, None, *land]),
+        (Command.NAV_LAND, frame, [0.0, 0.0, 0.0, 0.0, *land]),
     ]
     return [
         {
@@ -240,6 +245,28 @@ def _landing_items(item: dict[str, Any], source: str, location: str, number: int
         }
         for index, (command, item_frame, params) in enumerate(simple_items)
     ]
+
+
+def _landing_commands(item: dict[str, Any], source: str, location: str) -> list[tuple[int, int, list[Any]]]:
+    """Return the optional commands of a landing pattern, as command, frame and parameters.
+
+    Raises MissionError for an approach speed that is no speed.
+    """
+    commands: list[tuple[int, int, list[Any]]] = []
+    if item.get("useDoChangeSpeed") is True:
+        speed = item.get("finalApproachSpeed")
+        if isinstance(speed, bool) or not isinstance(speed, int | float) or not 0.0 < speed <= _MAX_SPEED_MPS:
+            allowed = f"expected more than 0, up to {_MAX_SPEED_MPS:g} m/s"
+            field = f"{location}.finalApproachSpeed"
+            raise MissionError.at(source, field, speed, allowed, shown=json.dumps(speed)[:40])
+        # An airspeed in whole m/s, and the throttle unchanged.
+        commands.append((Command.DO_CHANGE_SPEED, Frame.MISSION, [0.0, float(int(speed)), -1.0, 0.0, 0.0, 0.0, 0.0]))
+    if item.get("stopTakingPhotos") is True:
+        commands.append((Command.DO_SET_CAM_TRIGG_DIST, Frame.MISSION, [0.0] * 7))
+        commands.append((Command.IMAGE_STOP_CAPTURE, Frame.MISSION, [0.0, *[None] * 6]))
+    if item.get("stopVideoPhotos") is True:
+        commands.append((Command.VIDEO_STOP_CAPTURE, Frame.MISSION, [0.0, *[None] * 6]))
+    return commands
 
 
 def _read_coordinate(item: dict[str, Any], key: str, source: str, location: str) -> list[Any] | None:

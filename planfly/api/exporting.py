@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parameter_files import parameters_text
+from flight.autopilots.parameter_origin import TITLES, read_origin
 from flight.mission.fences import number_items, zone_fences
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
@@ -25,6 +26,7 @@ from logs.views.exports.map_files import (
     track_line,
 )
 from planfly.api.flying import FlownMission
+from planfly.arguments import check_arguments
 from planfly.flight_logs import is_log, loss_text
 from planfly.flight_options import FencePaths, MissionOptions
 from planfly.named_fences import read_named_fences
@@ -35,7 +37,7 @@ from planfly.runtime.stages import stage
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import check_output_file
 from planner.plan import Plan, plan_json
-from world.errors import MissionError, PlanflyError
+from world.errors import MissionError, ParameterError, PlanflyError
 from world.extras import require_extra
 from world.files import temporary_folder, write_atomically
 from world.scenario import Scenario
@@ -105,6 +107,8 @@ def export(
     *files: str | Path,
     fence: FencePaths = (),
     at: str | None = None,
+    autopilot: str | None = None,
+    params: str | Path | None = None,
     overwrite: bool = False,
 ) -> ExportedFiles:
     """Write a plan, a mission or a flight in the formats that the suffixes of the files name.
@@ -114,6 +118,8 @@ def export(
     and returns; for a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
     fence: files of fences or zones in addition to those of the source.
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
+    autopilot, params: the autopilot, or a parameter file of it, that a .plan is for (its firmwareType); None for the
+    autopilot of the source.
     overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
@@ -126,6 +132,7 @@ def export(
     if not files:
         raise PlanflyError("export: expected at least one file", field="files")
     targets = tuple(Path(file) for file in files)
+    named_autopilot = _named_autopilot(autopilot, params)
     with contextlib.ExitStack() as temporary_folders:
         path = _source_path(source, temporary_folders)
         for target in targets:
@@ -133,6 +140,8 @@ def export(
                 _check_suffix(target)
             check_output_file(target, overwrite, path)
         source_content = _read_source(path, targets, {"fence": fence, "at": at})
+        if any(target.suffix.lower() == ".plan" for target in targets):
+            source_content = _with_plan_notes(source_content, named_autopilot, fence)
         contents = [_target_content(source_content, target) for target in targets]
     for target, (data, _) in zip(targets, contents, strict=True):
         write_atomically(target, data)
@@ -145,6 +154,48 @@ def export(
         *([loss] if loss else []),
     )
     return ExportedFiles(targets, notes, tuple(description for _, description in contents), loss)
+
+
+def _named_autopilot(autopilot: str | None, params: str | Path | None) -> str:
+    """Return the name of the autopilot that the user names, or whose parameter file is given; "" for neither.
+
+    Raises ArgumentError for an unknown autopilot, and ParameterError for a file that is clearly of no autopilot.
+    """
+    check_arguments(autopilot=autopilot)
+    if autopilot is not None:
+        return autopilot.partition("-")[0]
+    if params is None:
+        return ""
+    origin = read_origin(Path(params))
+    if not origin.autopilot:
+        allowed = "--autopilot names the autopilot"
+        message = f"{params}: {origin.evidence or 'not clearly the file of one autopilot'}: {allowed}"
+        raise ParameterError(message, file=params, field="autopilot", value=origin.evidence, allowed=allowed)
+    return origin.autopilot
+
+
+def _with_plan_notes(source: _SourceContent, autopilot: str, fence: FencePaths) -> _SourceContent:
+    """Return a source with the autopilot for which a .plan is written, and with notes on what the .plan lacks.
+
+    autopilot: name of the autopilot; "" if the user named none.
+    """
+    notes = list(source.notes)
+    own_autopilot = source.mission.autopilot if source.autopilot is None else source.autopilot.name
+    if not (autopilot or own_autopilot):
+        notes.append(
+            f"{source.mission.source} names no autopilot: the .plan is for {TITLES[DEFAULT_AUTOPILOT]};"
+            " --autopilot or --params names another"
+        )
+    fence_files = [fence] if isinstance(fence, str | Path) else fence
+    notes += [
+        f"{file}: its rally points ({len(rally)}) are not taken: --fence reads only the fence"
+        for file in fence_files
+        if not source.mission.rally
+        and Path(file).suffix.lower() == ".plan"
+        and (rally := read_mission(Path(file)).rally)
+    ]
+    mission = replace(source.mission, autopilot=autopilot or own_autopilot or DEFAULT_AUTOPILOT)
+    return replace(source, mission=mission, notes=tuple(notes))
 
 
 def _source_path(source: FlightLog | FlownMission | Plan | str | Path, temporary_folders: contextlib.ExitStack) -> Path:
@@ -231,7 +282,7 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
     if not (needs_world or is_plan or fences.zones or options["at"] is not None):
         mission = fences.add_to_mission(read_mission(path))
-        return _SourceContent(replace(mission, autopilot=mission.autopilot or DEFAULT_AUTOPILOT), path.stem)
+        return _SourceContent(mission, path.stem)
     # Fence items have no times, so only the zones that are active during the flight are exported.
     setup = open_flight(path, options)
     lines, zones = {"plan": plan_line(setup)}, map_zones(setup)
@@ -255,8 +306,6 @@ def _with_zones(source: _SourceContent, scenario: Scenario) -> _SourceContent:
 def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, str]:
     """Return the content of a target file, and a description of this content."""
     suffix, mission = target.suffix.lower(), source.mission
-    if source.autopilot is not None:
-        mission = replace(mission, autopilot=source.autopilot.name)
     if suffix in LOG_SUFFIXES and source.log is not None:
         return _flight_content(source.log, suffix)
     if suffix in MAP_WRITERS:

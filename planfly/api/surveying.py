@@ -5,9 +5,13 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Unpack
 
+from flight.autopilots.parameter_edits import px4_parameter_text, with_parameter
+from flight.autopilots.parameter_files import MAX_BYTES, parameters_text
+from flight.autopilots.parameter_origin import PX4
+from flight.autopilots.parameter_set import ParameterSet
 from flight.mission.items import Camera, SurveyPlan
 from flight.mission.surveys import Survey
-from flight.mission_files.formats import mission_text
+from flight.mission_files.formats import FileKind, mission_text
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
@@ -41,8 +45,8 @@ from planfly.workflow.crash_safe_log import flight_text
 from planfly.workflow.open_flight import open_flight
 from planfly.workflow.output_paths import SURVEY_FILES, check_output_folder, clean_folder
 from planfly.workflow.pipeline import fly_and_judge
-from world.errors import ArgumentError, LogError, MissionError
-from world.files import write_atomically
+from world.errors import ArgumentError, LogError, MissionError, ParameterError
+from world.files import read_small_file, utf8_text, write_atomically
 from world.scenario import Scenario
 
 
@@ -138,7 +142,8 @@ def survey(
     suggest: True looks for remedies that make all lines of a mission usable.  Remedies are longer turn-arounds, an
     interleave stride (fly every n-th line), another course, an autopilot parameter, and a slower flight; each is tested
     by a flight before it is suggested.
-    out: folder for a picture of the lines, and for the remedies as a .waypoints and a .param; None writes no files.
+    out: folder for a picture of the lines, and for the remedies as a .plan (for a .plan) or a .waypoints, and a .param;
+    None writes no files.
     overwrite: True replaces results in the folder.
     options: options of a mission, see `planfly.fly`.
     Raises a `planfly.PlanflyError` for bad input, and for a mission without a survey.
@@ -227,19 +232,33 @@ def _write_results(result: SurveyResult, out: str | Path | None, overwrite: bool
 
         write_atomically(folder / "survey.png", png_bytes(draw_chart(chart)))
         files.append(folder / "survey.png")
+    # A .plan also holds the fence, the rally points and the autopilot.
+    kind: FileKind = "plan" if Path(result.setup.mission.source).suffix.lower() == ".plan" else "waypoints"
     for remedy in result.remedies:
         if remedy.mission is not result.setup.mission:
-            path = folder / f"{remedy.kind}.waypoints"
-            write_atomically(path, mission_text(remedy.mission, "waypoints"))
+            path = folder / f"{remedy.kind}.{kind}"
+            mission = replace(remedy.mission, autopilot=result.setup.autopilot.name)
+            write_atomically(path, mission_text(mission, kind))
             files.append(path)
         if remedy.kind == "parameter":
-            # Include the parameters of the user's own file, because they were flown, too.
-            parameters = result.setup.autopilot.with_parameters(**{remedy.name: remedy.value}).parameters
-            file_values = {} if parameters is None else parameters.by_origin("file")
             path = folder / "parameter.param"
-            write_atomically(path, "".join(f"{name},{value!r}\n" for name, value in file_values.items()))
+            write_atomically(path, _parameter_file_text(result.setup, remedy))
             files.append(path)
     return replace(result, files=tuple(files))
+
+
+def _parameter_file_text(setup: FlightSetup, remedy: SurveyRemedy) -> str:
+    """Return the user's own parameter file with the parameter of a remedy, or a file with this parameter only."""
+    params, parameters = setup.scenario.flight.params, setup.autopilot.parameters
+    if params is not None and isinstance(parameters, ParameterSet):
+        file, names = Path(params), parameters.table.by_any_name
+        text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
+        definition = parameters.table.by_name[remedy.name]
+        other_names = [name for name, (known, _) in names.items() if known == definition and name != remedy.name]
+        return with_parameter(text, params, remedy.name, remedy.value, other_names)
+    if setup.autopilot.name == PX4:
+        return px4_parameter_text(remedy.name, remedy.value, setup.autopilot.version)
+    return parameters_text({remedy.name: remedy.value}, "suggested by planfly survey")
 
 
 def _with_parallel_lines_as_survey(scenario: Scenario) -> Scenario:

@@ -3,6 +3,7 @@
 import argparse
 
 import planfly
+from planfly.arguments import CHOICES
 from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
@@ -34,6 +35,14 @@ def add_export_parser(command_line: LineParser) -> None:
         "landing and returns);"
         " from a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
     )
+    group = parser.add_group("autopilot of a .plan (default: the source's)")
+    group.add_argument(
+        "--autopilot", choices=CHOICES["autopilot"], help="autopilot that the .plan is for (firmwareType)"
+    )
+    option = group.add_argument(
+        "--params", metavar="FILE", help="parameter file of the autopilot that the .plan is for"
+    )
+    with_completer(option, file_completer("param", "parm", "params"))
     add_fence_option(parser)
     add_time_option(parser)
     add_result_options(parser)
@@ -41,7 +50,15 @@ def add_export_parser(command_line: LineParser) -> None:
 
 def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; return 3 for an incomplete log."""
-    result = planfly.export(args.source, *args.files, fence=args.fence, at=args.at, overwrite=args.overwrite)
+    result = planfly.export(
+        args.source,
+        *args.files,
+        fence=args.fence,
+        at=args.at,
+        autopilot=args.autopilot,
+        params=args.params,
+        overwrite=args.overwrite,
+    )
     print_warnings(result.notes)
     for file, content in zip(result.files, result.contents, strict=True):
         print(f"{_content_kind(file.suffix.lower()):<9} {file} ({content})")

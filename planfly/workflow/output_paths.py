@@ -43,7 +43,11 @@ COMPARE_FILES = (
 # Files of `planfly.survey`, with the picture of the lines, and the missions and parameters of the remedies.
 SURVEY_FILES = (
     "survey.png",
-    *(f"{kind}.waypoints" for kind in ("side", "turn-around", "every", "course", "parameter", "airspeed")),
+    *(
+        f"{remedy}.{kind}"
+        for remedy in ("side", "turn-around", "every", "course", "parameter", "airspeed")
+        for kind in ("waypoints", "plan")
+    ),
     "parameter.param",
 )
 # Maximum number of returns that an autopilot program may fly.

@@ -11,6 +11,7 @@ from typing import NamedTuple, get_args
 
 from flight.autopilots.arduplane.parameters import TABLE
 from flight.autopilots.arduplane.renamed_parameters import NAMES_BEFORE_4_7, NAMES_SINCE_4_7, describe_renamed
+from flight.autopilots.file_releases import FileRelease, choose_for_file, commented_release, nearest_release
 from flight.autopilots.parameter_files import MAX_BYTES, parse_parameters
 from world.errors import ParameterError
 from world.files import read_small_file, utf8_text
@@ -19,21 +20,6 @@ from world.scenario_tables import NEWEST_ARDUPLANE, ArduPlaneVersion
 _VERSIONS: tuple[ArduPlaneVersion, ...] = get_args(ArduPlaneVersion)
 # Release in the name of a program, such as "ArduPlane V4.6.3 (3fc7011a)".
 _PROGRAM_RELEASE = re.compile(r"\bV?(\d{1,2})\.(\d{1,2})")
-# Release in a comment: in the name of the program, or as QGroundControl writes it.
-_COMMENTED_RELEASES = (
-    re.compile(r"^\s*#.*\bArduPlane[ :]+V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE),
-    re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE),
-)
-
-
-class FileRelease(NamedTuple):
-    """ArduPlane release that wrote a parameter file.
-
-    release: such as "4.5".  evidence: the comment or the name that shows it.
-    """
-
-    release: str
-    evidence: str
 
 
 def simulated_release(program: str) -> ArduPlaneVersion:
@@ -46,7 +32,7 @@ def simulated_release(program: str) -> ArduPlaneVersion:
     ['4.6', '4.6', '4.7', '4.7']
     """
     found = _PROGRAM_RELEASE.search(program)
-    return NEWEST_ARDUPLANE if found is None else _simulated_release_for((int(found[1]), int(found[2])))
+    return NEWEST_ARDUPLANE if found is None else nearest_release(_VERSIONS, (int(found[1]), int(found[2])))
 
 
 def release_note(program: str) -> str:
@@ -63,13 +49,6 @@ def release_note(program: str) -> str:
     return f"ArduPlane {int(found[1])}.{int(found[2])} flew it, and {simulated_release(program)} is simulated"
 
 
-def _simulated_release_for(release: tuple[int, int]) -> ArduPlaneVersion:
-    """Return the newest simulated release that is not newer than a release, or the oldest simulated release."""
-    known = [tuple(map(int, version.split("."))) for version in _VERSIONS]
-    older = [version for version, numbers in zip(_VERSIONS, known, strict=True) if numbers <= release]
-    return older[-1] if older else _VERSIONS[0]
-
-
 def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
     r"""Return the release that wrote a parameter file, or None if unknown.
 
@@ -82,9 +61,8 @@ def file_release(text: str, names: Iterable[str]) -> FileRelease | None:
     >>> file_release("", ["ALT_SLOPE_MIN", "GLIDE_SLOPE_MIN"]) is None
     True
     """
-    for pattern in _COMMENTED_RELEASES:
-        if found := pattern.search(text):
-            return FileRelease(f"{int(found[1])}.{int(found[2])}", found[0].lstrip("# \t").removeprefix("NOTE: "))
+    if (commented := commented_release(text, "ArduPlane")) is not None:
+        return commented
     stated = list(names)
     newer = [name for name in stated if name in NAMES_SINCE_4_7]
     older = [name for name in stated if name in NAMES_BEFORE_4_7]
@@ -113,25 +91,7 @@ def choose_release(stated: ArduPlaneVersion | None, params: str | None) -> Relea
     text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
     names = list(parse_parameters(text, params))
     found = file_release(text, names)
-    version, notes = _choose_for_file(stated, found, params)
+    version, notes = choose_for_file(_VERSIONS, stated, found, params, "ArduPlane")
     if renamed := describe_renamed(names, TABLE.by_any_name, version):
         notes = (*notes, f"{params}: {renamed}")
     return ReleaseChoice(version, notes)
-
-
-def _choose_for_file(
-    stated: ArduPlaneVersion | None, found: FileRelease | None, params: str
-) -> tuple[ArduPlaneVersion, tuple[str, ...]]:
-    """Return the release to simulate with a parameter file, and a note if the file is from another release.
-
-    found: release of the file.
-    params: path of the file.
-    """
-    if found is None:
-        return stated or NEWEST_ARDUPLANE, ()
-    major, minor = map(int, found.release.split("."))
-    version = stated or _simulated_release_for((major, minor))
-    if version == found.release:
-        return version, ()
-    because = ", as named" if stated else ", the nearest release that planfly simulates"
-    return version, (f"{params} is of ArduPlane {found.release} ({found.evidence}): {version} flies it{because}",)

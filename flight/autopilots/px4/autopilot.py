@@ -4,12 +4,15 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import ClassVar, NamedTuple, Self
+from pathlib import Path
+from typing import ClassVar, NamedTuple, Self, get_args
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
 from flight.autopilots.autopilot import Autopilot, StoredAutopilot, StoredParameters
+from flight.autopilots.file_releases import choose_for_file, commented_release
 from flight.autopilots.gust_height import height_in_updrafts
+from flight.autopilots.parameter_files import MAX_BYTES
 from flight.autopilots.parts import (
     BatteryFailsafe,
     ControlLaw,
@@ -33,9 +36,13 @@ from flight.mission.items import LANDINGS, Command
 from flight.mission.loiter_circles import LoiterRules
 from flight.mission.return_path import ReturnRules
 from world.arrays import Floats
+from world.errors import ParameterError
+from world.files import read_small_file, utf8_text
 from world.kernels import Record
 from world.scenario_tables import NEWEST_PX4, FlightTable, Navigation, Px4Version
 from world.wind import Turbulence
+
+_VERSIONS: tuple[Px4Version, ...] = get_args(Px4Version)
 
 
 class _NeutralRange(NamedTuple):
@@ -128,6 +135,8 @@ _LEG_FIELDS = (
 class Px4(Autopilot):
     """Simulated PX4 for fixed wing: NPFG along the legs, TECS for altitude and airspeed.
 
+    notes: notes on a parameter file that another release wrote; not stored in a log.
+
     >>> made = Px4(Px4Parameters.defaults("1.16"))
     >>> made.turns.acceptance_radius, Px4(Px4Parameters.defaults("1.17")).turns.acceptance_radius
     (33.6, 10.0)
@@ -136,11 +145,21 @@ class Px4(Autopilot):
     name: ClassVar = "px4"
     title: ClassVar = "PX4"
     parameters: Px4Parameters = field()
+    notes: tuple[str, ...] = field(default=(), compare=False)
 
     @classmethod
     def load(cls, table: FlightTable, aircraft: Aircraft, scenario: str) -> Self:
-        """Return the autopilot with the parameters of the user's file, of the aircraft, and the defaults."""
-        return cls(Px4Parameters.load(aircraft, table.params, table.px4_version or NEWEST_PX4))
+        """Return the autopilot with the parameters of the user's file, of the aircraft, and the defaults.
+
+        Its release is the stated one, or the release that wrote the file, or the newest.
+        """
+        found = None
+        if table.params is not None:
+            file = Path(table.params)
+            text = utf8_text(read_small_file(file, MAX_BYTES, "parameter", ParameterError), file, ParameterError)
+            found = commented_release(text, "PX4")
+        version, notes = choose_for_file(_VERSIONS, table.px4_version, found, str(table.params), "PX4")
+        return cls(Px4Parameters.load(aircraft, table.params, version), notes=notes)
 
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
@@ -206,6 +225,7 @@ class Px4(Autopilot):
             feasibility=FeasibilityLimits(parameters["FW_LND_ANG"], int(parameters["MIS_TKO_LAND_REQ"]), is_stated),
             battery_failsafes=self._battery_failsafes(),
             describe_unsimulated_settings=partial(self.describe_unsimulated_settings, by_program=False),
+            parameter_notes=self.notes,
         )
 
     def describe_unsimulated_settings(self, mission: MissionParts, *, by_program: bool) -> list[str]:

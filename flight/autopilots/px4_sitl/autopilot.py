@@ -22,7 +22,7 @@ class Px4Sitl(ProgramAutopilot, Px4):
     @classmethod
     def restore(cls, stored: StoredAutopilot) -> Self:
         """Return the autopilot with the parameters and the program that a log stores."""
-        return cls(Px4.restore(stored).parameters, stored.program)
+        return cls(Px4.restore(stored).parameters, program=stored.program)
 
     @classmethod
     def accepts_program(cls, program: Path) -> bool:

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flight.mission.items import Camera
+from flight.mission.items import Camera, Command
 from flight.mission.surveys import LineAxis, PhotoLine, Survey, survey_plan
 from flight.simulation.track import ROLL
 from logs.verdict.measures.acceptance import acceptance_condition, position_error
@@ -17,6 +18,7 @@ from logs.verdict.tolerances import (
     MAX_PHOTO_BANK_RAD,
     MAX_PHOTO_COURSE_ERROR_RAD,
     MIN_PHOTO_HEIGHT_ERROR_M,
+    PHOTO_COVERAGE_FRACTION,
     PHOTO_HEIGHT_FRACTION,
     PHOTO_OFFSET_FRACTION,
     PHOTO_STEP_M,
@@ -190,8 +192,9 @@ def _camera_on_rows(
         """Return the first row, from `first_row` on, that reaches or passes a waypoint."""
         point = requirements.points[waypoint]
         distances = np.hypot(*(position[:, :2] - point[:2]).T)
-        # An autopilot that follows a path is at a waypoint where the path passes it.
-        radius = 0.0 if follows_path else acceptance_condition(requirements, waypoint).radius
+        # An autopilot that follows a path is at a waypoint where the path passes it, and a gate is passed at its plane.
+        is_exact = follows_path or _is_gate(requirements, waypoint)
+        radius = 0.0 if is_exact else acceptance_condition(requirements, waypoint).radius
         is_at_waypoint = (distances <= radius) | (along >= axis.project(point[None])[0][0])
         indices = np.flatnonzero(is_at_waypoint & is_ahead & (rows >= first_row))
         return int(indices[0]) if indices.size else len(along)
@@ -199,6 +202,12 @@ def _camera_on_rows(
     on_row = first_row_at(line.camera_on_at) if line.camera_on_at >= 0 else 0
     off_row = first_row_at(line.camera_off_at, on_row) if line.camera_off_at >= 0 else len(along)
     return (rows >= on_row) & (rows <= off_row)
+
+
+def _is_gate(requirements: RouteRequirements, waypoint: int) -> bool:
+    """Return True if a waypoint of the route is a gate (CONDITION_GATE)."""
+    seq = int(requirements.setup.route.items[waypoint])
+    return any(item.seq == seq and item.command == Command.CONDITION_GATE for item in requirements.setup.mission.items)
 
 
 def _line_steps(along: Floats, is_set: Flags, length: float) -> Flags:
@@ -236,7 +245,8 @@ class OverlapMeasure:
         usable.
     line, photo_spacing, height, is_camera_limited: for the minimum front overlap: number of the line from 0, distance
         between photos, m, height above ground, m, and True if the camera cannot take photos at shorter intervals.
-    side: overlap with the photos of the neighbouring line; None if no two usable lines are next to each other.
+    side: overlap with the photos of the neighbouring line, where both lines run side by side; a line of which too much
+        is lost is compared only if no two others are neighbours. None if no two usable lines are next to each other.
     line_pair, line_spacing, side_height: for the minimum side overlap: numbers of both lines, distance between them, m,
         and height above ground, m.
     """
@@ -253,16 +263,24 @@ class OverlapMeasure:
     side_height: float = math.nan
 
 
+# Maximum distance of neighbouring lines, in spacings of the survey: one line may be missing between them.
+_MAX_NEIGHBOR_SPACINGS = 2.5
+# Maximum distance of lines at one lateral position, such as the two parts of a line across a notch, in spacings.
+_SAME_POSITION_SPACINGS = 0.2
+
+
 class _Strip(NamedTuple):
     """Points of a photo line, with a flag for usable points.
 
     positions: (n, 3) m.  heights: above ground, (n,) m.  speeds: over ground, (n,) m/s.
+    is_lost: True if less of the line can be used than a photo line requires.
     """
 
     positions: Floats
     heights: Floats
     speeds: Floats
     is_usable: Flags
+    is_lost: bool = False
 
 
 def measure_overlap(
@@ -276,9 +294,12 @@ def measure_overlap(
     if plan is None or plan.camera is None:
         return None
     strips = [_line_strip(requirements, aligned, survey, line) for line in survey.lines]
-    return _with_front_overlap(
-        _with_side_overlap(OverlapMeasure(plan.camera), requirements, survey, strips), survey, strips
-    )
+    kept_strips = [None if strip is None or strip.is_lost else strip for strip in strips]
+    measure = _with_side_overlap(OverlapMeasure(plan.camera), requirements, survey, kept_strips)
+    if measure.side is None:
+        # No two lines that are not lost are neighbours: the usable parts of lost lines tell more than nothing.
+        measure = _with_side_overlap(measure, requirements, survey, strips)
+    return _with_front_overlap(measure, survey, strips)
 
 
 def _line_strip(
@@ -296,11 +317,14 @@ def _line_strip(
     rows = _line_rows(requirements, aligned, survey, line)
     if rows is None:
         return None
-    is_usable = rows.is_ahead & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
+    meets_conditions = rows.is_ahead
     for is_met in rows.conditions.values():
-        is_usable = is_usable & is_met
+        meets_conditions = meets_conditions & is_met
+    usable_fraction = float(_line_steps(rows.along, meets_conditions, rows.axis.length).mean())
+    is_usable = meets_conditions & (rows.along >= 0.0) & (rows.along <= rows.axis.length)
     speeds = np.hypot(*aligned.track.velocity[rows.track_rows, :2].T)
-    return _Strip(rows.position, heights_over_ground(requirements, rows.position), speeds, is_usable)
+    heights = heights_over_ground(requirements, rows.position)
+    return _Strip(rows.position, heights, speeds, is_usable, is_lost=usable_fraction < PHOTO_COVERAGE_FRACTION)
 
 
 def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequence[_Strip | None]) -> OverlapMeasure:
@@ -329,7 +353,12 @@ def _with_front_overlap(measure: OverlapMeasure, survey: Survey, strips: Sequenc
 def _with_side_overlap(
     measure: OverlapMeasure, requirements: RouteRequirements, survey: Survey, strips: Sequence[_Strip | None]
 ) -> OverlapMeasure:
-    """Return the measure with the minimum overlap between neighbouring lines."""
+    """Return the measure with the minimum overlap between neighbouring lines.
+
+    Lines are neighbours where they run side by side with no line between them, lost or not, and are not much further
+    apart than the survey's spacing: beyond a notch of the area is another part of it.
+    """
+    ranks, offsets = _lateral_ranks(survey), np.array(survey.offsets)
     corners = [requirements.points[line.first : line.last + 1] for line in survey.lines]
     axis = LineAxis(corners[0])
     end_distances = [axis.project(corner_points)[0] for corner_points in corners]
@@ -357,7 +386,11 @@ def _with_side_overlap(
                 )
                 this_line[row] = np.where(is_used, line_values, np.nan)
         gaps, heights = np.abs(this_line[0] - previous_line[0]), 0.5 * (this_line[1] + previous_line[1])
-        overlaps = 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9))
+        previous_numbers = np.nan_to_num(previous_line[3], nan=number).astype(int)
+        is_neighbor = (ranks[number] - ranks[previous_numbers] == 1) & (
+            np.abs(offsets[number] - offsets[previous_numbers]) <= _MAX_NEIGHBOR_SPACINGS * survey.spacing
+        )
+        overlaps = np.where(is_neighbor, 1.0 - gaps / (measure.camera.across * np.maximum(heights, 1e-9)), np.nan)
         if np.isfinite(overlaps).any():
             lowest_index = int(np.nanargmin(overlaps))
             if measure.side is None or overlaps[lowest_index] < measure.side:
@@ -371,3 +404,11 @@ def _with_side_overlap(
                 )
         previous_line[:, on_line] = this_line[:, on_line]
     return measure
+
+
+def _lateral_ranks(survey: Survey) -> NDArray[np.int64]:
+    """Return for each line the number of lateral positions to its left that have a line, (n,)."""
+    order, ranks = np.argsort(survey.offsets), np.zeros(len(survey.lines), dtype=np.int64)
+    gaps = np.diff(np.array(survey.offsets)[order])
+    ranks[order[1:]] = np.cumsum(gaps > _SAME_POSITION_SPACINGS * survey.spacing)
+    return ranks

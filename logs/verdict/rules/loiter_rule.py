@@ -12,6 +12,7 @@ import numpy as np
 
 from flight.mission.itinerary import stated_loiter
 from logs.verdict.findings import UNKNOWN_PATH, Finding, Message, badness, finding_reason, make_finding, message
+from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.circle_reach import end_loiter_hazards, find_hazards
 from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
@@ -297,8 +298,8 @@ def _small_radius_faults(requirements: RouteRequirements, circle: LoiterCircle, 
     """Return a fault if a loiter is smaller than the radius at the bank limit (m)."""
     if circle.radius >= min_radius - LOITER_RADIUS_TOLERANCE_M:
         return []
-    speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
-    need_text = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {min_radius:.0f} m"
+    speed, bank_text = float(requirements.route.airspeed[circle.first]), bank_limit_text(requirements.setup)
+    need_text = f"at {speed:.0f} m/s and {bank_text} the aircraft needs {min_radius:.0f} m"
     if not math.isfinite(min_radius):
         need_text = f"at {speed:.0f} m/s the circle cannot be flown"
     return [message(f"radius {circle.radius:.0f} m; {need_text} in this wind")]

@@ -8,6 +8,7 @@ from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import SHARPEST_FLY_BY_RAD
 from logs.verdict.findings import Fact, Finding, Message, finding_reason, make_finding, message
 from logs.verdict.measures.acceptance import acceptance_condition, negligible_kink
+from logs.verdict.measures.bank_limit import bank_limit_text
 from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
@@ -154,14 +155,14 @@ def _sharp_turn_message(
     turn_text = f"turns {math.degrees(planned_turn):.1f}°"
     if source == "scenario":
         return message(f"{turn_text}, more than the scenario's limit of {math.degrees(limit):.1f}°")
-    speed, bank = float(max(requirements.route.airspeed[i - 1 : i + 1])), math.degrees(requirements.limits.max_bank)
+    speed, bank_text = float(max(requirements.route.airspeed[i - 1 : i + 1])), bank_limit_text(requirements.setup)
     radius = float(requirements.radius[i])
     if not math.isfinite(radius):
         return message(f"{turn_text} where the wind is too strong to hold the course of a leg at {speed:.0f} m/s")
     if requirements.setup.route.arcs[i] > 0.0:
         return message(
             f"circles with radius {radius:.0f} m",
-            f"; at {speed:.0f} m/s and {bank:.0f}° bank the smallest turn radius on these courses"
+            f"; at {speed:.0f} m/s and {bank_text} the smallest turn radius on these courses"
             f" in this wind is {requirements.min_radius[i]:.0f} m",
         )
     length_text = "no leg would be long enough"
@@ -173,7 +174,7 @@ def _sharp_turn_message(
     room_text = f"the neighbouring turns leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
     return message(
         f"{turn_text} between legs of {length_before:.0f} m and {length_after:.0f} m:"
-        f" at {speed:.0f} m/s and {bank:.0f}° bank",
+        f" at {speed:.0f} m/s and {bank_text}",
         f" (radius {radius:.0f} m) {length_text}, and {room_text}",
     )
 

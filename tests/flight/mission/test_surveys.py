@@ -9,7 +9,7 @@ import pytest
 
 from flight.mission import surveys as survey_module
 from flight.mission.items import Command, Mission, SurveyPlan
-from flight.mission.route import Route, make_route
+from flight.mission.route import Route, RouteRules, make_route
 from flight.mission.survey_layout import SurveyLayout, layout_obstacle, min_turn_around, with_layout
 from flight.mission.surveys import LineAxis, Survey, camera_spacing, find_surveys, survey_plan
 from tests.mission_lines import ORIGIN, mission, wp
@@ -315,6 +315,53 @@ def test_the_camera_between_photos() -> None:
     assert camera_spacing(read, route).tolist() == [25.0, 0.0] * 4
     [found] = find_surveys(route, camera_spacing(read, route))
     assert all((line.photo, line.camera_on_at, line.camera_off_at) == (25.0, *line[:2]) for line in found.lines)
+
+
+def gated_grid(photo: float = 25.0, *, in_turns: bool = False) -> tuple[Mission, Route]:
+    """Lines of 800 m that QGroundControl begins and ends with gates, between turn-around waypoints 150 m beyond."""
+    lines: list[str] = []
+    for k, (east, north) in enumerate(grid(count=3, lead=150.0)):
+        is_gate = k % 4 in (1, 2)
+        lines.append(wp(east, north, command=4501 if is_gate else 16, p="0 1 0 0" if is_gate else "0 0 0 0"))
+        if is_gate:
+            lines.append(f"2 206 {photo if k % 4 == 1 or in_turns else 0} 0 1 0 0 0 0")
+    read = mission(*lines, home="36.5 -84.2 0")
+    return read, make_route(read, ORIGIN, None, 15.0, False, rules=RouteRules(reads_as_px4=True))
+
+
+@pytest.mark.parametrize("in_turns", [False, True], ids=["camera off in turns", "camera on in turns"])
+def test_gates_at_which_the_camera_is_switched_end_the_lines(in_turns: bool) -> None:
+    """PX4 flies from one turn-around to the next: the gates at 0 m and 800 m bound 800 m of its 1,100 m."""
+    read, route = gated_grid(in_turns=in_turns)
+    camera = camera_spacing(read, route)
+    [found] = find_surveys(route, camera, [(25.0, 150.0)])
+    assert [(line.first, line.last, line.begins, line.ends) for line in found.lines] == [
+        (1, 2, 0, 3),
+        (5, 6, 4, 7),
+        (9, 10, 8, 11),
+    ]
+    assert [line.photo for line in found.lines] == [25.0] * 3
+    lengths = [math.dist(route.waypoints[line.first, :2], route.waypoints[line.last, :2]) for line in found.lines]
+    assert lengths == pytest.approx([800.0] * 3, abs=0.1)
+    if not in_turns:
+        assert camera.tolist() == [0.0, 25.0, 0.0, 0.0] * 3
+        assert [(line.camera_on_at, line.camera_off_at) for line in found.lines] == [(1, 2), (5, 6), (9, 10)]
+
+
+def test_lines_between_gates_are_laid_out_otherwise() -> None:
+    read, route = gated_grid()
+    [found] = find_surveys(route, camera_spacing(read, route))
+    assert layout_obstacle(read, route, found) == ""
+    made = with_layout(read, route, found, SurveyLayout(200.0, every=2), ORIGIN)
+    assert made is not None
+    assert [item.command for item in made.items] == [16, 4501, 206, 4501, 206, 16] * 3
+    again = make_route(made, ORIGIN, None, 15.0, False, rules=RouteRules(reads_as_px4=True))
+    assert camera_spacing(made, again).tolist() == [0.0, 25.0, 0.0, 0.0] * 3
+    assert again.waypoints[::4, :2] == pytest.approx(np.array([[0, -200], [120, 1000], [60, -200]]), abs=0.1)
+    # Without turn-arounds, gates would lead nowhere.
+    bare = with_layout(read, route, found, SurveyLayout(0.0, every=2), ORIGIN)
+    assert bare is not None
+    assert [item.command for item in bare.items] == [16, 206, 16, 206] * 3
 
 
 def test_where_the_camera_is_switched_lines_are_where_it_is_on() -> None:

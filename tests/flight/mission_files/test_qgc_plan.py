@@ -150,9 +150,52 @@ def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None
     assert not spiral or mission.items[2].params[1] == (120.0 if clockwise else -120.0)
 
 
+PATTERN = {
+    "type": "ComplexItem",
+    "complexItemType": "fwLandingPattern",
+    "landCoordinate": [36.5, -84.2, 0],
+    "landingApproachCoordinate": [36.52, -84.2, 60],
+    "loiterRadius": 120,
+}
+
+
+@pytest.mark.parametrize(
+    ("settings", "commands"),
+    [
+        ({}, [189, 31, 21]),
+        ({"stopTakingPhotos": True, "stopVideoPhotos": False}, [189, 206, 2001, 31, 21]),
+        ({"stopVideoPhotos": True}, [189, 2501, 31, 21]),
+        ({"stopTakingPhotos": True, "stopVideoPhotos": True}, [189, 206, 2001, 2501, 31, 21]),
+        ({"useDoChangeSpeed": False, "finalApproachSpeed": 15}, [189, 31, 21]),
+        (
+            {"useDoChangeSpeed": True, "finalApproachSpeed": 15.9, "stopTakingPhotos": True, "stopVideoPhotos": True},
+            [189, 178, 206, 2001, 2501, 31, 21],
+        ),
+    ],
+)
+def test_a_landing_pattern_stops_the_camera_before_its_approach(settings: dict[str, Any], commands: list[int]) -> None:
+    """The order of QGroundControl's LandingComplexItem::appendMissionItems; later items count on."""
+    last = simple(2 + len(commands), 36.6)
+    mission = parse_mission(plan_with(simple(1, 36.6), PATTERN | settings, last), "a.plan")
+    assert [item.command for item in mission.items] == [16, *commands, 16]
+    assert [item.seq for item in mission.items] == list(range(1, len(commands) + 3))
+    by_command = {item.command: item.params[:3] for item in mission.items}
+    assert by_command.get(206, (0.0, 0.0, 0.0)) == (0.0, 0.0, 0.0)
+    # SPEED_TYPE_AIRSPEED; QGroundControl passes the speed on as a whole number.
+    assert by_command.get(178, (0.0, 15.0, -1.0)) == (0.0, 15.0, -1.0)
+
+
+@pytest.mark.parametrize(("loiter", "land", "frame"), [(True, True, 3), (False, False, 0), (True, False, 3)])
+def test_a_landing_pattern_of_the_first_version_states_its_frames_apart(loiter: bool, land: bool, frame: int) -> None:
+    pattern = PATTERN | {"loiterAltitudeRelative": loiter, "landAltitudeRelative": land}
+    mission = parse_mission(plan_with(simple(1, 36.6), pattern), "a.plan")
+    assert [item.frame for item in mission.items[2:]] == [frame, frame]
+
+
 @pytest.mark.parametrize(
     ("change", "text"),
     [
+        (PATTERN | {"useDoChangeSpeed": True, "finalApproachSpeed": "slow"}, 'finalApproachSpeed: "slow": expected'),
         ({"complexItemType": "StructureScan"}, "'StructureScan'"),
         ({"complexItemType": "fwLandingPattern", "landCoordinate": [1, 2]}, "landCoordinate: \\[1, 2\\]"),
         ({"complexItemType": "fwLandingPattern", "landCoordinate": [46.0, None, 0]}, "landCoordinate: \\[46.0, null"),

@@ -1,5 +1,7 @@
 """``planfly export``: plans, missions and logs in every form."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,7 +13,8 @@ import pytest
 import planfly
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from flight.mission_files.formats import read_mission
+from flight.mission.items import MissionItem
+from flight.mission_files.formats import mission_text, read_mission
 from logs.recording.reader import read_log
 from planfly.api.exporting import judging_parameters_text
 from planfly.cli import main
@@ -156,3 +159,61 @@ def test_only_a_file_with_a_fence_says_what_the_fence_omits(tmp_path: Path) -> N
     for name in ("m.plan", "m.fence"):
         (note,) = planfly.export(plan, tmp_path / name).notes
         assert note.startswith("1 missile sphere became an exclusion circle")
+
+
+WPL_PLACES = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46\t8\t0\t1\n" + "".join(
+    f"{k}\t0\t3\t16\t0\t0\t0\t0\t46.0{k}\t8\t100\t1\n" for k in (1, 2)
+)
+
+
+@pytest.mark.parametrize(
+    ("options", "firmware"),
+    [
+        ([], 3),
+        (["--autopilot", "px4-1.16"], 12),
+        (["--autopilot", "ardupilot"], 3),
+        (["--autopilot", "planfly"], 0),
+        (["--params", "px4.params"], 12),
+        (["--params", "px4.params", "--autopilot", "ardupilot"], 3),
+    ],
+)
+def test_a_plan_file_is_for_the_autopilot_that_is_named(
+    options: list[str],
+    firmware: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """MAV_AUTOPILOT: 3 is ArduPilot, 12 PX4; a .waypoints file names none, which is said if nobody names one."""
+    monkeypatch.chdir(tmp_path)
+    Path("a.waypoints").write_text(WPL_PLACES, encoding="ascii")
+    Path("px4.params").write_text("# Stack: PX4 Pro\n1\t1\tNAV_ACC_RAD\t20\t9\n", encoding="ascii")
+    assert main(["export", "a.waypoints", "a.plan", *options]) == 0
+    assert json.loads(Path("a.plan").read_text())["mission"]["firmwareType"] == firmware
+    note = "a.waypoints names no autopilot: the .plan is for ArduPilot; --autopilot or --params names another"
+    assert (note in capsys.readouterr().err) is not bool(options)
+    # Converted again, it stays what it is.
+    assert main(["export", "a.plan", "b.plan"]) == 0
+    assert json.loads(Path("b.plan").read_text())["mission"]["firmwareType"] == (firmware or 3)
+
+
+def test_rally_points_of_a_plan_are_kept_and_those_of_a_fence_are_not_taken(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("a.waypoints").write_text(WPL_PLACES, encoding="ascii")
+    mission = read_mission(Path("a.waypoints"))
+    corners = [MissionItem(k, 5001, 0, (3.0, 0.0, 0.0, 0.0), *place, 0.0) for k, place in enumerate(CORNERS)]
+    rally = MissionItem(0, 5100, 3, (0.0,) * 4, 46.01, 8.0, 100.0)
+    full = replace(mission, fences=tuple(corners), rally=(rally,), autopilot="px4")
+    Path("full.plan").write_text(mission_text(full, "plan"), encoding="utf-8")
+    assert main(["export", "full.plan", "again.plan"]) == 0
+    again = read_mission(Path("again.plan"))
+    assert (len(again.fences), len(again.rally), again.autopilot) == (3, 1, "px4")
+    assert "rally" not in capsys.readouterr().err
+    assert main(["export", "a.waypoints", "bare.plan", "--fence", "full.plan", "--autopilot", "px4"]) == 0
+    assert "full.plan: its rally points (1) are not taken: --fence reads only the fence" in capsys.readouterr().err
+    assert read_mission(Path("bare.plan")).rally == ()
+
+
+CORNERS = ((45.9, 7.9), (45.9, 8.1), (46.1, 8.0))

@@ -97,11 +97,14 @@ def test_a_parameter_that_would_help_is_written_beside_ones_own(
 
     monkeypatch.setattr(surveying, "survey_remedies", found)
     monkeypatch.chdir(tmp_path)
-    Path("own.param").write_text("NAVL1_PERIOD,15.5\n", encoding="ascii")
+    # With all parameters of the file, flown or not.
+    Path("own.param").write_text("# mine\nNAVL1_PERIOD,15.5\nSERVO1_TRIM,1500\n", encoding="ascii")
     assert main(["survey", str(FIELD_SURVEY), *BY, "--params", "own.param", "--suggest", "--out", "better"]) == 4
     told = "next      planfly survey better/parameter.waypoints --params better/parameter.param with the same options"
     assert told in capsys.readouterr().out
-    assert Path("better/parameter.param").read_text(encoding="ascii") == "NAVL1_PERIOD,15.5\nROLL_LIMIT_DEG,47.0\n"
+    assert Path("better/parameter.param").read_text(encoding="ascii") == (
+        "# mine\nNAVL1_PERIOD,15.5\nSERVO1_TRIM,1500\nROLL_LIMIT_DEG,47\n"
+    )
     assert len(Path("better/parameter.waypoints").read_text(encoding="ascii").splitlines()) == 19
 
 

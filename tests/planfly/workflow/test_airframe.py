@@ -6,9 +6,13 @@ from typing import Any
 
 import pytest
 
+from flight.mission.implied_scenario import implied_scenario
 from planfly.workflow.airframe import choose_seed, load_airframe, tightened_airframe
+from tests.mission_lines import mission, wp
 from tests.setups import small_scenario
 from world.errors import ScenarioError
+from world.scenario import with_flight
+from world.scenario_tables import FlightTable
 
 
 def test_the_scenario_goes_before_the_aircrafts_own_numbers() -> None:
@@ -20,6 +24,20 @@ def test_the_scenario_goes_before_the_aircrafts_own_numbers() -> None:
     given = load_airframe(small_scenario(flight=table))
     assert (given.airspeed, given.battery) == (22.0, 42.0)
     assert given.max_bank == pytest.approx(math.radians(21.0))
+
+
+def test_without_a_scenario_aircraft_and_autopilot_limit_the_bank(tmp_path: Path) -> None:
+    """An X8 banks 35 degrees, and nobody else sets a limit; 30 is the default of a scenario's file."""
+    file = tmp_path / "mine.params"
+    world = implied_scenario(mission(wp(0, 0), wp(0, 900), wp(0, 1800)), None).scenario
+    for roll_limit, bank in ((45.0, 35.0), (33.0, 33.0)):
+        file.write_text(f"FW_R_LIM {roll_limit}\nNPFG_PERIOD 10\n", encoding="utf-8")
+        own = load_airframe(with_flight(world, aircraft="x8", autopilot="px4", params=str(file)))
+        assert math.degrees(own.max_bank) == pytest.approx(bank)
+    stated = FlightTable(aircraft="x8", max_bank_deg=25.0)
+    limited = implied_scenario(mission(wp(0, 0), wp(0, 900)), None, stated).scenario
+    assert math.degrees(load_airframe(limited).max_bank) == pytest.approx(25.0)
+    assert math.degrees(load_airframe(small_scenario(flight={"aircraft": "x8"})).max_bank) == pytest.approx(30.0)
 
 
 def test_a_parameter_files_cruise_speed_goes_before_the_aircrafts(tmp_path: Path) -> None:

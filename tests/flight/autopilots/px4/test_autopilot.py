@@ -47,6 +47,36 @@ def test_parameters_alone_are_of_the_autopilot_that_the_scenario_names(aerosonde
     assert (made.parameters["NAV_ACC_RAD"], made.parameters.version) == (40.0, "1.16")
 
 
+NEAREST = "the nearest release that planfly simulates"
+
+
+@pytest.mark.parametrize(
+    ("version", "named", "flown", "note"),
+    [
+        ("1.16.0 ", None, "1.16", ""),
+        ("1.16.1 stable", None, "1.16", ""),
+        ("1.17.0", None, "1.17", ""),
+        ("1.15.4 stable", None, "1.16", f"is of PX4 1.15 (Version: 1.15): 1.16 flies it, {NEAREST}"),
+        ("1.18.0 dev", None, "1.17", f"is of PX4 1.18 (Version: 1.18): 1.17 flies it, {NEAREST}"),
+        ("1.16.0", "1.17", "1.17", "is of PX4 1.16 (Version: 1.16): 1.17 flies it, as named"),
+        ("unknown", None, "1.17", ""),
+    ],
+)
+def test_the_head_of_a_parameter_file_selects_the_release(
+    version: str, named: Px4Version | None, flown: str, note: str, aerosonde: Aircraft, tmp_path: Path
+) -> None:
+    """As QGroundControl writes it."""
+    file = tmp_path / "mine.params"
+    head = f"# Onboard parameters for Vehicle 1\n#\n# Stack: PX4 Pro\n# Vehicle: Fixed Wing\n# Version: {version}\n"
+    file.write_text(f"{head}1\t1\tNAV_ACC_RAD\t20\t9\n", encoding="utf-8")
+    scenario = with_flight(load_scenario("tight"), autopilot="px4", params=str(file), px4_version=named)
+    made = load_autopilot(scenario, aerosonde)
+    assert made.version == flown
+    assert made.checks.parameter_notes == ((f"{file} {note}",) if note else ())
+    # A plan states the release only if the file does not decide it.
+    assert scenario.flight.with_stated_defaults().px4_version == named
+
+
 def test_it_turns_earlier_in_thin_air_up_to_1_16(aerosonde: Aircraft) -> None:
     older, newer = (Px4(Px4Parameters.load(aerosonde, None, version)) for version in ("1.16", "1.17"))
     # 2.24 s of the true airspeed, which at 2,000 m is 1.1029 of the equivalent one (ISO 2533: 1.0066 kg/m^3).

@@ -137,7 +137,7 @@ def test_a_circle_that_a_steep_roll_limit_holds_is_not_flown_wider() -> None:
         assert item.ok is False
         assert not verdict.flyable
         assert "flown wider" not in item.reason
-        assert f"30° bank the aircraft needs {radius_at(30.0):.0f} m" in item.reason
+        assert f"the aircraft's bank limit of 30° the aircraft needs {radius_at(30.0):.0f} m" in item.reason
 
 
 def test_five_degrees_of_bank_more_are_the_tolerance_of_bank() -> None:
@@ -152,7 +152,7 @@ def test_a_stated_circle_needs_the_autopilots_own_bank() -> None:
     item = of(verdict, "loiter")
     assert item.ok is False
     assert item.limit == pytest.approx(radius_at(20.0), rel=0.002)
-    assert "20° bank" in item.reason
+    assert "ArduPlane's bank limit of 20°" in item.reason
 
 
 def judged_with(setup: FlightSetup, item: str, **parameters: float) -> Verdict:

@@ -11,13 +11,16 @@ import pytest
 
 from flight.autopilots.arduplane.autopilot import ArduPlane
 from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Camera, SurveyPlan
+from flight.mission.route import RouteRules, make_route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.verdict import Verdict
 from tests.logs.verdict.judging import failing, judge, leg
-from tests.mission_lines import setup_of, wp
+from tests.mission_lines import ORIGIN, setup_of, wp
 from tests.synthetic import bank_radius, fly_path, make_setup
 
 LENGTH, APART, LEAD, UP = 1000.0, 200.0, 300.0, 100.0
@@ -282,6 +285,64 @@ def test_only_photos_that_can_be_used_overlap() -> None:
         judge(setup, fly_path(setup, radius=FITS, across=lambda s: np.where(s < LEAD + 0.5 * LENGTH, -80.0, 0.0)))
     )
     assert side["side overlap"].flown == pytest.approx(60.0, abs=0.3)
+
+
+def test_a_lost_line_is_not_compared() -> None:
+    """The first line loses its first 100 m of 1,000 m, and is 49 m off on the rest: only the others are compared."""
+    setup = photographed()
+    left = lambda s: np.where(s < 2.0 * LEAD + LENGTH, -45.0, 0.0) + np.where(s < LEAD + 100.0, -35.0, 0.0)  # noqa: E731
+    verdict = judge(setup, fly_path(setup, radius=FITS, across=left))
+    assert photo_lines(verdict)[0].ok is False
+    assert overlaps(verdict)["side overlap"].flown == pytest.approx(60.0, abs=0.3)
+
+
+def in_order(*strips: tuple[float, float, float]) -> FlightSetup:
+    """Lines at an east position from one north position to another, alternately there and back, with CAMERA."""
+    items = []
+    for k, (east, south, north) in enumerate(strips):
+        along = [south - LEAD, south, north, north + LEAD]
+        for corner, place in enumerate(along if k % 2 == 0 else reversed(along)):
+            items.append(wp(east, place, 100.0))
+            if corner in (1, 2):
+                items.append(f"2 206 {50 if corner == 1 else 0} 0 1 0 0 0 0")
+    setup = setup_of(*items, home="36.5 -84.2 100")
+    return replace(setup, mission=replace(setup.mission, survey_plans=(SurveyPlan(50.0, LEAD, CAMERA),)))
+
+
+def test_lines_on_both_sides_of_a_notch_are_no_neighbors() -> None:
+    """Lines 3 and 4 begin 600 m further north: south of them lines 2 and 5 are 600 m apart, beside a notch."""
+    setup = in_order(
+        *((0.0, 0.0, LENGTH), (200.0, 0.0, LENGTH), (400.0, 600.0, LENGTH), (600.0, 600.0, LENGTH)),
+        *((800.0, 0.0, LENGTH), (1000.0, 0.0, LENGTH)),
+    )
+    assert overlaps(judge_geometry(setup))["side overlap"].planned == pytest.approx(60.0, abs=0.3)
+
+
+def test_a_missing_line_is_a_gap() -> None:
+    """400 m without a line between lines 3 and 4: photos of 500 m overlap by a fifth."""
+    strips = [(east, 0.0, LENGTH) for east in (0.0, 200.0, 400.0, 800.0, 1000.0, 1200.0)]
+    side = overlaps(judge_geometry(in_order(*strips)))["side overlap"]
+    assert side.planned == pytest.approx(20.0, abs=0.3)
+    assert "lines 3 and 4: 400 m apart" in side.reason
+
+
+def test_a_gate_switches_the_camera_at_its_plane() -> None:
+    """PX4 counts a waypoint as reached within NAV_ACC_RAD, and a gate where it passes it: no photo is missed."""
+    items = []
+    for k, (east, north, _) in enumerate(lines()):
+        is_gate = k % 4 in (1, 2)
+        items.append(wp(east, north, 100.0, command=4501 if is_gate else 16))
+        if is_gate:
+            items.append(f"2 206 {50 if k % 4 == 1 else 0} 0 1 0 0 0 0")
+    setup = setup_of(*items, home="36.5 -84.2 100")
+    law = Px4(Px4Parameters.defaults("1.17")).with_parameters(NAV_ACC_RAD=90.0)
+    route = make_route(
+        setup.mission, ORIGIN, setup.scenario.terrain, 25.0, False, setup.limits, rules=RouteRules(reads_as_px4=True)
+    )
+    setup = replace(setup, route=route, autopilot=law, nav="perfect")
+    first = photo_lines(judge(setup, fly_path(setup, radius=FITS)))[0]
+    assert first.flown == pytest.approx(100.0, abs=0.3)
+    assert "photo line 1 of 3 (items 2 to 4): 100 % of its 1000 m can be used" in first.reason
 
 
 def test_lines_that_bend_are_measured_along_their_bends() -> None:

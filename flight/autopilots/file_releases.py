@@ -1,0 +1,74 @@
+"""Find the release of an autopilot in the comments of a parameter file, and choose the release to simulate."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
+
+_Version = TypeVar("_Version", bound=str)
+
+
+class FileRelease(NamedTuple):
+    """Release of the autopilot that wrote a parameter file.
+
+    release: such as "4.5".  evidence: the comment or the name that shows it.
+    """
+
+    release: str
+    evidence: str
+
+
+# Release in a comment as QGroundControl writes it.
+_QGC_COMMENT = re.compile(r"^\s*#+\s*version\s*:\s*V?(\d{1,2})\.(\d{1,2})", re.IGNORECASE | re.MULTILINE)
+
+
+def commented_release(text: str, program: str) -> FileRelease | None:
+    r"""Return the release in the comments of a parameter file, or None.
+
+    program: name of the program, after which a comment may state the release.
+
+    >>> commented_release("# Stack: PX4 Pro\n# Version: 1.15.4 stable\n", "PX4")
+    FileRelease(release='1.15', evidence='Version: 1.15')
+    >>> commented_release("#NOTE: ArduPlane V4.5.7\n", "ArduPlane")
+    FileRelease(release='4.5', evidence='ArduPlane V4.5')
+    """
+    in_program_name = re.compile(
+        rf"^\s*#.*\b{re.escape(program)}[ :]+V?(\d{{1,2}})\.(\d{{1,2}})", re.IGNORECASE | re.MULTILINE
+    )
+    for pattern in (in_program_name, _QGC_COMMENT):
+        if found := pattern.search(text):
+            return FileRelease(f"{int(found[1])}.{int(found[2])}", found[0].lstrip("# \t").removeprefix("NOTE: "))
+    return None
+
+
+def nearest_release(versions: Sequence[_Version], release: tuple[int, int]) -> _Version:
+    """Return the newest simulated release that is not newer than a release, or the oldest simulated release.
+
+    versions: the simulated releases, oldest first.
+
+    >>> [nearest_release(("1.16", "1.17"), release) for release in ((1, 15), (1, 16), (1, 18))]
+    ['1.16', '1.16', '1.17']
+    """
+    known = [tuple(map(int, version.split("."))) for version in versions]
+    older = [version for version, numbers in zip(versions, known, strict=True) if numbers <= release]
+    return older[-1] if older else versions[0]
+
+
+def choose_for_file(
+    versions: Sequence[_Version], stated: _Version | None, found: FileRelease | None, params: str, title: str
+) -> tuple[_Version, tuple[str, ...]]:
+    """Return the release to simulate with a parameter file, and a note if the file is from another release.
+
+    versions: the simulated releases, oldest first; the newest is simulated if nothing states a release.
+    stated: release that the user names, or None.
+    found: release of the file.
+    params: path of the file.
+    title: name of the autopilot.
+    """
+    if found is None:
+        return stated or versions[-1], ()
+    major, minor = map(int, found.release.split("."))
+    version = stated or nearest_release(versions, (major, minor))
+    if version == found.release:
+        return version, ()
+    because = ", as named" if stated else ", the nearest release that planfly simulates"
+    return version, (f"{params} is of {title} {found.release} ({found.evidence}): {version} flies it{because}",)

@@ -1,0 +1,28 @@
+"""Name the bank limit of a flight, and who sets it."""
+
+import math
+
+from flight.simulation.setup import FlightSetup
+
+# Tolerance for equal bank limits, rad.
+_SAME_BANK_RAD = 1e-6
+
+
+def bank_limit_text(setup: FlightSetup) -> str:
+    """Return the bank limit of a setup, and who sets it.
+
+    The limit is the lowest of the aircraft's, the autopilot's and the scenario's. A mission that came without a
+    scenario has no limit of a scenario.
+
+    >>> from logs.recording.example_log import example_log
+    >>> bank_limit_text(example_log().setup)
+    'a bank limit of 29°'
+    """
+    limits = [
+        ("the aircraft's", setup.envelope.max_bank),
+        (f"{setup.autopilot.title}'s", setup.autopilot.turns.max_bank),
+    ]
+    if not setup.scenario.external:
+        limits.append(("the scenario's", math.radians(setup.scenario.flight.max_bank_deg)))
+    owner = next((owner for owner, limit in limits if abs(limit - setup.max_bank) <= _SAME_BANK_RAD), "a")
+    return f"{owner} bank limit of {math.degrees(setup.max_bank):.0f}°"
