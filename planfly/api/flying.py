@@ -314,7 +314,7 @@ def judge(
     >>> import planfly
     >>> plan = planfly.plan("paper-07", seed=1)
     >>> [planfly.judge(plan, geometry=geometry).verdict.level for geometry in (False, True)]
-    ['autopilot', 'geometric']
+    ['flown', 'geometric']
     """
     if isinstance(what, str | Path) and is_imported_log(Path(what)):
         # Imported here: only this branch needs the libraries that read the logs of other programs.

@@ -202,7 +202,7 @@ def command_line(scenario: str, seed: int, options: Mapping[str, Any]) -> str:
 def _fly_rounds(
     task: _RunTask, refine: int, locks: contextlib.ExitStack, on_round: Callable[[Round], None] | None
 ) -> RunResult:
-    """Plan and fly in rounds, with tightened limits after a failure, until a round is flyable or none remains.
+    """Plan and fly in rounds, with tightened limits after a failure, until one is flyable or none is left.
 
     locks: exit stack that holds the lock of the folder from the first plan on.
     """

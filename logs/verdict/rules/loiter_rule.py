@@ -235,9 +235,10 @@ def _loiter_finding(
 
 
 def _flown_radii(aligned: AlignedTrack, circle: LoiterCircle) -> Floats:
-    """Return the track's distances from a loiter's center, from the first to the last corner, m, (n,).
+    """Return the distances of the track's rows from a loiter's center, m, (n,).
 
-    The array is empty if the loiter was not flown to its end.
+    The rows are those from the first to the last waypoint of the circle.  If the loiter was not flown to its end, the
+    array is empty.
     """
     first, last = int(aligned.rows[circle.first]), int(aligned.rows[circle.last])
     if not aligned.passed[circle.last] or last <= first:
