@@ -162,7 +162,7 @@ class _Reader:
         if "position" not in series:
             names = ", ".join(sorted(self._index.names)[:12])
             raise LogError(
-                f"{self._source}: no POS, AHR2 or GPS message: nothing says where it flew (it has {names or 'none'})",
+                f"{self._source}: no POS, AHR2 or GPS message: the flown position is unknown (has {names or 'none'})",
                 file=self._source,
             )
         return RawLog(

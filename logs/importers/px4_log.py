@@ -233,7 +233,9 @@ class Topics:
         """Return the log with all data that a verdict needs.  Raises LogError for a log without positions."""
         series = {name: values for name, values in self._series() if values is not None and len(values.time)}
         if "position" not in series:
-            raise LogError(f"{self._source}: no vehicle_global_position: nothing says where it flew", file=self._source)
+            raise LogError(
+                f"{self._source}: no vehicle_global_position: the flown position is unknown", file=self._source
+            )
         return RawLog(
             source=self._source,
             format=FORMAT,

@@ -337,7 +337,7 @@ class VehicleMessages:
         heartbeats = [message for _, message in self._own.get("HEARTBEAT", []) if _is_vehicle(message)]
         if "position" not in series:
             raise LogError(
-                f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: nothing says where it flew",
+                f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: the flown position is unknown",
                 file=self._source,
             )
         return RawLog(

@@ -52,7 +52,7 @@ class Conditions(DocumentConfig):
     wind_from_deg: float | None
     """Both fields of the wind are null if the wind is the result."""
     turbulence: Turbulence | None
-    """Null if not simulated, like navigation."""
+    """Null if the flight was not simulated, as is navigation."""
     navigation: Navigation | None
     """perfect, rtk or gnss."""
     autopilot: str
@@ -207,7 +207,7 @@ def corridor_line(setup: FlightSetup) -> str:
     origin = "planfly's default"
     if CORRIDOR_RADII * radius >= half_width:
         origin = f"{CORRIDOR_RADII:g} times {setup.autopilot.title}'s acceptance radius of {radius:.0f} m"
-    line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} ([limits] corridor_m states one)"
+    line = f"Corridor: {half_width:.0f} m to either side of the legs, {origin} (set [limits] corridor_m to change it)"
     closest_legs = min_leg_spacing(setup.route.waypoints)
     if closest_legs is None or closest_legs[0] >= half_width:
         return line

@@ -205,7 +205,7 @@ def _identify(args: argparse.Namespace) -> int:
     ]
     if extra_names or args.name is not None or args.folder is not None:
         field = "name" if args.name is not None else f"--{extra_names[0]}" if extra_names else "--new"
-        raise PlanflyError(f"--identify cannot be combined with {field}: it comes from the logs", field=field)
+        raise PlanflyError(f"--identify cannot be combined with {field}, which is taken from the logs", field=field)
     for field, is_given, reason_text in (
         ("--params", args.params is not None, "the parameters come from the logs"),
         ("--from", args.source is not None, "--base names the aircraft to start from"),

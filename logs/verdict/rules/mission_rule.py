@@ -231,7 +231,8 @@ def _unsimulated_findings(setup: FlightSetup) -> Iterator[Finding]:
             remarks += [
                 (
                     item.seq,
-                    "DO_CHANGE_SPEED of ground speed: returns are judged with the autopilot's own MIN_GROUNDSPEED",
+                    "the ground speed that DO_CHANGE_SPEED sets is not used in returns to launch: they are judged with"
+                    " the parameter MIN_GROUNDSPEED",
                 )
                 for item in setup.mission.items
                 if item.command == C.DO_CHANGE_SPEED and item.params[0] == 1.0

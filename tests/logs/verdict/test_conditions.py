@@ -158,7 +158,7 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     setup = make_setup()
     survey = replace(setup, route=replace(setup.route, waypoints=lines(20.0)))
     assert setup.corridor == 30.0
-    default = "Corridor: 30 m to either side of the legs, planfly's default ([limits] corridor_m states one)"
+    default = "Corridor: 30 m to either side of the legs, planfly's default (set [limits] corridor_m to change it)"
     assert corridor_line(survey) == (
         f"{default}; the corridor is wider than the 20 m between legs 0 and 2, so a flight within the corridor may"
         " not have followed the lines"
@@ -167,7 +167,7 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     assert corridor_line(setup) == default
     assert corridor_line(replace(setup, autopilot=ArduPlane(ArduPilotParameters.defaults()))) == (
         "Corridor: 180 m to either side of the legs, 2 times ArduPlane's acceptance radius of 90 m"
-        " ([limits] corridor_m states one)"
+        " (set [limits] corridor_m to change it)"
     )
     stated = setup.scenario.limits.model_copy(update={"corridor_m": 30.0})
     assert corridor_line(survey.in_scenario(replace(setup.scenario, limits=stated))) == ""
