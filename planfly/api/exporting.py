@@ -8,7 +8,7 @@ from flight.autopilots.autopilot import Autopilot
 from flight.autopilots.parameter_files import parameters_text
 from flight.autopilots.parameter_origin import TITLES, read_origin
 from flight.mission.fences import number_items, zone_fences
-from flight.mission.items import Mission
+from flight.mission.items import Command, Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
@@ -87,6 +87,7 @@ class _SourceContent:
     notes: parts of the plan that the autopilot would reject.
     log: the input, if it is a flight log.
     autopilot: the autopilot that flies the mission; None if no target needs it.
+    has_own_parameters: True if the parameters are those of a log, a plan, a scenario or a parameter file.
     """
 
     mission: Mission
@@ -99,6 +100,7 @@ class _SourceContent:
     notes: tuple[str, ...] = ()
     log: FlightLog | None = None
     autopilot: Autopilot | None = None
+    has_own_parameters: bool = True
 
 
 @with_warm_up()
@@ -108,6 +110,7 @@ def export(
     fence: FencePaths = (),
     at: str | None = None,
     autopilot: str | None = None,
+    scenario: str | Path | None = None,
     params: str | Path | None = None,
     overwrite: bool = False,
 ) -> ExportedFiles:
@@ -118,8 +121,9 @@ def export(
     and returns; for a flight also .csv, .parquet, .tlog (MAVLink), .ulg (PX4).
     fence: files of fences or zones in addition to those of the source.
     at: time of the flight, see `planfly.plan`; the files omit zones that are inactive at that time.
-    autopilot, params: the autopilot, or a parameter file of it, that a .plan is for (its firmwareType); None for the
-    autopilot of the source.
+    scenario: scenario of a mission or plan, as for `planfly.fly`.
+    autopilot, params: the autopilot, or a parameter file of it, that a .plan is for (its firmwareType), and with whose
+    values a mission or plan is judged for a .parm; None for the autopilot of the source.
     overwrite: True replaces existing files.
     Raises a `planfly.PlanflyError` for bad input; then nothing is written.
 
@@ -139,7 +143,10 @@ def export(
             if target.suffix.lower() not in (*MAP_WRITERS, *PARAMETER_SUFFIXES, *LOG_SUFFIXES):
                 _check_suffix(target)
             check_output_file(target, overwrite, path)
-        source_content = _read_source(path, targets, {"fence": fence, "at": at})
+        options = MissionOptions(fence=fence, at=at, scenario=scenario, autopilot=None, params=None)
+        if any(target.suffix.lower() in PARAMETER_SUFFIXES for target in targets):
+            options |= {"autopilot": autopilot, "params": params}
+        source_content = _read_source(path, targets, options)
         if any(target.suffix.lower() == ".plan" for target in targets):
             source_content = _with_plan_notes(source_content, named_autopilot, fence)
         contents = [_target_content(source_content, target) for target in targets]
@@ -235,6 +242,10 @@ def _read_source(path: Path, targets: tuple[Path, ...], options: MissionOptions)
         if options["fence"]:
             allowed = "a log is exported with the fence that it was flown with"
             raise MissionError.of_argument("fence", options["fence"], allowed, shown="", file=path)
+        for name in ("scenario", "autopilot", "params"):
+            if (value := options.get(name)) is not None:
+                allowed = f"a log is exported with the {name} that it was flown with"
+                raise MissionError.of_argument(name, value, allowed, file=path)
         return _read_log(path, needs_returns=_needs_kml(targets))
     for target in targets:
         suffix = target.suffix
@@ -280,13 +291,18 @@ def _read_mission(path: Path, options: MissionOptions, *, needs_world: bool, nee
     if not path.is_file():
         raise MissionError(f"{path}: no such file; expected a plan.json, mission file or log", file=path)
     is_plan, fences = path.suffix.lower() == ".json", read_named_fences(options["fence"])
-    if not (needs_world or is_plan or fences.zones or options["at"] is not None):
+    has_own_parameters = is_plan or options["scenario"] is not None or options["params"] is not None
+    if not (needs_world or has_own_parameters or fences.zones or options["at"] is not None):
         mission = fences.add_to_mission(read_mission(path))
         return _SourceContent(mission, path.stem)
     # Fence items have no times, so only the zones that are active during the flight are exported.
     setup = open_flight(path, options)
     lines, zones = {"plan": plan_line(setup)}, map_zones(setup)
-    source = _SourceContent(setup.mission, setup.scenario.name, lines, zones, autopilot=setup.autopilot)
+    source = _SourceContent(
+        *(setup.mission, setup.scenario.name, lines, zones),
+        autopilot=setup.autopilot,
+        has_own_parameters=has_own_parameters,
+    )
     source = _with_returns(source, setup, None) if needs_returns else source
     if not is_plan:
         return _with_zones(source, setup.scenario)
@@ -316,7 +332,7 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
             descriptions.append("returns")
         return MAP_WRITERS[suffix](source.name, lines, zones), " and ".join(descriptions)
     if suffix in PARAMETER_SUFFIXES and source.autopilot is not None:
-        return judging_parameters_text(mission.source, source.autopilot)
+        return judging_parameters_text(mission, source.autopilot, has_own_parameters=source.has_own_parameters)
     kind = mission_kind(target)
     if kind in _CONTENT_NAMES:
         count = len(mission.fences if kind == "fence" else mission.rally)
@@ -329,18 +345,32 @@ def _target_content(source: _SourceContent, target: Path) -> tuple[str | bytes, 
     return mission_text(mission, kind), f"{len(mission.items)} items{extra}"
 
 
-def judging_parameters_text(mission: str, autopilot: Autopilot) -> tuple[str, str]:
+def judging_parameters_text(
+    mission: Mission, autopilot: Autopilot, *, has_own_parameters: bool = True
+) -> tuple[str, str]:
     """Return the text of a parameter file for take-off, landing and returns, and a description of its content.
 
-    mission: name of the mission in messages.  Raises MissionError for an autopilot without such parameters.
+    A value with which the autopilot does not arm is left out.
+
+    has_own_parameters: False if nobody stated a parameter, so that the values are planfly's defaults for the mission.
+    Raises MissionError for an autopilot without such parameters.
     """
     parameters = () if autopilot.parameters is None else autopilot.parameters.values
     values = {name: value for name, value, _ in parameters if name.startswith(_JUDGED_PREFIXES)}
     if not values:
         reason = f"{autopilot.title} has no parameters of take-off, landing and returns"
-        raise MissionError(f"{mission}: {reason}", file=mission, field="autopilot")
-    title = f"{autopilot.title}: take-off, landing and returns with which planfly judged the mission"
-    return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}"
+        raise MissionError(f"{mission.source}: {reason}", file=mission.source, field="autopilot")
+    omitted = ""
+    if values.get("RTL_AUTOLAND") == 0.0 and any(item.command == Command.DO_LAND_START for item in mission.items):
+        del values["RTL_AUTOLAND"]
+        omitted = ", without RTL_AUTOLAND 0, with which it does not arm"
+    title = f"{autopilot.title}: take-off, landing and returns "
+    title += (
+        "with which planfly judges the mission"
+        if has_own_parameters
+        else "by planfly's defaults for this mission; a parameter file of your own wins (export ... --params FILE)"
+    )
+    return parameters_text(values, title), f"{len(values)} parameters of {autopilot.title}{omitted}"
 
 
 def _flight_content(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:

@@ -253,7 +253,7 @@ def _fly_round(task: _RunTask, plan: Plan, number: int) -> Round:
     for target in (folder / "mission.waypoints", folder / "mission.plan", *rally):
         write_atomically(target, mission_text(mission, mission_kind(target)))
     if plan.ways is not None and airframe.autopilot.parameters is not None:
-        write_atomically(folder / "mission.parm", judging_parameters_text("mission.waypoints", airframe.autopilot)[0])
+        write_atomically(folder / "mission.parm", judging_parameters_text(mission, airframe.autopilot)[0])
     if not plan.feasible:
         verdict = judge_plan_only(plan, planning_conditions(task.scenario, airframe))
         write_atomically(folder / "verdict.json", verdict_json(verdict))

@@ -4,7 +4,7 @@ import argparse
 
 import planfly
 from planfly.arguments import CHOICES
-from planfly.terminal.arguments import MISSION_SUFFIXES, file_completer, with_completer
+from planfly.terminal.arguments import MISSION_SUFFIXES, complete_scenario, file_completer, with_completer
 from planfly.terminal.command_parser import LineParser
 from planfly.terminal.exit_codes import FLYABLE, INCOMPLETE
 from planfly.terminal.options import add_fence_option, add_result_options, add_time_option
@@ -35,12 +35,18 @@ def add_export_parser(command_line: LineParser) -> None:
         "landing and returns);"
         " from a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink; extra planfly[live]), .ulg (PX4)",
     )
-    group = parser.add_group("autopilot of a .plan (default: the source's)")
+    with_completer(
+        parser.add_argument(
+            "--scenario", metavar="SCENARIO", help="scenario of the mission, as for planfly check: TOML file or name"
+        ),
+        complete_scenario,
+    )
+    group = parser.add_group("autopilot of a .plan or .parm (default: the source's)")
     group.add_argument(
-        "--autopilot", choices=CHOICES["autopilot"], help="autopilot that the .plan is for (firmwareType)"
+        "--autopilot", choices=CHOICES["autopilot"], help="autopilot that the .plan (firmwareType) or .parm is for"
     )
     option = group.add_argument(
-        "--params", metavar="FILE", help="parameter file of the autopilot that the .plan is for"
+        "--params", metavar="FILE", help="parameter file of the autopilot; a .parm contains its values"
     )
     with_completer(option, file_completer("param", "parm", "params"))
     add_fence_option(parser)
@@ -50,15 +56,8 @@ def add_export_parser(command_line: LineParser) -> None:
 
 def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; return 3 for an incomplete log."""
-    result = planfly.export(
-        args.source,
-        *args.files,
-        fence=args.fence,
-        at=args.at,
-        autopilot=args.autopilot,
-        params=args.params,
-        overwrite=args.overwrite,
-    )
+    options = {name: getattr(args, name) for name in ("fence", "at", "scenario", "autopilot", "params", "overwrite")}
+    result = planfly.export(args.source, *args.files, **options)
     print_warnings(result.notes)
     for file, content in zip(result.files, result.contents, strict=True):
         print(f"{_content_kind(file.suffix.lower()):<9} {file} ({content})")

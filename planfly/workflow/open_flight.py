@@ -4,7 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from flight.autopilots.parts import MissionDialect, SpeedLimits
+from flight.autopilots.autopilot import Autopilot
+from flight.autopilots.parts import MissionDialect, RtlSettings, SpeedLimits
 from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
@@ -167,7 +168,7 @@ def make_setup(
     # A fence without valid zones could not be judged.
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
-    autopilot = airframe.autopilot
+    autopilot = _with_landing_parameters(airframe.autopilot, mission, scenario)
     mission = replace(mission, autopilot=autopilot.name)
     resets = autopilot.checks.resets_jump_counters
     if placed is None:
@@ -198,6 +199,16 @@ def make_setup(
         guidance_hz=scenario.flight.guidance_hz,
         fdm_hz=fdm_hz,
     )
+
+
+def _with_landing_parameters(autopilot: Autopilot, mission: Mission, scenario: Scenario) -> Autopilot:
+    """Return an autopilot that arms with a mission's landing sequence, unless a file or the scenario says otherwise."""
+    if scenario.landing is not None or all(item.command != Command.DO_LAND_START for item in mission.items):
+        return autopilot
+    stated = scenario.returns
+    settings = RtlSettings(autoland=None if stated is None else stated.rtl_autoland, lands=True)
+    values = autopilot.returns.parameters_of(settings)
+    return autopilot.with_parameters(**values) if values else autopilot
 
 
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import pytest
 import planfly
 from flight.autopilots.parameter_files import read_parameter_file
 from flight.autopilots.planfly.autopilot import PlanflyGuidance
-from flight.mission.items import MissionItem
+from flight.mission.items import Mission, MissionItem
 from flight.mission_files.formats import mission_text, read_mission
 from logs.recording.reader import read_log
 from planfly.api.exporting import judging_parameters_text
@@ -115,7 +115,46 @@ def test_the_parameters_that_a_plan_is_judged_with(plan_file: Path, tmp_path: Pa
 
 def test_planflys_own_guidance_has_none_of_these_parameters() -> None:
     with pytest.raises(MissionError, match=r"^a\.waypoints: .* has no parameters of take-off, landing and returns$"):
-        judging_parameters_text("a.waypoints", PlanflyGuidance())
+        judging_parameters_text(Mission(None, (), source="a.waypoints"), PlanflyGuidance())
+
+
+LANDING = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t46\t8\t0\t1
+1\t0\t3\t16\t0\t0\t0\t0\t46.01\t8\t100\t1
+2\t0\t3\t189\t0\t0\t0\t0\t0\t0\t0\t1
+3\t0\t3\t16\t0\t0\t0\t0\t46.01\t8.01\t60\t1
+4\t0\t3\t21\t0\t0\t0\t0\t46\t8\t0\t1
+"""
+
+
+def test_the_parameters_of_a_mission_are_defaults_unless_a_file_states_them(tmp_path: Path) -> None:
+    mission, mine, target = tmp_path / "m.waypoints", tmp_path / "mine.param", tmp_path / "a.parm"
+    mission.write_text(LANDING, encoding="ascii")
+    mine.write_text("RTL_AUTOLAND,2\nTKOFF_THR_MINACC,15\n", encoding="ascii")
+    assert main(["export", str(mission), str(target)]) == 0
+    assert "by planfly's defaults for this mission; a parameter file of your own wins" in target.read_text()
+    # With 0 ArduPlane does not arm.
+    assert read_parameter_file(target)["RTL_AUTOLAND"].value == 1.0
+    assert main(["export", str(mission), str(target), "--params", str(mine), "--overwrite"]) == 0
+    assert "with which planfly judges the mission" in target.read_text()
+    read = read_parameter_file(target)
+    assert (read["RTL_AUTOLAND"].value, read["TKOFF_THR_MINACC"].value) == (2.0, 15.0)
+
+
+def test_a_value_with_which_the_autopilot_does_not_arm_is_not_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mission, mine, target = tmp_path / "m.waypoints", tmp_path / "mine.param", tmp_path / "a.parm"
+    mission.write_text(LANDING, encoding="ascii")
+    mine.write_text("RTL_AUTOLAND,0\n", encoding="ascii")
+    assert main(["export", str(mission), str(target), "--params", str(mine)]) == 0
+    assert "without RTL_AUTOLAND 0, with which it does not arm" in capsys.readouterr().out
+    assert "RTL_AUTOLAND" not in read_parameter_file(target)
+
+
+def test_a_log_has_its_own_parameters(log_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["export", str(log_file), str(tmp_path / "a.parm"), "--params", "mine.param"]) == 2
+    assert "a log is exported with the params that it was flown with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])

@@ -77,6 +77,11 @@ def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path,
     assert not found.unjudged_parts
 
 
+def test_a_mission_with_a_landing_sequence_is_judged_with_a_setting_that_arms(tmp_path: Path) -> None:
+    """ArduPlane's default, 0, does not arm with DO_LAND_START."""
+    assert describe_landing(judged(tmp_path))[0].startswith("RTL_AUTOLAND 1: from its loiter")
+
+
 def test_what_each_value_says(tmp_path: Path) -> None:
     said = [describe_landing(judged(tmp_path, RTL_AUTOLAND=value))[0] for value in range(5)]
     assert "ArduPlane does not arm" in said[0]
