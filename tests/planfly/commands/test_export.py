@@ -153,8 +153,8 @@ def test_a_value_with_which_the_autopilot_does_not_arm_is_not_written(
 
 
 def test_a_log_has_its_own_parameters(log_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", str(log_file), str(tmp_path / "a.parm"), "--params", "mine.param"]) == 2
-    assert "a log is exported with the params that it was flown with" in capsys.readouterr().err
+    assert main(["export", str(log_file), str(tmp_path / "a.parm"), "--autopilot", "px4"]) == 2
+    assert "a log is exported with the autopilot that it was flown with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])
