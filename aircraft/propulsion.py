@@ -278,7 +278,10 @@ class ActuatorDisc:
     position: Vector3 = (0.0, 0.0, 0.0)
 
     def functions_xml(self, factors: tuple[str, ...]) -> str:
-        """Return the XML of the JSBSim functions."""
+        """Return the XML of JSBSim functions for exit speed, thrust, torque, power and current.
+
+        factors: names of the factors by which an aircraft of a campaign differs from its model.
+        """
         factor = _factor_element(factors)
         speed = multiply(f"<v> {number(self.exit_speed)} </v>", factor("motor-speed"))
         air = "<p> motor/airspeed-mps </p>"

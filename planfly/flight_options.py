@@ -277,9 +277,10 @@ def apply_options(scenario: Scenario, options: FlightOptions, program: Path | No
 
 
 def flight_entries(options: FlightOptions, program: Path | None = None) -> dict[str, str | float | None]:
-    """Return the [flight] entries of a scenario for options; None for entries that are not given.
+    """Return the entries of a scenario's [flight] table that state the options; None for an option that is not given.
 
-    Raises ArgumentError for an unknown autopilot, and for an autopilot in addition to a program.
+    program: file of a real autopilot (SITL) that flies instead of a simulated autopilot, or None.
+    Raises ArgumentError for an unknown autopilot, and if both an autopilot and a program are given.
 
     >>> entries = flight_entries({"autopilot": "px4-1.16"})
     >>> entries["autopilot"], entries["px4_version"]

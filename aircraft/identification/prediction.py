@@ -177,7 +177,7 @@ class Predictor:
             yield state
 
     def _air_velocity(self, rows: Ints) -> Floats:
-        """Return the measured velocity through the air in body axes at some rows (n,), m/s, (n, 3)."""
+        """Return the measured velocity through the air in body axes, m/s, (n, 3), at the given rows (n,)."""
         speed, alpha, beta = self._signals.airspeed[rows], self._flow.alpha[rows], self._flow.beta[rows]
         ahead = speed * np.cos(beta)
         return np.column_stack([ahead * np.cos(alpha), speed * np.sin(beta), ahead * np.sin(alpha)])

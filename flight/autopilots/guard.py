@@ -89,7 +89,7 @@ class Guard:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the guard process, without removing anything."""
+        """End the guard process, so that it neither kills processes nor removes files."""
         self._write_line("done")
         self._pipe.close()
         self._process.wait()

@@ -256,9 +256,9 @@ def try_model(aircraft: Aircraft) -> None:
 
 @cache
 def _run_trial(folder: str, _version: str) -> tuple[int | None, str]:
-    """Load and step a model in another process; return the exit code, or None on timeout, and JSBSim's printed reason.
+    """Load and step a model in another process; return the exit code, or None on timeout, and what JSBSim printed.
 
-    _version: hash of the model, which only belongs to the cache key.
+    _version: hash of the model, which is not used here but part of the cache's key.
     """
     # The child process finds planfly's packages where this process found them.
     root = str(Path(__file__).parents[2])

@@ -67,9 +67,9 @@ class Snapshot:
 
     @staticmethod
     def unpack(data: bytes) -> "Snapshot":
-        """Return the snapshot from the bytes of `pack`.
+        """Return the snapshot that `pack` turned into these bytes.
 
-        Raises struct.error for any other number of bytes.
+        Raises struct.error if the number of bytes is wrong.
         """
         return Snapshot(*_SNAPSHOT_FORMAT.unpack(data))
 

@@ -29,7 +29,10 @@ def read_state(block: Floats, registers: Floats, code: Code) -> None:
 def advance_model(
     block: Floats, frame: Record, registers: Floats, code: Code, contacts: Records, frictions: Records
 ) -> None:
-    """Copy the outputs of the workspace's block to the compiled model, and step the model to the next tick."""
+    """Copy the autopilot's outputs to the compiled model's registers, and step the model to the next tick.
+
+    block: inputs and outputs of the autopilot, in the order of the flight's workspace.
+    """
     first_write = code[WRITES_START]
     for k in range(code[CODE_END] - first_write):
         registers[code[first_write + k]] = block[_OUTPUT_OFFSET + k]

@@ -274,7 +274,7 @@ def _extract_flight(
     count: int,
     others: tuple[tuple[float, float], ...],
 ) -> LoggedFlight:
-    """Return one part of a log as a flight, with its data at the times of its positions.
+    """Return one part of a log as a flight, with all its data interpolated to the times of its positions.
 
     number, count, others: as in `LoggedFlight`.
     """
@@ -284,9 +284,9 @@ def _extract_flight(
         name: _interpolate_at(raw.series.get(name), name, time, positions) for name in COLUMNS if name != "height"
     }
     up = positions.up[is_kept]
-    holds: list[Quantity] = [name for name in _OPTIONAL_QUANTITIES if np.isfinite(columns[name]).any()]
+    available_quantities: list[Quantity] = [name for name in _OPTIONAL_QUANTITIES if np.isfinite(columns[name]).any()]
     if np.isfinite(up).all():
-        holds.append("heights")
+        available_quantities.append("heights")
     start = part.stretches[0].start if part.stretches else part.start
     return LoggedFlight(
         raw=raw,
@@ -295,7 +295,7 @@ def _extract_flight(
         lon=positions.lon[is_kept],
         up=up,
         columns=columns,
-        holds=tuple(holds),
+        holds=tuple(available_quantities),
         stretches=part.stretches,
         mission=raw.missions[part.mission] if part.mission >= 0 else None,
         heights=_heights(raw, positions, start),

@@ -264,7 +264,7 @@ class Recorder:
         self._writer.flush()
 
     def _add_scene_channel(self, topic: str) -> int:
-        """Add the channel of a topic that not every log has, and return its number."""
+        """Add a channel for scene updates on an optional topic, and return the channel's number."""
         descriptor = SceneUpdate.DESCRIPTOR
         self._channels[topic] = self._writer.add_channel(topic, descriptor.full_name, file_descriptor_set(descriptor))
         return self._channels[topic]

@@ -325,7 +325,9 @@ def judge_unflown(requirements: RouteRequirements, end_reason: str, *, log_compl
 
 
 def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict:
-    """Judge a run without a feasible plan at the level "plan"; the verdict is never complete.
+    """Return the verdict on a search that found no feasible plan, from the certificate of its best path alone.
+
+    The verdict's level is "plan", and the verdict is never complete, because nothing was flown.
 
     conditions: conditions for which the plan was made.
 

@@ -128,7 +128,7 @@ def _draw_ground_and_threats(scenario: Scenario, title: str, legend_height: floa
 
 
 def _draw_ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
-    """Draw start and destination, with labels clear of the paths."""
+    """Draw the start and the destination, with labels clear of the paths; return their handles for the legend."""
     placer = LabelPlacer(axes)
     for path in paths:
         placer.avoid(path[:, 0], path[:, 1])

@@ -257,9 +257,9 @@ def _read_named_draws(aircraft_table: Any, name: str) -> Draws:
 
 
 def _parse_quantity(quantity: Quantity, quantity_table: Any, name: str) -> VaryingQuantity:
-    """Parse the table of a quantity.
+    """Parse the table of a quantity into its distribution.
 
-    name: name of the file in messages.
+    name: file name for error messages.
 
     Raises SpreadError for an invalid table.
     """

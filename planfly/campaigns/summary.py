@@ -152,7 +152,10 @@ def _rule_sensitivities(base: CampaignBase, store: Store, rule: str) -> tuple[Se
 
 
 def summary_json(summary: CampaignSummary) -> str:
-    """Return the text of ``summary.json``, without times and workers, so that it does not depend on the workers."""
+    """Return the text of ``summary.json``.
+
+    Computing times and the number of workers are left out, so that the text is the same for any number of workers.
+    """
     estimate = summary.estimate
     data = {
         "schema": SUMMARY_SCHEMA,

@@ -604,7 +604,10 @@ def read_table(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def count_flights(path: Path) -> int:
-    """Return the number of flights in a table of either kind. Raises StoreError for other files and locked tables."""
+    """Return the number of flights in the table of a campaign or of a wind search.
+
+    Raises StoreError for other files, and for a table that another process has locked.
+    """
     with _open_to_read(path) as connection:
         return int(connection.execute("SELECT COUNT(*) FROM flights").fetchone()[0])
 

@@ -80,7 +80,9 @@ class _Probe:
         self._span, self._area = aircraft.wing_span, aircraft.wing_area
         trim = steady_flight(fdm, aircraft.airspeed, _AMSL)
         if trim is None:
-            raise FlightError(f"{aircraft.name}: no level flight at cruise to begin with", file=aircraft.name)
+            raise FlightError(
+                f"{aircraft.name}: cannot be trimmed for level flight at its cruise speed", file=aircraft.name
+            )
         self._airspeed = aircraft.airspeed
         self._trim = trim.vector()
         fdm.apply_trim(self._trim)
@@ -88,7 +90,7 @@ class _Probe:
         ixx, iyy, izz, ixz = (read(f"inertia/i{axes}-slugs_ft2")() * _SLUG_FT2 for axes in ("xx", "yy", "zz", "xz"))
         # JSBSim's product of inertia has the opposite sign.
         self.inertia = (ixx, iyy, izz, -ixz)
-        self._pressure = read("aero/qbar-psf")() * 47.88025898033584 * self._area
+        self._pressure_force = read("aero/qbar-psf")() * 47.88025898033584 * self._area
 
     def base_model(self, motor: Motor, *, has_torque_reaction: bool) -> BaseModel:
         """Return the model's numbers with a motor.
@@ -214,7 +216,7 @@ class _Probe:
         sine, cosine = math.sin(alpha), math.cos(alpha)
         forces = np.array([-x * cosine - z * sine, x * sine - z * cosine, y])
         lengths = np.array([self._span, self.chord, self._span])
-        return np.concatenate([forces, np.array(moments) / lengths]) / self._pressure
+        return np.concatenate([forces, np.array(moments) / lengths]) / self._pressure_force
 
 
 def is_flying_wing(aircraft: Aircraft) -> bool:

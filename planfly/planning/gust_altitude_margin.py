@@ -119,9 +119,9 @@ def _gusts_matter(plan: Plan, airframe: Airframe) -> bool:
 def _gust_displacements(
     scenario: Scenario, autopilot: Autopilot
 ) -> list[tuple[Gust, Callable[[float, Turbulence], float]]]:
-    """Return the kinds of gusts that matter, each with a function for the altitude displacement, m.
+    """Return the kinds of gusts that matter, each with a function that computes the altitude displacement, m.
 
-    The function takes the climb or sink rate that the aircraft does not use, m/s, and the turbulence.
+    The function's arguments are the climb or sink rate that the aircraft holds in reserve, m/s, and the turbulence.
     """
     deviations = autopilot.deviations
     displacements: list[tuple[Gust, Callable[[float, Turbulence], float]]] = [("downdrafts", deviations.gust_sink)]

@@ -297,7 +297,7 @@ def table_text(rows: Sequence[TableRow]) -> str:
 
 
 def _number_text(value: float | None, digits: int) -> str:
-    """Return a number with a number of decimals, or "-" for None."""
+    """Format a number with the given number of decimals; "-" for None."""
     return "-" if value is None else f"{value:.{digits}f}"
 
 

@@ -139,7 +139,10 @@ def warm_up(*units: str) -> Iterator[None]:
 
 
 def with_warm_up(*units: str) -> Callable[[Callable[_Parameters, _Result]], Callable[_Parameters, _Result]]:
-    """Return a decorator that runs a function of the public API under `warm_up`."""
+    """Return a decorator with which a function of the public API runs inside `warm_up`.
+
+    units: names of the groups of compiled kernels that the function calls.
+    """
 
     def decorate(function: Callable[_Parameters, _Result]) -> Callable[_Parameters, _Result]:
         @functools.wraps(function)

@@ -61,7 +61,7 @@ def check_request(scope: Scope, port: int) -> tuple[int, str]:
 
 
 def _is_page_visit(scope: Scope, headers: list[tuple[bytes, str]]) -> bool:
-    """Return True for a request of a browser to show the page itself, which shows nothing without the token."""
+    """Return True if a browser opens the page itself, which shows no data until it has the token."""
     header_values = dict(headers)
     is_document = (
         header_values.get(b"sec-fetch-mode") == "navigate" and header_values.get(b"sec-fetch-dest") == "document"

@@ -46,7 +46,9 @@ class Airframe:
 
 
 def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan | None = None) -> Plan:
-    """Return a plan with the departure and approach that its scenario requires; without either, the plan itself.
+    """Return a plan with the departure and the approach that its scenario requires added.
+
+    If the scenario requires neither, the plan is returned unchanged.
 
     flown_plan: the plan being flown, whose departure is reused; None for a new plan.
 

@@ -212,9 +212,10 @@ def _with_landing_parameters(autopilot: Autopilot, mission: Mission, scenario: S
 
 
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:
-    """Return a note on each commanded airspeed that the autopilot ignores or replaces by the nearest limit.
+    """Return a note on each commanded airspeed that the autopilot ignores, or replaces with its nearest limit.
 
-    ArduPlane reads an airspeed only from type 0; PX4, which takes the nearest limit, does not read the type.
+    ArduPlane takes DO_CHANGE_SPEED as an airspeed only if its speed type is 0, and ignores values beyond its limits.
+    PX4 takes it as an airspeed whatever the type, and flies the nearest limit.
 
     >>> from flight.mission.items import MissionItem
     >>> faster = MissionItem(2, 178, 2, (0.0, 60.0, -1.0, 0.0), 0.0, 0.0, 0.0)

@@ -159,7 +159,7 @@ def add_airspace_violations(
         offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if has_max_height:
-            violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
+            violations.terrain += _leg_excess_area(data, required, path[i], path[i + 1], legs[i], lags[i], across)
         max_offset = max(offset_before, offset_after)
         if has_zones and _leg_zone_penetration(data, path[i], path[i + 1], across + max_offset, below, above) > 0.0:
             first_fraction = min(1.0, END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == 0 else 0.0
@@ -220,7 +220,7 @@ def _leg_zone_penetration(
 
 
 @inner
-def _leg_excess_height(
+def _leg_excess_area(
     data: ProblemArrays,
     required: RequiredClearance,
     leg_start: Floats,
@@ -229,7 +229,11 @@ def _leg_excess_height(
     lag: Record,
     across: float,
 ) -> float:
-    """Return a leg's excess over the maximum height above ground, height lag included, m x km."""
+    """Return how far a leg rises above the maximum height above ground, integrated over its length, m x km.
+
+    lag: height lag of the autopilot on the leg, which is added to the leg's altitude.
+    across: half width of the ground strip below the leg that is examined, m.
+    """
     if not data.tracking.has_error:
         return _swath_excess_height(data, required, leg_start, leg_end, 0.0, 0.0, math.inf)
     total, start, end = 0.0, np.empty(3), np.empty(3)

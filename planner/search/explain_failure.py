@@ -230,10 +230,10 @@ ZONE_PITCH_M = 20.0
 
 
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
-    """Return lines that state what blocks an infeasible plan, and what a search in its encoding cannot find.
+    """Return lines that explain why a plan is infeasible, and which kinds of routes its search could not have found.
 
-    limits: limits of the path; if given, the margins that a plan requires are examined, too, and a path that keeps all
-    of them gives no lines.
+    limits: limits of the path; if given, the margins that a plan requires are checked, too, and the result is empty if
+    the path keeps all of them.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario

@@ -236,7 +236,10 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
 
 
 def _prepare_retry(search: Search, attempt: int) -> None:
-    """Increase the clearance buffer, pass missiles more closely, and re-evaluate the archive."""
+    """Pose the search's problem again for another attempt, and evaluate the archived samples again.
+
+    With each attempt the clearance buffer grows, and paths may pass missiles more closely.
+    """
     search.problem = with_narrow_margins(make_problem(search.problem.scenario, search.problem.limits, attempt))
     vectors = search.archive.vectors
     search.archive = Archive(vectors[:0], no_scores())

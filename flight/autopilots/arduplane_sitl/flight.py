@@ -128,7 +128,7 @@ def fly_autopilot(
     *,
     log: Path | None = None,
 ) -> tuple[SimulatedFlight, FlightSetup]:
-    """Fly a setup with ArduPlane SITL, from its boot to its end.
+    """Fly a setup with ArduPlane SITL, from the autopilot's boot to the end of the flight.
 
     setup, aircraft, autopilot, user_parameters: see `AutopilotFlight`.
     log: file to which the autopilot's own log (.BIN) is moved.

@@ -104,7 +104,7 @@ class AutopilotProcess:
 
             If it were registered later, the program would survive if planfly were killed in between.
             """
-            # Before Python restores the default of the signal, with which a dead guard would end this process here.
+            # Ignore SIGPIPE while writing to the guard: by the default action, a dead guard would end this process.
             signal.signal(signal.SIGPIPE, signal.SIG_IGN)
             guard.register_group(os.getpid())
             signal.signal(signal.SIGPIPE, signal.SIG_DFL)

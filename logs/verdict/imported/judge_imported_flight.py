@@ -327,7 +327,7 @@ def _stretch_findings(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     for finding in track_findings(legs.requirements, legs.aligned):
         checked_finding = _check_gaps(_check_data(setup, legs, finding), legs)
         if legs.partial:
-            checked_finding = _check_unreached(checked_finding, legs)
+            checked_finding = _unjudge_if_unreached(checked_finding, legs)
         findings.append(_renumber_place(checked_finding, legs.first, setup))
     return [*findings, *_findings_without_data(setup, {finding.rule for finding in findings})]
 
@@ -415,10 +415,10 @@ def _check_gaps(finding: Finding, legs: FlownLegs) -> Finding:
     return finding
 
 
-def _check_unreached(finding: Finding, legs: FlownLegs) -> Finding:
-    """Mark findings on the unreached last waypoint, and on the leg to it, as not judged.
+def _unjudge_if_unreached(finding: Finding, legs: FlownLegs) -> Finding:
+    """Return a finding, marked as not judged if it concerns the last waypoint, which was not reached, or its leg.
 
-    On that leg only rules that need the full leg are affected, and a failure remains.
+    On the leg to that waypoint, only rules that need the whole leg are marked, and a finding that fails still fails.
     """
     leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     is_unreached = finding.place.kind == "waypoint" and finding.place.index == waypoint

@@ -13,14 +13,14 @@ def returns_after_last_item(setup: FlightSetup) -> bool:
 
     A mission that ends at its scenario's destination is judged only up to the destination.
     """
-    return _begins_return(setup) and not _ends_at_destination(setup)
+    return _returns_after_last_item(setup) and not _ends_at_destination(setup)
 
 
-def _begins_return(setup: FlightSetup) -> bool:
+def _returns_after_last_item(setup: FlightSetup) -> bool:
     """Return True if ArduPlane returns to launch by itself after the mission's last item.
 
     ArduPlane returns (`AP_Mission::complete`, `Plane::exit_mission_callback`) unless the mission ends with a return, a
-    landing, an endless loiter or an endless jump.  Return False also for an imported flight, and for a mission without
+    landing, an endless loiter or an endless jump.  Also return False for an imported flight, and for a mission without
     a home.
     """
     route, mission = setup.route, setup.mission
@@ -56,7 +56,7 @@ def _ends_at_destination(setup: FlightSetup) -> bool:
 
 def unjudged_return_text(setup: FlightSetup) -> str:
     """Explain why a return after the last item is not judged; return "" if it is judged or does not occur."""
-    if not _begins_return(setup) or not _ends_at_destination(setup):
+    if not _returns_after_last_item(setup) or not _ends_at_destination(setup):
         return ""
     return f"the mission ends at the scenario's destination; {setup.autopilot.title} then returns to launch"
 

@@ -96,7 +96,10 @@ def _findings_on_legs(requirements: RouteRequirements, first: int, last: int) ->
 def _compliance_finding(
     requirements: RouteRequirements, planned_visits: Records, flown_visits: Records | None
 ) -> Finding:
-    """Report that no judged zone is violated."""
+    """Return the finding that no judged zone is violated, with the distance to the nearest zone.
+
+    planned_visits, flown_visits: one record for each zone, none of which is violated; see `zone_visits`.
+    """
     airspace, corridor = requirements.airspace, requirements.setup.corridor
     count, visits = len(airspace.zones), planned_visits if flown_visits is None else flown_visits
     nearest_zone = int(visits["depth"].argmax())

@@ -409,7 +409,11 @@ def _check_landing(mission: Mission) -> Iterator[_Remark]:
 
 
 def _check_approach(mission: Mission, origin: GeoOrigin, limits: FeasibilityLimits) -> Iterator[_Remark]:
-    """Yield landings whose approach begins with an unsupported item, from below or inside an orbit, or is too steep."""
+    """Yield a remark on each landing whose approach PX4 would reject, or whose approach has an unknown height.
+
+    PX4 rejects an approach that begins with an unsupported item, below the landing point, or in an orbit around it, and
+    an approach that is too steep.
+    """
     max_angle = math.degrees(limits.landing_angle)
     for previous, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or previous.command not in PLACES | TAKEOFFS or not previous.has_position:

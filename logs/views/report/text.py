@@ -133,7 +133,7 @@ def verdict_badge(verdict: Verdict) -> Badge:
 
 
 def headline_without_answer(badge: Badge, headline: str) -> str:
-    """Remove the answer that the badge already gives from the headline.
+    """Return the headline without the answer at its beginning, if the badge gives the same answer.
 
     >>> headline_without_answer(Badge("fail", "✗", "Not flyable"), "not flyable: slope on leg 1")
     'slope on leg 1'
