@@ -152,7 +152,10 @@ class ReturnsResult:
         if self.setup.envelope.battery_guessed and self.setup.scenario.flight.battery_wh is None:
             notes.append("the battery capacity is guessed, so energy is not judged; state battery_wh in the scenario")
         if self.returns.lands:
-            notes.append("a return to a landing sequence is judged up to its first item; the landing is not judged")
+            notes.append(
+                "a return to a landing sequence has to keep the required height above ground up to the sequence's first"
+                " item, and only off the ground on the approach after it; the landing is not judged"
+            )
         parameters = self.setup.autopilot.parameters
         if parameters is None or not parameters.source:
             notes.append(

@@ -447,8 +447,9 @@ def judge_returns(
         if "terrain" in world.unjudged_parts or ("landing" in world.unjudged_parts and ending == "straight to land"):
             continue
         targets = [world.target(row, ending) for row in starts.rows]
-        results, paths = simulate_returns(world, starts, targets)
         min_heights = required_heights(world, starts)
+        results, paths = simulate_returns(world, starts, targets)
+        results = _with_clearance_to_landing_sequence(world, starts, targets, results, min_heights)
         judged_returns = []
         for k, row in enumerate(results):
             advance(number * len(starts) + k, total_count)
@@ -539,6 +540,34 @@ def simulate_returns(
         abort_limits=abort_limits,
     )
     return result.results, result.tracks
+
+
+def _with_clearance_to_landing_sequence(
+    world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], results: Records, min_heights: Floats
+) -> Records:
+    """Return the results of returns, with the clearance up to the first item of a landing sequence if it is too low.
+
+    Beyond this item a return flies the approach of the mission itself, which descends to the landing; there only the
+    ground, the spheres, the zones and the energy limit it.
+    """
+    is_low = results["clearance"] < min_heights - CLEARANCE_TOLERANCE_M
+    has_approach = [target.landing is not None and bool(target.landing.next_stops) for target in targets]
+    indices = np.flatnonzero(is_low & np.array(has_approach, dtype=np.bool_))
+    if not indices.size:
+        return results
+    short_targets = [
+        targets[k]._replace(landing=landing._replace(next_stops=()))
+        for k in indices.tolist()
+        if (landing := targets[k].landing) is not None
+    ]
+    short_results, _ = simulate_returns(world, starts.subset(indices), short_targets)
+    results = results.copy()
+    for name in ("clearance", "clearance_east", "clearance_north", "clearance_up"):
+        values = results[name]
+        # A return that meets the ground keeps the place where it does.
+        is_airborne = results["outcome"][indices] != RETURN_GROUND_IMPACT
+        values[indices[is_airborne]] = short_results[name][is_airborne]
+    return results
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:

@@ -51,6 +51,19 @@ def test_it_flies_straight_to_the_landing_sequence_over_what_is_between(tmp_path
     assert headline(found).endswith("are safe; the landing is not judged")
 
 
+@pytest.mark.parametrize(("amsl", "kind"), [(20.0, "safe"), (-30.0, "ground")])
+def test_the_approach_after_the_first_item_may_be_low_but_not_in_the_ground(
+    tmp_path: Path, amsl: float, kind: str
+) -> None:
+    """The required height is 30 m; the ground there is at 0 m."""
+    lower = WAY + row(3, 189) + row(4, 16, 6000.0, 100.0) + row(5, 16, 7000.0, amsl) + row(6, 21, 8000.0, 1.0)
+    found = judged(tmp_path, lower, RTL_AUTOLAND=2)
+    # A return from further east cannot sink to these heights.
+    assert {one.kind for one in found.each if 1500.0 < one.start[0] < 2500.0} == {kind}
+    # The hill before the first item is judged as before.
+    assert reaches(found, "ground") >= 700.0
+
+
 def test_it_goes_on_from_its_circle_to_the_landing_sequence(tmp_path: Path) -> None:
     # At 100 m over home it comes home safely from before the hill, and goes on at 100 m into the hill, 400 m high.
     stays = judged(tmp_path, RTL_AUTOLAND=0)
