@@ -352,7 +352,7 @@ def judging_parameters_text(
 
     A value with which the autopilot does not arm is left out.
 
-    has_own_parameters: False if nobody stated a parameter, so that the values are planfly's defaults for the mission.
+    has_own_parameters: False if no parameter was given, and the values are planfly's defaults for the mission.
     Raises MissionError for an autopilot without such parameters.
     """
     parameters = () if autopilot.parameters is None else autopilot.parameters.values
