@@ -63,6 +63,8 @@ class Conditions(DocumentConfig):
     height_datum: str | None
     zones: int = 0
     """Number of zones of the scenario and of the mission's fence."""
+    unused_parameters: tuple[str, ...] = ()
+    """Names in the parameter file that have no effect on the simulated flight."""
 
 
 def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilot: Autopilot) -> Conditions:
@@ -92,6 +94,7 @@ def plan_conditions(scenario: Scenario, aircraft: str, airspeed: float, autopilo
         terrain=None if terrain is None else terrain.source,
         height_datum=None if terrain is None else terrain.datum,
         zones=len(scenario.zones),
+        unused_parameters=() if autopilot.parameters is None else autopilot.parameters.unused,
     )
 
 

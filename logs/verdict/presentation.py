@@ -5,15 +5,24 @@ makes.  A presentation holds data; `logs.verdict.wording` phrases places and sug
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from logs.verdict.findings import Finding, closest_to_limit, undecided_findings
-from logs.verdict.rule_words import RULE_WORDS, RuleWords
+from logs.verdict.rule_words import FRONT_OVERLAP, RULE_WORDS, SIDE_OVERLAP, Margin, RuleWords
+
+# Words of the overlap of a survey's photos, which is shown apart from the photo lines: it is no share of a line.
+_OVERLAP_WORDS = replace(
+    RULE_WORDS["survey"],
+    title="photo overlap",
+    noun="photo overlap",
+    question="Do the photos of a survey overlap as required?",
+    margin=Margin("overlap", "%", 5.0),
+)
 
 
 @dataclass(frozen=True, slots=True)
 class RuleFindings:
-    """Findings of one rule, in the verdict's order."""
+    """Findings of one rule, or of one part of a rule, in the verdict's order."""
 
     words: RuleWords
     findings: tuple[Finding, ...]
@@ -99,6 +108,13 @@ def findings_by_rule(findings: Sequence[Finding]) -> tuple[RuleFindings, ...]:
     [[1, 0]]
     """
     grouped: dict[str, list[Finding]] = {name: [] for name in RULE_WORDS}
+    overlaps: list[Finding] = []
     for finding in findings:
-        grouped[finding.rule].append(finding)
-    return tuple(RuleFindings(RULE_WORDS[name], tuple(group)) for name, group in grouped.items() if group)
+        is_overlap = finding.rule == _OVERLAP_WORDS.name and finding.check in (FRONT_OVERLAP, SIDE_OVERLAP)
+        (overlaps if is_overlap else grouped[finding.rule]).append(finding)
+    rules = []
+    for name, group in grouped.items():
+        rules.append(RuleFindings(RULE_WORDS[name], tuple(group)))
+        if name == _OVERLAP_WORDS.name:
+            rules.append(RuleFindings(_OVERLAP_WORDS, tuple(overlaps)))
+    return tuple(rule for rule in rules if rule.findings)

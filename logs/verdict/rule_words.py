@@ -84,6 +84,11 @@ class RuleWords:
         return f"place_{self.name}"
 
 
+# Check of the rule "survey" that judges the overlap of photos along the lines.
+FRONT_OVERLAP = "front overlap"
+# Check of the rule "survey" that judges the overlap of photos across the lines.
+SIDE_OVERLAP = "side overlap"
+
 # The words of every rule by its name, in the order in which a verdict judges and lists the rules.
 RULE_WORDS: dict[str, RuleWords] = {
     words.name: words

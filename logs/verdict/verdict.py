@@ -14,7 +14,7 @@ from logs.verdict.document import (
     level_document,
     parameters_document,
 )
-from logs.verdict.findings import APART_FROM_FLIGHT, Finding, undecided_findings
+from logs.verdict.findings import APART_FROM_FLIGHT, Finding, closest_to_limit, undecided_findings
 from logs.verdict.junit import junit_text
 from logs.verdict.notebook import verdict_html
 from logs.verdict.places import DecidingParameter, LevelAnswer
@@ -135,7 +135,10 @@ class Verdict:
         >>> verdict.closest["slope"].margin
         4.0
         """
-        closest = {rule.words.name: rule.closest for rule in findings_by_rule(self.findings)}
+        rules = dict.fromkeys(finding.rule for finding in self.findings)
+        closest = {
+            rule: closest_to_limit([finding for finding in self.findings if finding.rule == rule]) for rule in rules
+        }
         return {name: finding for name, finding in closest.items() if finding is not None}
 
     def to_pandas(self) -> Any:

@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 from flight.mission.surveys import Survey
 from logs.verdict.measures.photo_lines import LineMeasure, OverlapMeasure
-from logs.verdict.rules.survey_rule import FRONT, SIDE, lost_text, overlap_text
+from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
+from logs.verdict.rules.survey_rule import lost_text, overlap_text
 from logs.verdict.tolerances import PHOTO_COVERAGE_FRACTION, PHOTO_OVERLAP_FRACTION
 from planfly.surveys.survey_remedies import NearMiss, SurveyRemedy, ordinal_text
 
@@ -62,7 +63,7 @@ def overlap_lines(measure: OverlapMeasure | None) -> tuple[str, ...]:
     """
     if measure is None:
         return ("overlap not judged: the camera is unknown (--camera)",)
-    texts = [overlap_text(measure, check) for check in (FRONT, SIDE)]
+    texts = [overlap_text(measure, check) for check in (FRONT_OVERLAP, SIDE_OVERLAP)]
     if measure.front is None:
         texts[0] = "front overlap not judged: the distance between photos is not stated, or no photo can be used"
     if measure.side is None:

@@ -4,7 +4,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, NoReturn, Protocol, TextIO
 
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
@@ -213,7 +213,7 @@ class LineParser(CommandParser):
                 "",
             ).partition("=")[0]
             if option:
-                parser.error(f"{option}: no such option{did_you_mean(option, parser.long_options())}")
+                parser.error(f"{option}: no such option{_similar_option(option, parser.long_options())}")
             parser.error(
                 f"{next((argument for argument in unknown_arguments if argument != '--'), unknown_arguments[0])}:"
                 " no such argument"
@@ -262,3 +262,15 @@ def error_text(error: PlanflyError, parser: CommandParser) -> str:
     if head in options and text.startswith(prefix + head):
         text = prefix + options[head] + text[len(prefix + head) :]
     return _KEYWORD.sub(lambda match: options.get(match[1] or match[2], match[0]), text)
+
+
+def _similar_option(option: str, options: Iterable[str]) -> str:
+    """Return the end of a message about an unknown option: the most similar option, or "".
+
+    The leading dashes, which all options share, are not compared.
+
+    >>> _similar_option("--terain", ["--terrain", "--overwrite"]), _similar_option("--terrain", ["--overwrite"])
+    (": did you mean '--terrain'?", '')
+    """
+    text = did_you_mean(option.lstrip("-"), [name.lstrip("-") for name in options])
+    return text.replace("did you mean '", "did you mean '--")

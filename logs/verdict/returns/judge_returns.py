@@ -29,6 +29,8 @@ from flight.autopilots.arduplane.rtl_point_mass import (
     fly_returns,
     make_return_environment,
 )
+from flight.autopilots.autopilot import Parameters
+from flight.autopilots.px4.parameters import FROM_ARDUPILOT, Px4Parameters
 from flight.mission.items import LANDINGS, Command
 from flight.mission.placing import landing_starts, return_points
 from flight.mission.return_path import (
@@ -401,7 +403,9 @@ def make_return_world(setup: FlightSetup) -> ReturnWorld:
     aircraft: Aircraft = find_logged_aircraft(setup.aircraft, setup.scenario.flight.aircraft)
     setup_parameters = setup.autopilot.model.parameters
     parameters = (
-        setup_parameters if isinstance(setup_parameters, ArduPilotParameters) else ArduPilotParameters.load(aircraft)
+        setup_parameters
+        if isinstance(setup_parameters, ArduPilotParameters)
+        else _with_px4_airspeeds(ArduPilotParameters.load(aircraft), setup_parameters)
     )
     return ReturnWorld(
         setup,
@@ -415,6 +419,15 @@ def make_return_world(setup: FlightSetup) -> ReturnWorld:
         setup_parameters is not None and setup_parameters is not parameters,
         landing_starts(setup.mission, setup.scenario.origin, setup.scenario.terrain),
     )
+
+
+def _with_px4_airspeeds(parameters: ArduPilotParameters, own: Parameters | None) -> ArduPilotParameters:
+    """Return ArduPlane's parameters of an aircraft with the airspeeds that the user's file of PX4 states."""
+    if not isinstance(own, Px4Parameters):
+        return parameters
+    stated = own.by_origin("file")
+    names = {name: FROM_ARDUPILOT[name][0] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")}
+    return parameters.changed(**{name: stated[px4_name] for name, px4_name in names.items() if px4_name in stated})
 
 
 # Function that flies a return in JSBSim and returns the minimum height above ground and the minimum distance outside a

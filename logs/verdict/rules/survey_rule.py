@@ -16,6 +16,7 @@ from logs.verdict.measures.route_requirements import RouteRequirements, turn_lim
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.rule import LogNeeds, Rule
+from logs.verdict.rule_words import FRONT_OVERLAP, SIDE_OVERLAP
 from logs.verdict.tolerances import (
     MAX_PHOTO_BANK_RAD,
     PHOTO_COVERAGE_FRACTION,
@@ -23,10 +24,6 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE_RAD,
     TURN_AROUND_RADII,
 )
-
-# Checks of the photos' overlap.
-FRONT = "front overlap"
-SIDE = "side overlap"
 
 
 def survey_findings(
@@ -57,8 +54,8 @@ def _overlap_findings(requirements: RouteRequirements, aligned: AlignedTrack | N
     if measure is None:
         return []
     overlaps = (
-        (FRONT, measure.front, measure.camera.front, survey.line(measure.line)),
-        (SIDE, measure.side, measure.camera.side, survey.line(measure.line_pair[1])),
+        (FRONT_OVERLAP, measure.front, measure.camera.front, survey.line(measure.line)),
+        (SIDE_OVERLAP, measure.side, measure.camera.side, survey.line(measure.line_pair[1])),
     )
     findings = []
     for check, overlap, required, line in overlaps:
@@ -94,9 +91,9 @@ def overlap_text(measure: OverlapMeasure, check: str) -> str:
 
     Return "" if the overlap is unknown.
 
-    check: `FRONT` or `SIDE`.
+    check: `FRONT_OVERLAP` or `SIDE_OVERLAP`.
     """
-    if check == FRONT:
+    if check == FRONT_OVERLAP:
         overlap, required = measure.front, measure.camera.front
         spacing_text = f" apart, one every {measure.camera.interval:g} s" if measure.is_camera_limited else " apart"
         lines_text = (

@@ -109,7 +109,7 @@ def test_every_verdict_is_told_what_it_is_for_and_holds_it_as_data() -> None:
     assert list(geometric.lines[2:5]) == said  # after the answer, and how it starts
     assert list(planned.lines[1:4]) == said
     for verdict in (geometric, planned):
-        assert json.loads(verdict_json(verdict))["conditions"] == asdict(conditions)
+        assert json.loads(verdict_json(verdict))["conditions"] == json.loads(json.dumps(asdict(conditions)))
 
 
 def test_an_imported_flight_is_told_as_far_as_its_log_goes() -> None:
@@ -171,3 +171,13 @@ def test_a_corridor_that_nobody_stated_says_what_it_is_made_of_and_what_it_is_wi
     )
     stated = setup.scenario.limits.model_copy(update={"corridor_m": 30.0})
     assert corridor_line(survey.in_scenario(replace(setup.scenario, limits=stated))) == ""
+
+
+def test_all_names_of_a_parameter_file_without_effect_are_data() -> None:
+    """A line names four of them; the conditions name all."""
+    names = [f"CAM{k}_FEEDBACK" for k in range(9)]
+    law = ArduPlane(
+        ArduPilotParameters.of_text("\n".join(f"{name} 1" for name in names) + "\nWP_RADIUS 60\n", "a.parm")
+    )
+    assert judging_conditions(replace(make_setup(), autopilot=law)).unused_parameters == tuple(names)
+    assert judging_conditions(make_setup()).unused_parameters == ()

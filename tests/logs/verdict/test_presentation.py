@@ -88,3 +88,26 @@ def test_every_rendering_shows_the_same_failures_in_the_same_order() -> None:
     # Four findings failed, and the verdict.
     assert suite.get("failures") == "5"
     assert suite.get("skipped") == "1"
+
+
+def test_the_overlap_of_photos_is_shown_apart_from_the_photo_lines() -> None:
+    """16 lines, of which one fails, and two overlaps of -23 % and 70 %: no share of a line is below 0."""
+    lines = [
+        make_finding(
+            "survey", Place("leg", k), ok=k > 0, reason="", margin=k - 0.5, flown=94.5 + k, limit=95.0, unit="%"
+        )
+        for k in range(16)
+    ]
+    overlaps = [
+        make_finding(
+            "survey", Place("leg", k), ok=flown > 0.0, reason="", margin=flown, flown=flown, unit="%", check=check
+        )
+        for k, (check, flown) in enumerate((("side overlap", -23.0), ("front overlap", 70.0)))
+    ]
+    of_lines, of_overlap = findings_by_rule([*lines, *overlaps])
+    assert (of_lines.words.title, of_lines.count_text) == ("photo lines", "15 of 16 ok")
+    assert (of_overlap.words.title, of_overlap.count_text) == ("photo overlap", "1 of 2 ok")
+    assert of_overlap.words.margin is not None
+    assert of_overlap.words.margin.quantity == "overlap"
+    assert of_lines.closest is lines[0]
+    assert of_overlap.closest is overlaps[0]

@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 import planfly
+from flight.mission.items import MissionItem
+from flight.mission_files.formats import mission_text, read_mission
 from flight.simulation.setup import FlightSetup
 from logs.verdict.verdict import Verdict
 from planfly.api import surveying
@@ -106,6 +108,32 @@ def test_a_parameter_that_would_help_is_written_beside_ones_own(
         "# mine\nNAVL1_PERIOD,15.5\nSERVO1_TRIM,1500\nROLL_LIMIT_DEG,47\n"
     )
     assert len(Path("better/parameter.waypoints").read_text(encoding="ascii").splitlines()) == 19
+
+
+def test_a_layout_for_a_plan_is_a_plan_with_all_that_it_holds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With fence, rally points and firmwareType; its items hold no camera, so that the next command states it."""
+
+    def found(setup: FlightSetup, _: Airframe, verdict: Verdict, __: Any) -> TriedRemedies:
+        laid = replace(setup.mission, items=setup.mission.items[:-1])
+        return TriedRemedies((SurveyRemedy("turn-around", "", 0.0, 150.0, "m", verdict, laid, 5000.0, 150.0),))
+
+    monkeypatch.setattr(surveying, "survey_remedies", found)
+    monkeypatch.chdir(tmp_path)
+    mission = read_mission(FIELD_SURVEY)
+    lat, lon = next((item.lat_deg, item.lon_deg) for item in mission.items if item.has_position)
+    corners = ((lat - 0.2, lon - 0.2), (lat - 0.2, lon + 0.2), (lat + 0.2, lon))
+    fences = tuple(MissionItem(k, 5001, 0, (3.0, 0.0, 0.0, 0.0), *place, 0.0) for k, place in enumerate(corners))
+    rally = MissionItem(0, 5100, 3, (0.0,) * 4, lat, lon, 100.0)
+    whole = replace(mission, fences=fences, rally=(rally,), autopilot="px4")
+    Path("field.plan").write_text(mission_text(whole, "plan"), encoding="utf-8")
+    options = ["--aircraft", "x8", "--suggest", "--out", "better", "--camera", "23.5x15.6,16,75,60"]
+    assert main(["survey", "field.plan", *options]) == 4
+    assert "next      planfly survey better/turn-around.plan with the same options" in capsys.readouterr().out
+    written = read_mission(Path("better/turn-around.plan"))
+    assert (len(written.items), len(written.fences), len(written.rally)) == (len(mission.items) - 1, 3, 1)
+    assert written.autopilot == "px4"
 
 
 @pytest.mark.parametrize("camera", [(23.5, 15.6), (23.5, 0.0, 16.0), "23.5x15.6,16", (1.0, 1.0, 1.0, 70.0, 100.0), 5])

@@ -88,6 +88,8 @@ Output = pytest.CaptureFixture[str]
     [
         ("flyy m.plan", "planfly: 'flyy': no such command: did you mean 'fly'? (see planfly --help)"),
         ("fly m.plan --wnd 8,270", "planfly fly: --wnd: no such option: did you mean '--wind'?"),
+        # All options share their dashes: "--overwrite" is not like "--terrain".
+        ("export a.plan b.plan --terrain x", "planfly export: --terrain: no such option (see planfly export --help)"),
         ("fly m.plan --terain=x", "planfly fly: --terain: no such option: did you mean '--terrain'?"),
         ("run tight --log f.mcap", "planfly run: "),
         ("check a.mcap b.mcap", "planfly check: b.mcap: no such argument (see planfly check --help)"),

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flight.autopilots.px4.autopilot import Px4
+from flight.autopilots.px4.parameters import Px4Parameters
 from flight.mission.items import Command, Frame, MissionItem
 from flight.mission.return_path import ReturnPoint
 from flight.simulation.setup import FlightSetup
@@ -313,3 +315,14 @@ def test_without_a_home_there_is_nowhere_to_return_to(tmp_path: Path) -> None:
     setup = hill_setup(tmp_path)
     with pytest.raises(MissionError, match="home: not stated"):
         make_return_world(replace(setup, mission=replace(setup.mission, home=None)))
+
+
+def test_glides_and_returns_with_px4_have_the_airspeeds_of_its_file(tmp_path: Path) -> None:
+    """PX4's return is ArduPlane's, at the user's own least and cruise airspeed; other values are the aircraft's."""
+    setup = hill_setup(tmp_path)
+    own = Px4(Px4Parameters.of_text("FW_AIRSPD_MIN 19.5\nFW_AIRSPD_TRIM 24\nFW_AIRSPD_MAX 30\n", "a.params"))
+    of_file = make_return_world(replace(setup, autopilot=own)).parameters
+    of_aircraft = make_return_world(replace(setup, autopilot=Px4(Px4Parameters.defaults()))).parameters
+    assert [of_file[name] for name in ("AIRSPEED_MIN", "AIRSPEED_CRUISE", "AIRSPEED_MAX")] == [19.5, 24.0, 30.0]
+    assert of_aircraft["AIRSPEED_MIN"] == 18.0
+    assert of_file["ROLL_LIMIT_DEG"] == of_aircraft["ROLL_LIMIT_DEG"]
