@@ -28,6 +28,8 @@ from world.terrain import Terrain
 PLAN_SCHEMA = "planfly.plan/1"
 # Algorithm of a plan whose waypoints were given instead of searched.
 GIVEN_WAYPOINTS = "given"
+# First words of a problem of a departure or an approach, which is searched for given waypoints as well.
+GROUND_PROBLEMS = ("climb-out: ", "landing: ")
 # Maximum size of a file, bytes; ten thousand waypoints with as many threats take 4 MB.
 MAX_BYTES = 64 * 2**20
 
@@ -60,7 +62,10 @@ class Violations(NamedTuple):
 
 
 class Objectives(NamedTuple):
-    """Objectives of a path, in the order of `Objective`: length / straight line, and three sums over its points."""
+    """Objectives of a path, in the order of `Objective`: length / straight line, and three sums over its points.
+
+    height_sum: sum of the heights above ground, divided by the six points per leg (eq. 11), m.
+    """
 
     length_ratio: float
     kill_exposure: float
@@ -72,16 +77,20 @@ class Objectives(NamedTuple):
 class Certificate:
     """Result of the continuous check along the whole path, not only at six points per leg.
 
-    Margins are the smallest difference of limit and value, negative if the path fails.
+    Margins are the smallest difference of limit and value, negative if the path fails.  For algorithms with graded
+    violations, as the default, clearance, bounds, kill_distance, zone_distance and headroom are margins of the flight:
+    the deviation that is predicted for the autopilot on legs and at corners, its lag in altitude and the navigation
+    error are subtracted.  For the others, such as "umda" and "de-paper", they are margins of the legs and fly-by arcs.
+    For given waypoints the algorithm of the scenario decides.
 
     turn, slope: margins, rad.
     available_length: smallest length of a leg between its two turns, m; inf if only the fixed turn limit applies.
     clearance: smallest height above ground minus the required clearance, m.
     bounds: margin to map, floor and ceiling, m.
-    kill_distance: distance of the path from the nearest missile sphere, m; negative inside, inf without missiles.
+    kill_distance: distance from the nearest missile sphere, m; negative inside, inf without missiles.
     zone_distance: distance outside exclusions and inside inclusions, horizontal or vertical, m; negative if a zone is
     violated, inf without zones.
-    headroom: maximum height above ground minus the path's height, m; inf without a maximum.
+    headroom: maximum height above ground minus the greatest height, m; inf without a maximum.
     problems: one line per failure, empty if the path is certified.
     path_digest: `path_digest` of the certified path; "" if unknown.
     """
@@ -112,9 +121,9 @@ def path_digest(waypoints: Floats) -> str:
     return hashlib.sha256(np.ascontiguousarray(waypoints, dtype=np.float64).tobytes()).hexdigest()[:16]
 
 
-@dataclass(frozen=True, slots=True, repr=False)
+@dataclass(frozen=True, slots=True, repr=False, eq=False)
 class Plan:
-    """Planned path.
+    """Planned path.  Plans are equal if their files are (`plan_json`).
 
     scenario: the scenario of the plan.
     waypoints: (w, 3) east and north of the scenario's origin and altitude AMSL, m. They cannot be replaced without the
@@ -175,6 +184,31 @@ class Plan:
     def state(self) -> str:
         """State of the plan in words: safe, feasible or neither."""
         return "safe" if self.safe else "feasible, but inside a missile's reach" if self.feasible else "not feasible"
+
+    @property
+    def unmet_margins(self) -> tuple[str, ...]:
+        """Margins of the planner that given waypoints do not meet; empty for a searched plan.
+
+        A verdict on given waypoints judges their flight, which may be flyable without these margins.
+        """
+        if self.algorithm != GIVEN_WAYPOINTS:
+            return ()
+        return tuple(problem for problem in self._problems if not problem.startswith(GROUND_PROBLEMS))
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Problems with which no flight of the plan is flyable: those of a searched path, departure or approach."""
+        return tuple(problem for problem in self._problems if problem not in self.unmet_margins)
+
+    @property
+    def _problems(self) -> tuple[str, ...]:
+        """Problems of the certificate; if it has none, the violations at the paper's points."""
+        if self.certificate.problems or not any(self.violations):
+            return self.certificate.problems
+        return ("it violates constraints at its sampled points",)
+
+    def __eq__(self, other: object) -> bool:
+        return plan_json(self) == plan_json(other) if isinstance(other, Plan) else NotImplemented
 
     def __repr__(self) -> str:
         ratio = self.objectives.length_ratio
@@ -382,9 +416,9 @@ def plan_html(plan: Plan) -> str:
     rows = [
         ("waypoints", len(plan.waypoints)),
         ("length / straight line", f"{plan.objectives.length_ratio:.4f}"),
-        ("clearance to spare", f"{certificate.clearance:.1f} m"),
+        ("clearance to spare, at least", f"{certificate.clearance:.1f} m"),
         (
-            "outside missiles' reach by",
+            "outside missiles' reach by at least",
             f"{certificate.kill_distance:.0f} m" if math.isfinite(certificate.kill_distance) else "none",
         ),
         ("turns and slopes to spare", f"{math.degrees(certificate.turn):.1f}°, {math.degrees(certificate.slope):.2f}°"),

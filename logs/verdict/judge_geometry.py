@@ -270,9 +270,9 @@ def judge_geometry(setup: FlightSetup, requirements: RouteRequirements | None = 
     findings = (
         *mission_findings(setup),
         *with_suggestions(requirements, None, geometric_findings(requirements)),
-        *([_infeasible_finding(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
+        *([_infeasible_finding(setup.plan)] if setup.plan is not None and setup.plan.failures else []),
     )
-    complete = setup.plan is None or setup.plan.feasible
+    complete = setup.plan is None or not setup.plan.failures
     unjudged, has_failed = undecided_text(findings), any(finding.ok is False for finding in findings)
     flyable = complete and not unjudged and not has_failed
     headline_text = headline(findings, flyable, setup.envelope.source)
@@ -375,8 +375,7 @@ def judge_plan_only(plan: Plan, conditions: Conditions | None = None) -> Verdict
 
 def _infeasible_finding(plan: Plan) -> Finding:
     """Return the failed finding on a plan that is not feasible, with the problems of its certificate."""
-    problems = plan.certificate.problems or ("the best path still has violations",)
-    first_problem, *other_problems = problems
+    first_problem, *other_problems = plan.failures
     fault = message(
         f"no feasible plan was found: {first_problem}", "".join(f"; {problem}" for problem in other_problems)
     )

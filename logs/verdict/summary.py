@@ -226,6 +226,8 @@ def summary_lines(
         if RULE_WORDS[finding.rule].is_warning and finding.ok is None
     ]
     lines += _terrain_error_lines(findings, setup)
+    if setup.plan is not None and setup.plan.unmet_margins:
+        lines.append(f"Planner's margins not met: {'; '.join(setup.plan.unmet_margins)}")
     if setup.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.notes)}")
     if level == "flown":

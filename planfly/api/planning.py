@@ -51,7 +51,9 @@ def plan(
 
     scenario: a built-in scenario's name (`planfly.scenarios()` lists them), a TOML file's path, or a `Scenario`.
     waypoints: a path of your own, (w, 3): east and north of the scenario's origin and altitude AMSL, m, from the
-    scenario's start to its destination.  Nothing is searched: the path is scored and certified as it stands.
+    scenario's start to its destination.  Nothing is searched: the path is scored and certified as it stands.  Margins
+    of the planner that it does not meet make the plan "not feasible" and are named by the verdict, which judges only
+    the flight.
     out: file for the plan.json, in which {name} and {seed} stand for the scenario's name and the seed.
     overwrite: True replaces an existing file.
 

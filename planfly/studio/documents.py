@@ -25,7 +25,7 @@ from planfly.workflow.airframe import Airframe, choose_seed, load_airframe
 from planfly.workflow.imported_flights import ImportedFlight
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.open_flight import make_setup, mission_of_plan, open_flight
-from planner.plan import Certificate, Objectives, Plan, Violations, plan_json
+from planner.plan import GROUND_PROBLEMS, Certificate, Objectives, Plan, Violations, plan_json
 from planner.search.plan_path import certify_waypoints
 from world.arrays import Floats
 from world.elevation_formats import EMBEDDED
@@ -330,9 +330,10 @@ def _saved_plan(name: str, context: EditContext, judged_mission: JudgedMission) 
         not context.planned or planned_mission(new_plan, context.airframe).items != judged_mission.mission.items
     )
     losses = ["the items: a plan stores only positions, and its mission is made from them"] if has_changed_items else []
-    if not new_plan.feasible:
-        problem = (new_plan.certificate.problems or ("violations are counted",))[0]
-        losses.append(f"the plan is not feasible: {problem}")
+    if new_plan.failures:
+        losses.append(f"the plan is not feasible: {new_plan.failures[0]}")
+    elif new_plan.unmet_margins:
+        losses.append(f"planner's margins not met: {new_plan.unmet_margins[0]}")
     return SavedFile(name, plan_json(new_plan).encode(), (*losses, *_lost_parameters(context)))
 
 
@@ -408,7 +409,7 @@ def _plan_with_ground_phases(context: EditContext, mission: Mission) -> Plan | N
     if is_unchanged:
         plan = replace(_certified_plan(context, waypoints), ways=opened_plan.ways)
         ground_problems = [
-            problem for problem in opened_plan.certificate.problems if problem.startswith(("climb-out: ", "landing: "))
+            problem for problem in opened_plan.certificate.problems if problem.startswith(GROUND_PROBLEMS)
         ]
         plan = replace(
             plan, certificate=replace(plan.certificate, problems=(*plan.certificate.problems, *ground_problems))

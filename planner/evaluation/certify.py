@@ -128,6 +128,7 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
         if turns_length + settling_and_roll > length + _EPSILON:
             description = (
                 f"{length:.0f} m long, its turns need {turns_length:.0f} m and {settling_and_roll:.0f} m to settle"
+                " with a plan's margins for the autopilot's turns"
             )
             faults.append((float(length - turns_length) - settling_and_roll, f"leg {i}", description))
     problems += _summarise_faults(faults)

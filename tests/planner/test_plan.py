@@ -13,6 +13,7 @@ import pytest
 
 from planner.ground_ways import ClimbOut, DepartureAndApproach, Descent
 from planner.plan import (
+    GIVEN_WAYPOINTS,
     Certificate,
     Objective,
     Plan,
@@ -122,6 +123,24 @@ def test_feasible_is_counted_and_continuous_and_safe_is_outside_missiles_too() -
         plan = made(certificate=replace(CERTIFICATE, kill_distance=distance))
         assert (plan.feasible, plan.safe) == (True, safe)
     assert not made(certificate=failed).safe
+
+
+def test_plans_are_equal_if_their_files_are() -> None:
+    assert made() == made()
+    moved = made(certificate=CERTIFICATE, violations=np.array([0, 1, 0, 0]))
+    assert made() != moved
+    assert made() != "plan"
+
+
+def test_margins_that_given_waypoints_miss_do_not_fail() -> None:
+    problems = ("leg 1: 420 m long", "landing: none of 3 paths is clear")
+    certificate, counted = replace(CERTIFICATE, problems=problems), ("it violates constraints at its sampled points",)
+    for algorithm, failures, unmet in (("umda", problems, ()), (GIVEN_WAYPOINTS, problems[1:], problems[:1])):
+        plan = made(certificate=certificate, algorithm=algorithm)
+        assert (plan.failures, plan.unmet_margins) == (failures, unmet)
+    assert made(violations=np.eye(4)[0]).failures == counted
+    assert made(violations=np.eye(4)[0], algorithm=GIVEN_WAYPOINTS).unmet_margins == counted
+    assert made().failures == made(algorithm=GIVEN_WAYPOINTS).unmet_margins == ()
 
 
 def test_arrays_are_locked() -> None:
@@ -267,8 +286,8 @@ def test_a_notebook_shows_what_it_keeps_from_its_limits(plan: Plan) -> None:
     rows = {row[0].text: row[1].text for row in page.find("table/tbody") or ()}
     assert page.findtext("strong") == "Plan tight: safe"
     assert rows["length / straight line"] == "1.2500"
-    assert rows["clearance to spare"] == "9.0 m"
-    assert rows["outside missiles' reach by"] == "51 m"
+    assert rows["clearance to spare, at least"] == "9.0 m"
+    assert rows["outside missiles' reach by at least"] == "51 m"
     assert rows["turns and slopes to spare"] == "5.0°, 1.25°"
     assert rows["algorithm, seed"] == "umda, 7"
 

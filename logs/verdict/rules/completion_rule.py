@@ -22,9 +22,8 @@ def completion_findings(
     """Judge whether a flight followed a feasible plan to the last waypoint, and whether its log is complete."""
     plan = requirements.setup.plan
     faults = []
-    if plan is not None and not plan.feasible:
-        problem = next(iter(plan.certificate.problems), "it violates constraints at its sampled points")
-        faults.append(message("the plan is not feasible", f": {problem}"))
+    if plan is not None and plan.failures:
+        faults.append(message("the plan is not feasible", f": {plan.failures[0]}"))
     if end_reason != "completed":
         faults.append(message(f"the flight ended early: {end_reason}", _ending_place_text(requirements, aligned)))
     if not log_complete:

@@ -9,6 +9,7 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from planner.plan import GIVEN_WAYPOINTS
 from tests.logs.verdict.judging import bad_plan, judge, leg, of, waypoint
 from tests.synthetic import (
     copied,
@@ -41,6 +42,27 @@ def test_an_infeasible_plan_flown_is_not_complete(setup: FlightSetup, track: Tra
     plan = bad_plan(setup)
     assert not judge(replace(setup, plan=plan), track).complete
     assert not judge_geometry(replace(setup, plan=plan)).flyable
+
+
+def test_given_waypoints_need_not_meet_the_planners_margins(setup: FlightSetup, track: Track) -> None:
+    """Nothing was searched for them: as the mission of the same waypoints, they are judged by their flight."""
+    given = replace(setup, plan=replace(bad_plan(setup), algorithm=GIVEN_WAYPOINTS))
+    line = "Planner's margins not met: leg 2: slope 16.6 deg beyond 13.7 deg"
+    for verdict, mission in (
+        (judge(given, track), judge(setup, track)),
+        (judge_geometry(given), judge_geometry(setup)),
+    ):
+        assert (verdict.flyable, verdict.complete, verdict.findings) == (True, True, mission.findings)
+        assert [words for words in verdict.lines if words not in mission.lines] == [line]
+    # A departure is searched for them, too.
+    certificate = replace(given.plan.certificate, problems=("climb-out: no path", "leg 2: slope 16.6 deg"))
+    grounded = replace(given, plan=replace(given.plan, certificate=certificate))
+    flown = judge(grounded, track)
+    assert of(flown, "completion").reason == "the plan is not feasible: climb-out: no path"
+    assert "Planner's margins not met: leg 2: slope 16.6 deg" in flown.lines
+    assert (
+        judge_geometry(grounded).headline == "not flyable: completion (no feasible plan was found: climb-out: no path)"
+    )
 
 
 def test_a_circle_beside_a_leg_is_not_the_leg(setup: FlightSetup, track: Track) -> None:
