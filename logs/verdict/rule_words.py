@@ -224,6 +224,7 @@ RULE_WORDS: dict[str, RuleWords] = {
             question="Does the launch start the motor, leave its runway in time, lose no height, and climb out free of"
             " obstacles?",
             margin=Margin("height above ground", "m", 10.0),
+            urgency=4,
             phrase=name_reason,
             unjudged="launch",
             explains_unjudged=True,

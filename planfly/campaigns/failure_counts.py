@@ -20,7 +20,7 @@ class RuleFailures:
 
 
 def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[RuleFailures, ...]:
-    """Count flights by failed rule and place.
+    """Count flights by failed rule and place; the most urgent rules, which may cause other failures, come first.
 
     flights: failed rules and places of each flight.
 
@@ -34,9 +34,8 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
         counts.update({rule for rule, _ in failed_findings})
         for rule, place in failed_findings:
             places.setdefault(rule, Counter())[place] += 1
-    return tuple(
-        RuleFailures(rule, counts[rule], tuple(places[rule].most_common())) for rule in RULE_WORDS if counts[rule]
-    )
+    rules = sorted(counts, key=lambda rule: (-RULE_WORDS[rule].urgency, list(RULE_WORDS).index(rule)))
+    return tuple(RuleFailures(rule, counts[rule], tuple(places[rule].most_common())) for rule in rules)
 
 
 def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:

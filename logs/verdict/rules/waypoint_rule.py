@@ -85,8 +85,8 @@ def _flown_finding(requirements: RouteRequirements, aligned: AlignedTrack | None
     """
     condition, setup = acceptance_condition(requirements, i), requirements.setup
     offset, max_distance = float(requirements.fly_by_offset[i]), condition.radius + condition.tolerance
-    distance, reason = math.nan, "missed: nothing was flown"
-    ok: bool | None = False
+    distance, reason = math.nan, "not reached: nothing was flown"
+    ok: bool | None = None
     facts: tuple[Fact, ...] = ()
     faults: list[Message] = []
     if aligned is not None:

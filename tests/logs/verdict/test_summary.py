@@ -32,7 +32,7 @@ def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
     )
     assert headline(found, False).endswith(f", +{len(RULES) - 4} more")
     assert headline(found, False).startswith(
-        "not flyable: loss of control (why), completion (why), mission (why), slope ("
+        "not flyable: launch (why), loss of control (why), completion (why), mission (why), +"
     )
 
 

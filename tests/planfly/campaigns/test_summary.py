@@ -6,6 +6,7 @@ from pathlib import Path
 
 from logs.verdict.places import Place
 from planfly.campaigns.campaign_base import CampaignBase
+from planfly.campaigns.failure_counts import count_failures
 from planfly.campaigns.report import campaign_page
 from planfly.campaigns.summary import campaign_lines, summary_json
 from tests.planfly.campaigns.made_campaigns import made_flight
@@ -67,3 +68,10 @@ def test_too_few_flights_show_no_sensitivities(base: CampaignBase, tmp_path: Pat
         assert summary.sensitivities == ()
         assert "would show what the margin depends on" in campaign_lines(summary)[-1]
         assert "What the deciding margin depends on" not in campaign_page(base, summary, store, "").decode()
+
+
+def test_what_ends_a_flight_comes_before_what_it_then_misses() -> None:
+    flight = [(rule, Place("waypoint", 1)) for rule in ("waypoint", "slope", "completion", "departure", "launch")]
+    assert [failures.rule for failures in count_failures([flight])] == [
+        *("launch", "departure", "completion", "slope", "waypoint")
+    ]

@@ -176,3 +176,17 @@ def test_a_circle_where_the_wind_leaves_no_way_around_says_so() -> None:
     )
     assert one.ok is False
     assert "at 25 m/s the circle cannot be flown" in one.reason
+
+
+def test_a_flight_that_ends_in_a_loiter_says_nothing_against_the_loiter() -> None:
+    """It ends 500 m after the circle, 1.3 km around, is joined: the next corner is not reached."""
+    requirements, aligned, circle = laid(loiter(), stop=2500.0)
+    corner = int(np.argmin(aligned.passed))
+    assert circle.first < corner < circle.last
+    found = [
+        make_finding("waypoint", requirements.waypoint(k), ok=k < corner, reason="")
+        for k in range(circle.first, corner + 1)
+    ]
+    (item,) = merge_loiter_findings(requirements, aligned, found)
+    assert (item.rule, item.ok) == ("loiter", None)
+    assert "the flight did not reach its end" in item.reason

@@ -13,6 +13,8 @@ from flight.autopilots.px4.autopilot import Px4
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.rules.waypoint_rule import waypoint_findings
 from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint
 from tests.synthetic import bank_radius, bump, fly_path, make_setup, waypoint_stations
 
@@ -196,3 +198,9 @@ def test_px4_turns_by_its_own_radius_and_says_so() -> None:
     own = replace(setup, route=replace(setup.route, acceptance=np.zeros(3)))
     told = of(judge_geometry(own), "waypoint", waypoint(1)).reason
     assert told == "PX4 turns to the next leg 10 m before the waypoint, or once the aircraft has passed the waypoint"
+
+
+def test_a_flight_without_a_track_missed_no_waypoint(setup: FlightSetup) -> None:
+    """The cause, a crash at the launch, is a finding of its own."""
+    found = waypoint_findings(route_requirements(setup), None)
+    assert {(item.ok, item.reason) for item in found} == {(None, "not reached: nothing was flown")}
