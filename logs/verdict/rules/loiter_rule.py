@@ -177,10 +177,8 @@ def _loiter_finding(
     corners = slice(circle.first, circle.last + 1)
     is_known = bool(np.isfinite(requirements.turn_limit[corners]).all())
     min_radius = float(requirements.min_radius[corners].max()) if is_known else math.nan
+    corner_findings = [_without_early_end(aligned, finding) for finding in corner_findings]
     failed_corners = [finding for finding in corner_findings if finding.ok is False]
-    # The end of a flight says nothing about the corners after it; the rule on the completion states the end.
-    unreached = [] if aligned is None else [item for item in failed_corners if not _is_passed(aligned, item)]
-    failed_corners = [finding for finding in failed_corners if finding not in unreached]
     joins_at_center = requirements.setup.autopilot.loiters.steers_to_center
     uses_parameter = _uses_parameter_radius(requirements, circle)
     if joins_at_center and (uses_parameter if aligned is None else _has_reached(requirements, aligned, circle)):
@@ -211,7 +209,7 @@ def _loiter_finding(
         if joins_at_center and not uses_parameter and circle.laps >= 1.0 and mean_radius > max_radius:
             faults.append(message(f"flown with a mean radius of {mean_radius:.0f} m", f"; at most {max_radius:.0f} m"))
     ok: bool | None = not (faults or failed_corners)
-    if ok and (unreached or any(finding.ok is None for finding in corner_findings)):
+    if ok and any(finding.ok is None for finding in corner_findings):
         ok = None
         is_complete = aligned is not None and bool(aligned.passed[-1])
         facts.append("a part of the circle was not flown" if is_complete else "the flight did not reach its end")
@@ -288,10 +286,11 @@ def _hazards_text(requirements: RouteRequirements, circle: LoiterCircle, min_rad
     return f"{reach_text}, {', '.join(hazards)}; only a simulated flight shows where the aircraft circles"
 
 
-def _is_passed(aligned: AlignedTrack, corner_finding: Finding) -> bool:
-    """Return True if the flight passed the waypoint of a finding."""
+def _without_early_end(aligned: AlignedTrack | None, corner_finding: Finding) -> Finding:
+    """Return a finding as not judged if the flight ended before its corner; the completion rule judges such an end."""
     index = corner_finding.place.index
-    return index is not None and bool(aligned.passed[index])
+    is_reached = aligned is None or index is None or bool(aligned.passed[index])
+    return corner_finding if is_reached or corner_finding.ok is not False else replace(corner_finding, ok=None)
 
 
 def _has_reached(requirements: RouteRequirements, aligned: AlignedTrack, circle: LoiterCircle) -> bool:
