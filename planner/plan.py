@@ -78,10 +78,12 @@ class Certificate:
     """Result of the continuous check along the whole path, not only at six points per leg.
 
     Margins are the smallest difference of limit and value, negative if the path fails.  For algorithms with graded
-    violations, as the default, clearance, bounds, kill_distance, zone_distance and headroom are margins of the flight:
-    the deviation that is predicted for the autopilot on legs and at corners, its lag in altitude and the navigation
-    error are subtracted.  For the others, such as "umda" and "de-paper", they are margins of the legs and fly-by arcs.
-    For given waypoints the algorithm of the scenario decides.
+    violations, as the default, clearance, kill_distance, zone_distance and headroom are those of the worst position
+    that is predicted for the autopilot: beside the legs by its lateral deviation, navigation error and excursion at
+    corners, and above or below by its lag in altitude on slopes.  Its vertical deviation on a level leg is part of the
+    required margins.  For bounds both deviations are subtracted.  For other algorithms, such as "umda" and "de-paper",
+    nothing is subtracted: the margins are of the legs and fly-by arcs.  For given waypoints the algorithm of the
+    scenario decides.
 
     turn, slope: margins, rad.
     available_length: smallest length of a leg between its two turns, m; inf if only the fixed turn limit applies.

@@ -1,4 +1,4 @@
-"""Convert geofences from and to zones, test positions against them, and build rally points."""
+"""Convert geofences from and to zones, and test positions against them."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem, round_to_grid
+from flight.mission.items import Command, Frame, ItemProblem, Mission, MissionItem, round_to_grid
 from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneKind, is_hole, make_cylinder, make_polygon
 from world.airspace.zones_on_map import add_corner_count, ring_on_map
 from world.arrays import Floats
@@ -108,7 +108,7 @@ def _joined_names(names: list[str]) -> str:
 
 
 # ----------------------------------------------------------------------
-# Shapes of a geofence, tests of positions against them, and the fence and rally points of a scenario.
+# Shapes of a geofence, tests of positions against them, and the fence of a scenario.
 
 
 # Commands of a polygon's vertices.
@@ -194,9 +194,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
     mission's own fence is kept. An exclusion that the mission passes above or below, according to ``passes``, is
     omitted: an autopilot with such a fence refuses the mission or aborts it.
 
-    Rally points are the first and last position of the mission, at the mission's height above home; a mission with
-    rally points, and one from or to the ground, keeps its own. The notes list what a fence cannot represent, and what
-    is omitted.
+    The mission keeps its rally points. The notes list what a fence cannot represent, and what is omitted.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)
@@ -232,10 +230,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
         limit_text = f"{scenario.limits.max_height_m:g} m above ground"
         notes.append(f"a fence does not follow the ground: the maximum height of {limit_text} is not part of it")
     all_fences = number_items([*fences, *mission.fences])
-    # A mission that starts or ends on the ground keeps its rally points: its last position is the landing point.
-    keeps_rally = bool(mission.rally) or scenario.launch is not None or scenario.landing is not None
-    rally = mission.rally if keeps_rally else number_items(_ends_as_rally_points(mission))
-    return replace(mission, fences=all_fences, rally=rally), tuple(notes)
+    return replace(mission, fences=all_fences), tuple(notes)
 
 
 def _missile_zones(scenario: Scenario) -> list[Zone]:
@@ -259,35 +254,6 @@ def _omit_crossed_exclusions(
         else:
             remaining.append(zone)
     return remaining, crossed_names
-
-
-def _ends_as_rally_points(mission: Mission) -> list[MissionItem]:
-    """Return rally points at the first and last position of a mission; none if the altitude of home is unknown."""
-    positions = [item for item in mission.items if item.has_position]
-    home = mission.home
-    if home is None or not positions or math.isnan(home.alt):
-        return []
-    ends = [positions[0], positions[-1]] if len(positions) > 1 else positions
-    return [
-        MissionItem(
-            0,
-            int(Command.NAV_RALLY_POINT),
-            int(Frame.GLOBAL_RELATIVE_ALT),
-            (0.0,) * 4,
-            end.lat_deg,
-            end.lon_deg,
-            round(end.alt - _home_offset(end, home), 3),
-        )
-        for end in ends
-    ]
-
-
-def _home_offset(item: MissionItem, home: Home) -> float:
-    """Return the altitude to subtract from an item's altitude to get its height above home, m.
-
-    The result is home's altitude for an altitude AMSL, and 0 for a height above home.
-    """
-    return home.alt if item.frame in (Frame.GLOBAL, Frame.GLOBAL_INT) else 0.0
 
 
 def number_items(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:

@@ -16,6 +16,8 @@ from world.scenario_tables import SCALE_RATIOS
 
 # Tables of a position, which replace another position as a whole.
 _POSITIONS = ("start", "destination", "home")
+# Keys that name the source of a table; with another value of one of them, the table replaces the base's table.
+_SOURCE_KEYS = ("kind", "path")
 # Tables from which the terrain is made.
 _TERRAIN_TABLES = frozenset(("terrain", "area", "origin"))
 # Keys of the columns of an array of threats.
@@ -40,7 +42,8 @@ def make_scenario(
     and detection radius, m.  A radius that is 0 or missing means no such zone; a scale that is missing is a quarter of
     the kill radius and a third of the detection radius.
     tables: values of other tables, as mappings with the keys of a scenario file, and its name and description; other
-    keys of a table stay, except for a position, which is replaced as a whole.
+    keys of a table stay, except for a position, and a table of another kind or file, which are replaced as a whole.
+    Another elevation file replaces the base's origin, too, unless an origin is given: its centre becomes the origin.
     Raises a `planfly.PlanflyError` for values that a scenario file must not have.
 
     >>> import planfly
@@ -53,7 +56,9 @@ def make_scenario(
     spec = base_scenario.to_json()
     for name, values in tables.items():
         is_merged = isinstance(values, Mapping) and isinstance(spec.get(name), dict) and name not in _POSITIONS
-        spec[name] = spec[name] | dict(values) if is_merged else values
+        spec[name] = _with_changes(spec[name], values) if is_merged else values
+    if spec["terrain"].get("path") != base_scenario.to_json()["terrain"].get("path") and "origin" not in tables:
+        spec.pop("origin", None)
     if threats is not None:
         spec["threats"] = _threat_tables(threats)
     terrain = base_scenario.terrain if _TERRAIN_TABLES.isdisjoint(tables) else None
@@ -63,6 +68,13 @@ def make_scenario(
         if note not in base_scenario.notes:
             report_line(f"{scenario.name}: {note}")
     return scenario
+
+
+def _with_changes(table: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a table with other values; if it then is of another kind or file, only its kind and the values."""
+    if any(key in changes and changes[key] != table.get(key) for key in _SOURCE_KEYS):
+        table = {key: table[key] for key in ("kind",) if key in table}
+    return table | dict(changes)
 
 
 def _threat_tables(threats: Any) -> list[dict[str, Any]]:

@@ -30,6 +30,8 @@ from planfly.workflow.make_plan import make_plan
 from planfly.workflow.mission_context import JudgedMission
 from planfly.workflow.pipeline import fly_and_judge
 from planfly.workflow.suggestion_trials import MAX_TRIAL_FLIGHTS, SuggestionTrials, tried_suggestions
+from planner.evaluation.certify import least_height
+from planner.evaluation.problem import make_problem
 from planner.search.plan_front import FrontPlan
 from world.arrays import Floats
 from world.scenario import Scenario, scenario_from_spec
@@ -151,7 +153,7 @@ def plan(request: PlanRequest, advance: Advance) -> list[FrontPlan]:
     new_plan = make_plan(scenario, airframe, seed, request.algorithm, advance, stop=stop, continues=joins_next_leg)
     # A single path needs no comparison, so quantities that take longer to compute are omitted.
     length = float(np.linalg.norm(np.diff(new_plan.waypoints, axis=0), axis=1).sum())
-    clearance = float(new_plan.certificate.clearance) + scenario.limits.min_clearance_m
+    clearance = least_height(make_problem(scenario, airframe.limits).certified, new_plan.waypoints)
     return [FrontPlan(new_plan, length, math.nan, clearance, math.nan, math.nan)]
 
 

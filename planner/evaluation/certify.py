@@ -11,6 +11,7 @@ import math
 import numpy as np
 
 from aircraft.path_limits import arc_slope, turn_tangents
+from aircraft.tracking import zero_tracking_error
 from planner.airspace.zone_limits import is_limited
 from planner.evaluation.airspace_scores import airspace_pieces
 from planner.evaluation.certify_kernels import (
@@ -65,6 +66,15 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
     """Return the distance from the path to the nearest missile sphere, m; negative inside, or inf without missiles."""
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
+
+
+def least_height(data: ProblemArrays, waypoints: Floats) -> float:
+    """Return the least height above ground of the legs and fly-by arcs of a path (w, 3), m; NaN off the terrain.
+
+    No tracking error is subtracted.
+    """
+    exact_data = data._replace(tracking=zero_tracking_error())
+    return float(heights_above_ground(exact_data, np.array(waypoints, dtype=np.float64))["height"].min())
 
 
 # A fault: its margin to the limit (negative beyond it), its place and its description.

@@ -16,7 +16,7 @@ import numpy as np
 
 from aircraft.path_limits import Limits
 from planner.airspace.zone_limits import is_limited
-from planner.evaluation.certify import certify
+from planner.evaluation.certify import certify, least_height
 from planner.evaluation.encoding import RotatedFrame, rotated_frame
 from planner.evaluation.front_scores import Value, front_values
 from planner.evaluation.graded_scores import graded_scores
@@ -94,7 +94,7 @@ class FrontPlan:
     """Plan of a front, and its values in SI units: m, s, m, s, J (NaN if the aircraft's power is unknown).
 
     exposure: density of detection by radars, integrated over the flight time; not the time inside their range.
-    clearance: minimum height above ground; `Certificate.clearance` is this less the required clearance.
+    clearance: least height above ground of the legs and fly-by arcs.
     """
 
     plan: Plan
@@ -105,7 +105,7 @@ class FrontPlan:
     energy: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Front:
     """Plans, the shortest first; no plan is better than another plan in every objective.
 
@@ -113,7 +113,7 @@ class Front:
 
     asked: requested maximum number of plans.
     fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
-    default: the default planner's plan, which is the shortest, and its values.
+    default: the default planner's plan and its values; another plan may be a little shorter.
     reference: (4,) reference point of the hypervolume, clearance negated; plans beyond it are ignored.
     evaluations: paths evaluated, without the default plan's evaluations.
     refused: number of other plans that were not safe once they were completed.
@@ -128,6 +128,9 @@ class Front:
     evaluations: int
     refused: int = 0
     ended: str = "completed"
+
+    def __repr__(self) -> str:
+        return f"<Front {self.default.plan.scenario.name}: {len(self.plans)} of {self.asked} plans, {self.ended}>"
 
     def _repr_html_(self) -> str:
         """Return an HTML table of the plans for notebooks."""
@@ -305,10 +308,9 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
 
 
 def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
-    """Return a plan with its values; the clearance is taken from the certificate."""
+    """Return a plan with its values; the clearance is exact, not sampled."""
     row = task.values(np.array(plan.waypoints)[None])[0]
-    required_clearance = task.problem.certified.clearance
-    clearance = plan.certificate.clearance + required_clearance
+    clearance = least_height(task.problem.certified, plan.waypoints)
     return FrontPlan(plan, row[Value.LENGTH], row[Value.EXPOSURE], clearance, row[Value.TIME], row[Value.ENERGY])
 
 
@@ -506,7 +508,7 @@ def _certify_distinct(
 
 
 def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans with a noticeable gain that are not dominated by the values of their certificates."""
+    """Return the plans with a noticeable gain that are not dominated by their exact values."""
     objectives = np.array([_objective_row(plan, fourth) for plan in plans])
     indices = np.arange(len(objectives))
     # Keep the first of several equal plans.

@@ -1,12 +1,14 @@
 """A scenario made in Python: its threats from arrays and data frames, other values, and what is refused."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import planfly
+from tests.world.made.elevation_files import MIDDLE, made_tile, write_geotiff
 from world.scenario import load_scenario
 
 ROWS = [
@@ -137,3 +139,28 @@ def test_a_notebook_shows_a_scenario_as_a_line_or_a_table() -> None:
     table = scenario._repr_html_()
     assert "a&lt;b" in table
     assert "<td>destination</td><td>east 2600 m, north 0 m, 75 m AMSL</td>" in table
+
+
+def test_an_elevation_file_of_ones_own_replaces_the_terrain_as_a_whole(tmp_path: Path) -> None:
+    """A digest or an origin of another file, and keys of another kind, are not carried over."""
+    tile = write_geotiff(tmp_path / "own.tif", np.full_like(made_tile(), 120.0))
+    ends: dict[str, Any] = {"start": {"east_m": -400, "north_m": 0, "height_m": 150}}
+    ends["destination"] = {"east_m": 400, "north_m": 0, "height_m": 150}
+    area = {"east_m": [-900, 900], "north_m": [-900, 900], "ceiling_amsl_m": 900}
+    for base, terrain in (
+        ("jacksboro-air", {"kind": "dem", "path": str(tile)}),
+        ("jacksboro-air", {"path": str(tile)}),
+        ("paper-07", {"kind": "dem", "path": str(tile)}),
+        ("tight", {"kind": "dem", "path": str(tile)}),
+    ):
+        made = planfly.make_scenario(base, terrain=terrain, area=area, threats=[], **ends)
+        assert made.terrain is not None
+        assert made.terrain.height(0.0, 0.0) == pytest.approx(120.0, abs=0.1)
+        assert (made.origin.lat_deg, made.origin.lon_deg) == pytest.approx((MIDDLE.lat_deg, MIDDLE.lon_deg), abs=1e-6)
+    # Of the same kind, the other keys stay; a stated origin is kept.
+    assert planfly.make_scenario("tight", terrain={"amsl_m": 5.0}).to_json()["terrain"] == {
+        "kind": "flat",
+        "amsl_m": 5.0,
+    }
+    changes = {"terrain": {"kind": "dem", "path": str(tile)}, "origin": {"lat_deg": 46.061, "lon_deg": 8.05}}
+    assert planfly.make_scenario("tight", area=area, threats=[], **changes, **ends).origin.lat_deg == 46.061

@@ -45,20 +45,22 @@ def log_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    targets = [tmp_path / f"a.{kind}" for kind in ("waypoints", "plan", "fence", "rally", "kml", "gpx")]
+    targets = [tmp_path / f"a.{kind}" for kind in ("waypoints", "plan", "fence", "kml", "gpx")]
     assert main(["export", str(plan_file), *map(str, targets)]) == 0
     printed = capsys.readouterr()
     assert "a fence has no height" in printed.err
     # A map is named by the scenario, not by where its file lies.
-    assert ElementTree.parse(targets[4]).getroot().findtext(f"{KML}Document/{KML}name") == "jacksboro-air"
-    assert gpxpy.parse(targets[5].read_text()).name == "jacksboro-air"
+    assert ElementTree.parse(targets[3]).getroot().findtext(f"{KML}Document/{KML}name") == "jacksboro-air"
+    assert gpxpy.parse(targets[4].read_text()).name == "jacksboro-air"
     assert printed.out.count("\n") == len(targets)
-    waypoints, plan, fence, rally = (read_mission(target) for target in targets[:4])
+    waypoints, plan, fence = (read_mission(target) for target in targets[:3])
     assert waypoints.items == plan.items
     assert plan.fences == fence.fences
-    assert plan.rally == rally.rally
     assert len(fence.fences) > 4
-    assert len(rally.rally) == 2
+    # No returns are required, so the verdict had no rally points, and there are none to write.
+    assert plan.rally == ()
+    assert main(["export", str(plan_file), str(tmp_path / "a.rally")]) == 2
+    assert "no rally points to write to" in capsys.readouterr().err
     # What is written is refused the second time.
     assert main(["export", str(plan_file), str(targets[2])]) == 2
 
