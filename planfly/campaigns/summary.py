@@ -48,7 +48,7 @@ class Sensitivity:
     slope: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CampaignSummary:
     """Contents of the summary and the report.
 
@@ -73,6 +73,10 @@ class CampaignSummary:
     dispersions: dict[str, dict[str, Any]]
     made_of: str
     conditions: Conditions
+
+    def __repr__(self) -> str:
+        tally = self.estimate.tally
+        return f"<CampaignSummary {self.name}: {tally.flyable} of {tally.flown} flights are flyable>"
 
 
 def summarise_campaign(base: CampaignBase, goal: Goal, estimate: Estimate, store: Store) -> CampaignSummary:

@@ -19,6 +19,7 @@ def test_it_counts_what_failed_and_names_what_was_lost(base: CampaignBase, tmp_p
     with made_report(base, tmp_path) as (_, summary):
         tally = summary.estimate.tally
         assert (tally.flyable, tally.failed, tally.lost) == (59 - failed, failed, 1)
+        assert repr(summary) == f"<CampaignSummary {base.name}: {59 - failed} of 60 flights are flyable>"
         assert [(one.rule, one.flights, one.places) for one in summary.by_rule] == [
             ("clearance", failed, ((Place("leg", 1), failed),))
         ]
