@@ -97,8 +97,9 @@ def test_a_plan_a_flight_and_files_are_exported(
 def test_what_a_file_does_not_hold_is_told(tmp_path: Path) -> None:
     gap = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46\t8\t0\t1\n2\t0\t3\t16\t0\t0\t0\t0\t46.1\t8\t90\t1\n"
     (tmp_path / "a.waypoints").write_text(gap)
-    (note,) = planfly.export(tmp_path / "a.waypoints", tmp_path / "a.plan").notes
-    assert "a gap in seq before 2" in note
+    gap_note, autopilot_note = planfly.export(tmp_path / "a.waypoints", tmp_path / "a.plan").notes
+    assert "names no autopilot" in autopilot_note
+    assert "a gap in seq before 2" in gap_note
 
 
 def test_a_plan_for_px4_without_a_landing_is_exported_with_a_word(path: planfly.Plan, tmp_path: Path) -> None:
