@@ -134,8 +134,10 @@ def make_loop(
 TICK_S = 1.0 / 60.0
 # Duration of one block of rows from `simulate`, s.
 BLOCK_DURATION_S = 1.0
-# Largest number of blocks whose rows are kept as they were flown, before they are stored in a track.
-_MAX_PENDING_BLOCKS = 600
+# The same for a flight that is neither recorded nor shown; 40 us are spent in Python for each block.
+LONG_BLOCK_DURATION_S = 10.0
+# Number of rows that are kept as they were flown, before they are stored in a track.
+_MAX_PENDING_ROWS = 36_000
 # Bank that guidance may add to the bank of planned turns in order to correct an error, rad.
 BANK_RESERVE_RAD = math.radians(3.0)
 # Time added to the time limit of a flight that takes off or lands, s.
@@ -169,8 +171,8 @@ class FlightBlock(NamedTuple):
     distance: float
 
 
-def simulate(flight: Airborne) -> Iterator[FlightBlock]:
-    """Fly until the flight ends, and yield the rows of each second.
+def simulate(flight: Airborne, block_duration: float = BLOCK_DURATION_S) -> Iterator[FlightBlock]:
+    """Fly until the flight ends, and yield the rows of each block.  block_duration: duration of a block, s.
 
     >>> import numpy as np
     >>> from types import SimpleNamespace
@@ -183,7 +185,7 @@ def simulate(flight: Airborne) -> Iterator[FlightBlock]:
     """
     end_reason = ""
     while not end_reason:
-        rows, end_reason = flight.fly_block(round(BLOCK_DURATION_S / flight.dt))
+        rows, end_reason = flight.fly_block(round(block_duration / flight.dt))
         yield FlightBlock(rows, end_reason, min(float(flight.memory.distance), flight.path.length))
 
 
@@ -209,7 +211,7 @@ def fly_to_end(flight: Airborne) -> SimulatedFlight:
     ('completed', 12, True)
     """
     builder, end_reason = TrackBuilder(), ""
-    for block in simulate(flight):
+    for block in simulate(flight, LONG_BLOCK_DURATION_S):
         builder.add(block.rows)
         end_reason = block.end_reason
     return SimulatedFlight(builder.track(), end_reason, flight.path)
@@ -231,11 +233,13 @@ class TrackBuilder:
         no_rows = as_track(join_rows([]))
         self._columns = {name: getattr(no_rows, name).copy() for name in COLUMNS}
         self._pending_rows: list[Rows] = []
+        self._pending_row_count = 0
 
     def add(self, rows: Rows) -> None:
         """Add rows that follow the rows added before."""
         self._pending_rows.append(rows)
-        if len(self._pending_rows) >= _MAX_PENDING_BLOCKS:
+        self._pending_row_count += len(rows)
+        if self._pending_row_count >= _MAX_PENDING_ROWS:
             self._store_pending_rows()
 
     def track(self) -> Track:
@@ -248,6 +252,7 @@ class TrackBuilder:
     def _store_pending_rows(self) -> None:
         rows = join_rows(self._pending_rows)
         self._pending_rows.clear()
+        self._pending_row_count = 0
         for name, column in self._columns.items():
             stored_count = len(column)
             # Enlarge the array in place: a copy of a long flight takes as much memory again.

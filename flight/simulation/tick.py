@@ -39,7 +39,7 @@ from world.wind import mean_wind_speed
 # Fields of the state that are read from JSBSim each tick; time and wind are already known.
 READ_FIELDS = field_names(STATE)[: field_names(STATE).index("time")]
 # Maximum number of ticks per call of compiled code.
-BLOCK_TICKS = 60
+BLOCK_TICKS = 600
 # Mean wind and gust, true north, east and down; ground altitude below; battery energy.
 AIR = record_dtype(
     "wind_north",  # m/s, direction of air motion

@@ -41,6 +41,7 @@ def judge_flight(
     envelope: bool = True,
     reference: ReferenceFlights | None = None,
     requirements: RouteRequirements | None = None,
+    findings_only: bool = False,
 ) -> Verdict:
     """Judge a flown track at the level "flown".
 
@@ -53,6 +54,8 @@ def judge_flight(
     envelope: True to apply the aircraft's envelope as well as the evidence of the flight, False for only the evidence.
     reference: results of reference flights.
     requirements: the setup's route requirements if already known.
+    findings_only: True for a verdict with only its findings and answer, as a campaign's table needs it: without
+        suggestions, lines and the answer of geometry.
 
     >>> from logs.recording.example_log import example_log
     >>> log = example_log()
@@ -69,6 +72,8 @@ def judge_flight(
     complete = all(finding.ok is True for finding in findings if finding.rule == "completion")
     unjudged = undecided_text(findings)
     flyable = complete and not unjudged and not any(finding.ok is False for finding in findings)
+    if findings_only:
+        return Verdict(findings, flyable, complete, (), "flown", unjudged=unjudged)
     findings = with_suggestions(air_requirements, aligned, findings)
     levels = _level_answers(whole_requirements, findings, flyable)
     conditions = judging_conditions(setup)

@@ -255,7 +255,12 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
     draw = draw_flight(base.dispersions, base.seed, index)
     varied_flight = vary_flight(base, draw, wind)
     flight = fly_and_judge(
-        varied_flight.setup, varied_flight.airframe, log, off_nominal=varied_flight.off_nominal, reference="never"
+        varied_flight.setup,
+        varied_flight.airframe,
+        log,
+        off_nominal=varied_flight.off_nominal,
+        reference="never",
+        findings_only=log is None,
     )
     track, route = flight.track, varied_flight.setup.route
     has_rows = len(track) > 0

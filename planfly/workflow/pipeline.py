@@ -9,7 +9,7 @@ from flight.dynamics.fdm import Variation
 from flight.mission.items import Mission
 from flight.simulation.airborne import Airborne
 from flight.simulation.setup import FlightSetup
-from flight.simulation.simulate import Flight, TrackBuilder, simulate
+from flight.simulation.simulate import BLOCK_DURATION_S, LONG_BLOCK_DURATION_S, Flight, TrackBuilder, simulate
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
@@ -131,6 +131,7 @@ def fly_and_judge(
     off_nominal: OffNominal | None = None,
     reference: FlyReference = "failed",
     returns: bool = False,
+    findings_only: bool = False,
     limits: FlightLimits = _DEFAULT_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record the flight if a log is named, and judge it.
@@ -142,13 +143,16 @@ def fly_and_judge(
     reference: cases in which reference flights are flown, see
     `planfly.workflow.reference_flights.judge_with_reference_flights`.
     returns: True judges returns from a few points, and draws them in the log.  Without a log no returns are judged.
+    findings_only: True for a verdict with only its findings and answer, see `logs.verdict.judge_flight.judge_flight`.
     limits: limits of the flight time and of the size of the log.
 
     If the flight cannot start, or `planfly.workflow.trial_flight.reason_not_to_start` gives a reason not to start it,
     the result has no row and no log; its verdict covers the route and says that the flight did not start.  Raises
     FlightError if a program does not fly the mission to its end; then no log is left.
     """
-    task = _FlightOptions(airframe, log, advance, every, limits, reference, returns=returns)
+    task = _FlightOptions(
+        airframe, log, advance, every, limits, reference, returns=returns, findings_only=findings_only
+    )
     requirements = route_requirements(setup)
     reason = reason_not_to_start(requirements)
     if reason:
@@ -176,6 +180,7 @@ class _FlightOptions:
     limits: FlightLimits
     reference: FlyReference
     returns: bool
+    findings_only: bool
 
 
 def _fly_with_program(task: _FlightOptions, setup: FlightSetup, program: ProgramAutopilot) -> JudgedFlight:
@@ -222,7 +227,8 @@ def _record_and_judge(task: _FlightOptions, requirements: RouteRequirements, fli
 def _simulate_and_record(task: _FlightOptions, flight: Airborne, recorder: CrashSafeLog | None) -> tuple[Track, str]:
     """Fly to the end or until the log is full, recording each block; return the track and the reason for the end."""
     builder, end_reason, length = TrackBuilder(), "", flight.path.length
-    for block in simulate(flight):
+    # A recorded flight is written second by second, so that a crash of the process loses no more.
+    for block in simulate(flight, LONG_BLOCK_DURATION_S if recorder is None else BLOCK_DURATION_S):
         builder.add(block.rows)
         end_reason = block.end_reason
         if recorder is not None and len(block.rows):
@@ -256,6 +262,9 @@ def _judge_rows(
         LogEvent(0.0, f"flight model: {engine}", "info"),
         LogEvent(end_time, f"flight ended: {end_reason}", "info" if end_reason == "completed" else "error"),
     )
+    if task.findings_only:
+        verdict = judge_flight(requirements.setup, track, end_reason, requirements=requirements, findings_only=True)
+        return JudgedFlight(requirements.setup, requirements, track, end_reason, verdict, events, engine)
     aircraft = task.airframe.aircraft
     verdict, reference_flights = judge_with_reference_flights(
         requirements, aircraft, track, end_reason, fly=task.reference

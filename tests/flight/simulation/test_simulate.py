@@ -376,3 +376,17 @@ def test_guidance_at_thirty_hertz_follows_too(make_setup: MakeSetup, aerosonde: 
     track = fly_to_end(Flight(replace(setup, guidance_hz=30), aerosonde)).track
     assert np.diff(track.time) == pytest.approx(1 / 30, abs=1e-9)
     assert float(np.abs(track.cross_track[150:]).max()) < 0.6
+
+
+def test_the_length_of_blocks_does_not_change_the_track(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    setup = replace(make_setup(WAY[:4], wind=(7.0, 30.0), turbulence="light", seed=5), nav="gnss")
+    tracks, lengths = [], []
+    for duration in (1.0, 7.0, 10.0, 25.0):
+        builder = TrackBuilder()
+        blocks = list(simulate(Flight(setup, aerosonde), duration))
+        for block in blocks:
+            builder.add(block.rows)
+        tracks.append(_digest(builder.track()))
+        lengths.append({len(block.rows) for block in blocks[:-1]})
+    assert len(set(tracks)) == 1
+    assert lengths == [{60}, {420}, {600}, {1500}]
