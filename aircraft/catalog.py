@@ -10,7 +10,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -131,6 +131,7 @@ def aircraft_names() -> tuple[str, ...]:
     return tuple(sorted(file.stem for file in _ROOT.glob("*/*.toml") if file.stem == file.parent.name))
 
 
+@lru_cache
 def load_aircraft(name: str) -> Aircraft:
     """Return the embedded aircraft with this name.
 

@@ -12,6 +12,7 @@ launch as ArduPlane does with its default parameters.
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import ClassVar, Literal, NamedTuple, Protocol, Self
@@ -288,7 +289,7 @@ class Autopilot(ABC):
         """Rules of take-off, landing and go-around."""
         return GroundRules()
 
-    @property
+    @cached_property
     def checks(self) -> MissionChecks:
         """Reading and checks of missions, and the settings on which they depend."""
         return MissionChecks()

@@ -3,6 +3,7 @@
 from abc import abstractmethod
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -55,7 +56,7 @@ class ProgramAutopilot(Autopilot):
         binary: the program's file.
         """
 
-    @property
+    @cached_property
     def checks(self) -> MissionChecks:
         """Checks of the simulated autopilot, with the settings that have no effect in the program's flight.
 

@@ -9,7 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
@@ -184,7 +184,14 @@ def shipped_model(aircraft: Aircraft) -> dict[str, bytes]:
 
 
 def _read_model(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
-    """Return the reader of a file, after it has read the file."""
+    """Return the reader of a file, after it has read the file; a file that has not changed is read only once."""
+    status = file.stat() if file.is_file() else None
+    stamp = None if status is None else (status.st_mtime_ns, status.st_size, status.st_ino)
+    return _read_stamped_model(file, stamp, main, remove_channels)
+
+
+@lru_cache(maxsize=16)
+def _read_stamped_model(file: Path, _stamp: tuple[int, ...] | None, main: bool, remove_channels: bool) -> _Reader:
     reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import ClassVar, Literal, Self
 
 from aircraft.catalog import Aircraft
@@ -172,7 +172,7 @@ class ArduPlane(Autopilot):
         """Simulated ArduPlane release."""
         return self.parameters.version
 
-    @property
+    @cached_property
     def checks(self) -> MissionChecks:
         """Checks by ArduPlane's list of commands, from TERRAIN_ENABLE, MIS_OPTIONS, FENCE_OPTIONS and BATT_*."""
         parameters = self.parameters

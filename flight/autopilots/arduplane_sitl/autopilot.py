@@ -1,6 +1,7 @@
 """Implement ArduPlane itself as an autopilot, by its SITL program in lockstep with planfly's physics."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import ClassVar, Self
 
@@ -48,7 +49,7 @@ class ArduPlaneSitl(ProgramAutopilot, ArduPlane):
             " the control that each servo moves"
         ]
 
-    @property
+    @cached_property
     def checks(self) -> MissionChecks:
         """Checks of the simulated ArduPlane, without battery failsafes: the program flies with them switched off."""
         return replace(super().checks, battery_failsafes=())

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import ClassVar, NamedTuple, Self, get_args
 
@@ -209,7 +209,7 @@ class Px4(Autopilot):
         """Simulated PX4 release."""
         return self.parameters.version
 
-    @property
+    @cached_property
     def checks(self) -> MissionChecks:
         """PX4's feasibility checks, from FW_LND_ANG and MIS_TKO_LAND_REQ.
 

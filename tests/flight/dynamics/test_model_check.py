@@ -28,6 +28,14 @@ def test_copied_model_flies(model: Aircraft) -> None:
     Fdm(model).start(47.0, 8.0, 500.0, 1.0, 25.0)
 
 
+def test_a_model_that_changes_after_it_was_read_is_checked_again(model: Aircraft) -> None:
+    Fdm(model).start(47.0, 8.0, 500.0, 1.0, 25.0)
+    text = model.model_file.read_text(encoding="utf-8")
+    model.model_file.write_text(text.replace("</fdm_config>", '<input port="5555"/></fdm_config>'), encoding="utf-8")
+    with pytest.raises(FlightError, match="<input> opens a port"):
+        Fdm(model)
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
