@@ -184,7 +184,7 @@ def main() -> None:
     parser.add_argument("--winds", type=Path, help="winds.json of a run of `planfly winds`; else they are found here")
     args = parser.parse_args()
     if args.winds is None:
-        boundaries = [(one.estimate, one.beyond) for one in found_winds().boundaries]
+        boundaries = [(one.estimate, one.is_beyond_search) for one in found_winds().boundaries]
     else:
         table = json.loads(args.winds.read_text(encoding="utf-8"))
         boundaries = [(float(one["boundary_mps"]), bool(one["beyond"])) for one in table["directions"]]
