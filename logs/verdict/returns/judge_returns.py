@@ -461,8 +461,7 @@ def judge_returns(
             continue
         targets = [world.target(row, ending) for row in starts.rows]
         min_heights = required_heights(world, starts)
-        results, paths = simulate_returns(world, starts, targets)
-        results = _with_clearance_to_landing_sequence(world, starts, targets, results, min_heights)
+        results, paths = simulate_judged_returns(world, starts, targets, min_heights)
         judged_returns = []
         for k, row in enumerate(results):
             advance(number * len(starts) + k, total_count)
@@ -555,19 +554,33 @@ def simulate_returns(
     return result.results, result.tracks
 
 
-def _with_clearance_to_landing_sequence(
-    world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], results: Records, min_heights: Floats
-) -> Records:
-    """Return the results of returns, with the clearance up to the first item of a landing sequence if it is too low.
+def simulate_judged_returns(
+    world: ReturnWorld,
+    starts: ReturnStarts,
+    targets: Sequence[ReturnTarget],
+    min_heights: Floats,
+    min_sphere_distances: Floats | None = None,
+) -> tuple[Records, tuple[Floats, ...]]:
+    """Simulate returns, with the clearance up to the first item of a landing sequence if it is too low beyond it.
 
     Beyond this item a return flies the approach of the mission itself, which descends to the landing; there only the
     ground, the spheres, the zones and the energy limit it.
+
+    min_heights: required heights above ground, m, (n,).
+    min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
+        None to simulate every return to its end.
+    Returns results and paths as `simulate_returns` does.
     """
-    is_low = results["clearance"] < min_heights - CLEARANCE_TOLERANCE_M
-    has_approach = [target.landing is not None and bool(target.landing.next_stops) for target in targets]
-    indices = np.flatnonzero(is_low & np.array(has_approach, dtype=np.bool_))
+    has_approach = np.array(
+        [target.landing is not None and bool(target.landing.next_stops) for target in targets], dtype=np.bool_
+    )
+    abort_limits = (
+        None if min_sphere_distances is None else (np.where(has_approach, -math.inf, min_heights), min_sphere_distances)
+    )
+    results, paths = simulate_returns(world, starts, targets, abort_limits)
+    indices = np.flatnonzero((results["clearance"] < min_heights) & has_approach)
     if not indices.size:
-        return results
+        return results, paths
     short_targets = [
         targets[k]._replace(landing=landing._replace(next_stops=()))
         for k in indices.tolist()
@@ -580,7 +593,7 @@ def _with_clearance_to_landing_sequence(
         # A return that meets the ground keeps the place where it does.
         is_airborne = results["outcome"][indices] != RETURN_GROUND_IMPACT
         values[indices[is_airborne]] = short_results[name][is_airborne]
-    return results
+    return results, paths
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:
