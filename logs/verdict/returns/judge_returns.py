@@ -181,6 +181,7 @@ class Returns:
     stands_in: True if ArduPlane's return is simulated because the autopilot has no return law.
     unjudged_parts: parts that are not judged.
     autoland: RTL_AUTOLAND; None for the mission of another autopilot.
+    autoland_assumed: True if this value is assumed, because ArduPlane does not arm with 0.
     landings: the mission's landing sequences.
     omitted_count: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing
         that it sinks to the ground before it can return.
@@ -197,6 +198,7 @@ class Returns:
     stands_in: bool = False
     unjudged_parts: tuple[UnjudgedPart, ...] = ()
     autoland: int | None = None
+    autoland_assumed: bool = False
     landings: tuple[LandingStart, ...] = ()
     omitted_count: int = 0
 
@@ -493,6 +495,7 @@ def judge_returns(
         stands_in=world.stands_in,
         unjudged_parts=world.unjudged_parts,
         autoland=None if world.has_other_law else int(world.parameters.rtl_autoland),
+        autoland_assumed="RTL_AUTOLAND" in world.parameters.by_origin("assumed"),
         landings=world.landings,
         omitted_count=omitted_count,
     )

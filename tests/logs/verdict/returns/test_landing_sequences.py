@@ -129,7 +129,10 @@ def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path,
 
 def test_a_mission_with_a_landing_sequence_is_judged_with_a_setting_that_arms(tmp_path: Path) -> None:
     """ArduPlane's default, 0, does not arm with DO_LAND_START."""
-    assert describe_landing(judged(tmp_path))[0].startswith("RTL_AUTOLAND 1: from its loiter")
+    assumed = "RTL_AUTOLAND 1 (assumed: with 0 ArduPlane does not arm): from its loiter"
+    assert describe_landing(judged(tmp_path))[0].startswith(assumed)
+    # A value that is stated is not assumed.
+    assert describe_landing(judged(tmp_path, RTL_AUTOLAND=1))[0].startswith("RTL_AUTOLAND 1: from its loiter")
 
 
 def test_what_each_value_says(tmp_path: Path) -> None:
