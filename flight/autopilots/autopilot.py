@@ -40,7 +40,9 @@ Level = Literal["airframe", "autopilot"]
 # ----------------------------------------------------------------------
 # Parameters, from the user's file, the aircraft's folder or the autopilot's defaults.
 
-Origin = Literal["file", "aircraft", "default"]
+# "assumed": chosen by planfly for a mission with a landing, because the autopilot would not arm, or not land, with the
+# value of the aircraft or the default.
+Origin = Literal["file", "assumed", "aircraft", "default"]
 
 
 class ParameterValue(NamedTuple):
@@ -52,7 +54,12 @@ class ParameterValue(NamedTuple):
 
 
 # Texts for the sources of a value.
-_SOURCE_NAMES: dict[Origin, str] = {"file": "the file", "aircraft": "the aircraft", "default": "the defaults"}
+_SOURCE_NAMES: dict[Origin, str] = {
+    "file": "the file",
+    "assumed": "the assumptions for the landing",
+    "aircraft": "the aircraft",
+    "default": "the defaults",
+}
 
 
 def find_contradictions(values: Iterable[ParameterValue], orders: Iterable[tuple[str, ...]]) -> tuple[str, ...]:
@@ -114,8 +121,8 @@ class Parameters(Protocol):
     def contradictions(self) -> tuple[str, ...]:
         """Texts on values of the user's file that contradict another parameter."""
 
-    def changed(self, **values: float) -> Self:
-        """Return a copy with the given parameters changed."""
+    def changed(self, origin: Origin = "file", /, **values: float) -> Self:
+        """Return a copy with the given parameters changed.  origin: source of the values."""
 
     def by_origin(self, origin: Origin) -> dict[str, float]:
         """Return the values that come from one source, by name and in the autopilot's units."""
@@ -235,9 +242,10 @@ class Autopilot(ABC):
         """
         return []
 
-    def with_parameters(self, **values: float) -> "Autopilot":
+    def with_parameters(self, origin: Origin = "file", /, **values: float) -> "Autopilot":
         """Return a copy with the given parameters changed, by the autopilot's names and in its units.
 
+        origin: source of the values.
         Raises ValueError for an autopilot without parameters.
         """
         raise ValueError(f"{self.title} has no parameters")

@@ -93,18 +93,14 @@ def load_autopilot(scenario: "Scenario", aircraft: "Aircraft") -> "Autopilot":
         raise ScenarioError.at(scenario.name, "flight.autopilot", name, allowed, shown=repr(name))
     autopilot = _load_class(paths[name]).load(scenario.flight, aircraft, scenario.name)
     stated = scenario.returns
-    rtl_parameters = autopilot.returns.parameters_of(
-        RtlSettings(
-            altitude=None if stated is None else stated.rtl_altitude,
-            autoland=None if stated is None else stated.rtl_autoland,
-            lands=scenario.landing is not None,
-            field_depth=_field_depth_below_home(scenario),
-        )
+    if stated is not None:
+        rtl_parameters = autopilot.returns.parameters_of(RtlSettings(stated.rtl_altitude, stated.rtl_autoland))
+        _check_no_conflict(scenario, autopilot, rtl_parameters)
+        autopilot = autopilot.with_parameters(**rtl_parameters) if rtl_parameters else autopilot
+    assumed_parameters = autopilot.returns.parameters_of(
+        RtlSettings(lands=scenario.landing is not None, field_depth=_field_depth_below_home(scenario))
     )
-    if not rtl_parameters:
-        return autopilot
-    _check_no_conflict(scenario, autopilot, rtl_parameters)
-    return autopilot.with_parameters(**rtl_parameters)
+    return autopilot.with_parameters("assumed", **assumed_parameters) if assumed_parameters else autopilot
 
 
 def _field_depth_below_home(scenario: "Scenario") -> float:

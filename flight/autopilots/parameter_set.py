@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, NamedTuple, Self, get_args
 
 from aircraft.catalog import Aircraft
 from flight.autopilots.autopilot import Origin, ParameterValue, StoredParameters, find_contradictions
@@ -195,7 +195,7 @@ class ParameterSet:
 
         Raises ParameterError if a value is not allowed.
         """
-        origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
+        origins: dict[Origin, dict[str, float]] = {origin: {} for origin in get_args(Origin)}
         for name, recorded, origin in stored.values:
             if name in cls.table.by_any_name:
                 definition, factor = cls.table.by_any_name[name]
@@ -274,15 +274,16 @@ class ParameterSet:
         definition = self.table.by_name[name]
         return definition.to_si * next((value for known, value, _ in self.values if known == name), definition.default)
 
-    def changed(self, **values: float) -> Self:
+    def changed(self, origin: Origin = "file", /, **values: float) -> Self:
         """Return a copy with other values for some parameters, by the autopilot's names and in its units.
 
+        origin: source of the values.
         Raises ValueError if the table has no parameter of a name.
         """
         if unknown := sorted(set(values) - self.table.by_name.keys()):
             raise ValueError(f"{unknown[0]}: not a parameter of the simulated autopilot")
         by_name = {parameter.name: parameter for parameter in self.values}
-        by_name |= {name: ParameterValue(name, value, "file") for name, value in values.items()}
+        by_name |= {name: ParameterValue(name, value, origin) for name, value in values.items()}
         return replace(self, values=tuple(by_name.values()))
 
     def by_origin(self, origin: Origin) -> dict[str, float]:

@@ -35,12 +35,18 @@ _DIRECTION_COUNT = 72
 
 
 def preflight_notes(
-    mission: Mission, route: Route, scenario: Scenario, rules: ReturnRules, parameters: Mapping[str, float]
+    mission: Mission,
+    route: Route,
+    scenario: Scenario,
+    rules: ReturnRules,
+    parameters: Mapping[str, float],
+    assumed_parameters: Mapping[str, float],
 ) -> tuple[str, ...]:
     """Return notes on a mission's launch, landing, home, rally points and RTL.
 
     rules: RTL rules of the autopilot.
     parameters: stated parameters of the autopilot by name.
+    assumed_parameters: parameters that are assumed for the mission's landing, by name.
     """
     rally_problems: tuple[str, ...] = ()
     try:
@@ -54,7 +60,7 @@ def preflight_notes(
         *_note_distant_home(mission, scenario),
         *_note_rally_points(return_targets[1:], route, scenario, rules),
         *_note_low_return(return_targets[:1], scenario, rules),
-        *_note_forbidden_landing_sequence(mission, parameters),
+        *_note_autoland(mission, scenario, parameters, assumed_parameters),
         *_note_landing_ground(mission, route, scenario),
     )
 
@@ -136,11 +142,22 @@ def _note_low_return(home: tuple[ReturnPoint, ...], scenario: Scenario, rules: R
         )
 
 
-def _note_forbidden_landing_sequence(mission: Mission, parameters: Mapping[str, float]) -> Iterator[str]:
-    """Yield a note on a landing sequence with which ArduPlane does not arm because of RTL_AUTOLAND (AP_Arming.cpp)."""
+def _note_autoland(
+    mission: Mission, scenario: Scenario, parameters: Mapping[str, float], assumed_parameters: Mapping[str, float]
+) -> Iterator[str]:
+    """Yield a note on a landing sequence with which ArduPlane does not arm if RTL_AUTOLAND is 0 (AP_Arming.cpp).
+
+    A scenario with a landing needs no note on the assumed value: it comes with the parameters that planfly writes.
+    """
     start_numbers = [item.seq for item in mission.items if item.command == Command.DO_LAND_START]
     if start_numbers and parameters.get("RTL_AUTOLAND") == 0.0:
         yield f"item {start_numbers[0]}: DO_LAND_START with RTL_AUTOLAND 0: ArduPlane does not arm"
+    elif start_numbers and scenario.landing is None and "RTL_AUTOLAND" in assumed_parameters:
+        value = assumed_parameters["RTL_AUTOLAND"]
+        yield (
+            f"item {start_numbers[0]}: DO_LAND_START: RTL_AUTOLAND {value:g} is assumed, because ArduPlane does not arm"
+            " with its default 0"
+        )
 
 
 # Text for level ground.

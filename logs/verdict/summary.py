@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from typing import get_args
 
+from flight.autopilots.autopilot import Origin
 from flight.autopilots.parameter_files import LONGEST_NAME
 from flight.simulation.setup import FlightSetup
 from logs.verdict.conditions import Conditions, autopilot_line, condition_lines, corridor_line
@@ -274,7 +276,8 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     )
     if not is_flown and all(len(name) <= LONGEST_NAME for name in parameters.unused):
         return contradictions
-    counts = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
+    counts = {origin: len(parameters.by_origin(origin)) for origin in get_args(Origin)}
+    assumed_text = f"{counts['assumed']} assumed for the landing, " if counts["assumed"] else ""
     # A name that is too long is a mistake in the file; other unused names belong to other hardware.
     unused_by_length = sorted(parameters.unused, key=lambda name: len(name) <= LONGEST_NAME)
     unused_names = [
@@ -292,7 +295,7 @@ def _parameter_lines(setup: FlightSetup, *, is_flown: bool) -> list[str]:
     if undocumented_texts := parameters.outside_documented_ranges:
         notes += f"; outside {setup.autopilot.title}'s documented ranges, but used: {', '.join(undocumented_texts)}"
     return [
-        f"Parameters: {counts['file']} from the file, {counts['aircraft']} from the aircraft,"
+        f"Parameters: {counts['file']} from the file, {assumed_text}{counts['aircraft']} from the aircraft,"
         f" {counts['default']} from {setup.autopilot.title}'s defaults{notes}",
         *contradictions,
     ]

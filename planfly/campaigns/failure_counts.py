@@ -1,7 +1,7 @@
 """Count the flights of a campaign or of a search by failed rule and place, and write the counts."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -36,6 +36,15 @@ def count_failures(flights: Iterable[Iterable[tuple[str, Place]]]) -> tuple[Rule
             places.setdefault(rule, Counter())[place] += 1
     rules = sorted(counts, key=lambda rule: (-RULE_WORDS[rule].urgency, list(RULE_WORDS).index(rule)))
     return tuple(RuleFailures(rule, counts[rule], tuple(places[rule].most_common())) for rule in rules)
+
+
+def deciding_rule(by_rule: Sequence[RuleFailures]) -> str:
+    """Return the rule that fails most flights, the most urgent one of several; "" without failures.
+
+    >>> deciding_rule(count_failures([[("slope", Place("leg", 1))], [("slope", Place("leg", 2))]]))
+    'slope'
+    """
+    return max(by_rule, key=lambda failures: failures.flights).rule if by_rule else ""
 
 
 def failures_document(by_rule: Iterable[RuleFailures]) -> list[dict[str, Any]]:

@@ -106,6 +106,8 @@ class WindsResult:
     lost: indices, from 0, of the flights that could not be flown; they are treated as not flyable.
     conditions: conditions of the flights, without the wind, which depends on the direction.
     calm: failures in calm air if the mission is not flyable in calm air with the target probability; None otherwise.
+    failures: for each direction, the failures, by rule and place, of its flights in winds up to the upper bound of its
+        boundary; () if no wind was searched.
     """
 
     goal: WindsGoal
@@ -114,6 +116,7 @@ class WindsResult:
     lost: tuple[int, ...] = ()
     conditions: Conditions | None = None
     calm: CalmFailures | None = None
+    failures: tuple[tuple[RuleFailures, ...], ...] = ()
 
     def from_deg(self, direction: int) -> float:
         """Return the direction from which the wind blows, degrees.  direction: index of the direction."""
@@ -248,14 +251,33 @@ class _Search:
         """Return the result of the search."""
         boundaries = tuple(direction.boundary() for direction in self.directions)
         conditions = replace(self._base.conditions(), wind_mps=None, wind_from_deg=None)
-        calm_failures = self._calm_failures(boundaries)
-        return WindsResult(self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm_failures)
+        calm_failures, failures = self._calm_failures(boundaries), self._failures_by_direction(boundaries)
+        return WindsResult(
+            self.goal, boundaries, tuple(self.flown), tuple(self.lost), conditions, calm_failures, failures
+        )
 
     def result_in_calm_air(self, calm: CalmFailures) -> WindsResult:
         """Return the result of a search that ends after its flights in calm air."""
         boundaries = (WindBoundary(0.0, 0.0, 0.0, is_beyond_search=False),) * self.goal.directions
         self.flown = [(0, 0.0, False)] * calm.flights
-        return replace(self.result(), boundaries=boundaries, calm=calm)
+        return replace(self.result(), boundaries=boundaries, calm=calm, failures=())
+
+    def _failures_by_direction(self, boundaries: tuple[WindBoundary, ...]) -> tuple[tuple[RuleFailures, ...], ...]:
+        """Return the failures of each direction in winds up to the upper bound of its boundary.
+
+        If no flight failed in such a wind, the failures are those in the weakest wind in which a flight failed.
+        """
+        failures = []
+        for number, boundary in enumerate(boundaries):
+            # Without a search, the flights in calm air have no findings here.
+            failed_flights = [
+                (speed, failed)
+                for (direction, speed, _), failed in zip(self.flown, self._failed, strict=False)
+                if direction == number and failed
+            ]
+            max_speed = max(boundary.high, min((speed for speed, _ in failed_flights), default=0.0))
+            failures.append(count_failures(failed for speed, failed in failed_flights if speed <= max_speed))
+        return tuple(failures)
 
     def _calm_failures(self, boundaries: tuple[WindBoundary, ...]) -> CalmFailures | None:
         """Return the failures in the weakest wind flown, over the directions whose boundary is calm air.

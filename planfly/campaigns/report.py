@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +23,7 @@ from logs.views.drawing import page_svg, png_bytes
 from logs.views.report.page import page_template
 from planfly.campaigns.campaign_base import CampaignBase
 from planfly.campaigns.dispersions import QUANTITY_BY_NAME
-from planfly.campaigns.failure_counts import failure_lines, failures_document
+from planfly.campaigns.failure_counts import deciding_rule, failure_lines, failures_document
 from planfly.campaigns.find_winds import (
     BOUNDARY_ACCURACY_MPS,
     CALM_MPS,
@@ -380,8 +381,9 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
             _speed_text(spoke.boundary, goal.most),
             _interval_text(spoke.low, spoke.high, goal.most),
             str(sum(count for _, count, _ in spoke.flights)),
+            RULE_WORDS[rule].title if rule else "",
         )
-        for spoke in spokes
+        for spoke, rule in zip(spokes, _deciding_rules(winds), strict=True)
     ]
     data = {
         "schema": WINDS_SCHEMA,
@@ -402,8 +404,9 @@ def write_winds(folder: Path, base: CampaignBase, winds: WindsResult, command: s
                     {"speed_mps": round(speed, 3), "flights": count, "flyable": flyable}
                     for speed, count, flyable in spoke.flights
                 ],
+                "failed_by_rule": failures_document(winds.failures[k]) if winds.failures else [],
             }
-            for spoke in spokes
+            for k, spoke in enumerate(spokes)
         ],
         "calm": None if winds.calm is None else _calm_document(winds.calm),
         "spread": base.dispersions.to_json(),
@@ -497,6 +500,27 @@ def _lost_lines(winds: WindsResult) -> list[str]:
     ]
 
 
+def _deciding_rules(winds: WindsResult) -> list[str]:
+    """Return the rule that fails most flights of each direction up to its boundary, or "" without failures."""
+    return [deciding_rule(by_rule) for by_rule in winds.failures] or [""] * len(winds.boundaries)
+
+
+def _deciding_lines(winds: WindsResult) -> list[str]:
+    """Return a line about the rules that fail most flights, each with its directions; [] without failures."""
+    directions_by_rule: dict[str, list[str]] = {}
+    first = 0
+    for rule, group in groupby(_deciding_rules(winds)):
+        last = first + len(list(group)) - 1
+        text = f"{winds.from_deg(first):g}°" + (f" to {winds.from_deg(last):g}°" if last > first else "")
+        directions_by_rule.setdefault(rule, []).append(text)
+        first = last + 1
+    directions_by_rule.pop("", None)
+    if not directions_by_rule:
+        return []
+    texts = (f"{RULE_WORDS[rule].title} from {', '.join(texts)}" for rule, texts in directions_by_rule.items())
+    return [f"fails most often, up to the boundary: {'; '.join(texts)}"]
+
+
 def _lines_without_failures(winds: WindsResult) -> list[str]:
     """Return a line about the directions in which no flight failed, if there are any.
 
@@ -556,6 +580,7 @@ def wind_lines(winds: WindsResult) -> list[str]:
         _winds_answer(winds),
         *_calm_lines(winds),
         *(() if winds.conditions is None else flown_lines(winds.conditions)),
+        *_deciding_lines(winds),
         *_lines_without_failures(winds),
         *_unsettled_lines(winds),
         *_lost_lines(winds),

@@ -255,7 +255,12 @@ def _judge_flown_return(
         np.hypot(*(position[-1, :2] - np.array(_end_position(target)[:2]))) < _ARRIVAL_DISTANCE_M
     )
     record: Record = np.zeros(1, RETURN_RESULT)[0]
-    clearance = min(0.0, approach.clearance) if hits_ground else approach.clearance
+    clearance, lowest_position = approach.clearance, approach.lowest_position
+    if hits_ground:
+        clearance = min(0.0, clearance)
+    elif 0.0 < clearance < simulated_return.required_height and target.landing and target.landing.next_stops:
+        # As in `judge_returns`, the required height applies up to the first item of the landing sequence.
+        clearance, lowest_position, *_ = nearest_approaches(world, _cut_at(target.landing.position, position))
     record["outcome"] = (
         RETURN_GROUND_IMPACT if hits_ground or clearance <= 0.0 else RETURN_ARRIVED if has_arrived else RETURN_TIMEOUT
     )
@@ -270,7 +275,7 @@ def _judge_flown_return(
         target=target,
         kind=classify_return(world, record, zone, remaining_energy, simulated_return.required_height),
         clearance=clearance,
-        lowest_position=approach.lowest_position,
+        lowest_position=lowest_position,
         sphere_distance=approach.outside,
         threat=approach.threat,
         zone=zone,
@@ -290,7 +295,12 @@ def _cut_at_landing(target: ReturnTarget, position: Floats) -> Floats:
     """Cut a path to a landing sequence at the last waypoint before the landing.  position: path points, (t, 3), m."""
     if target.landing is None:
         return position
-    return position[: int(np.argmin(np.linalg.norm(position - np.array(_end_position(target)), axis=1))) + 1]
+    return _cut_at(_end_position(target), position)
+
+
+def _cut_at(point: tuple[float, float, float], position: Floats) -> Floats:
+    """Cut a path where it is nearest to a point.  position: path points, (t, 3), m."""
+    return position[: int(np.argmin(np.linalg.norm(position - np.array(point), axis=1))) + 1]
 
 
 def _flown_target(world: ReturnWorld, simulated_target: ReturnTarget, position: Floats) -> ReturnTarget:

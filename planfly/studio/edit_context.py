@@ -9,9 +9,9 @@ from flight.mission.route import Route, route_through_stops, with_end_courses
 from flight.simulation.setup import FlightSetup
 from planfly.named_fences import NamedFences
 from planfly.studio.settings import SetParameters
-from planfly.workflow.airframe import airframe_for_setup
+from planfly.workflow.airframe import Airframe, airframe_for_setup
 from planfly.workflow.mission_context import MissionContext
-from planfly.workflow.open_flight import make_setup
+from planfly.workflow.open_flight import make_setup, with_landing_parameters
 from planner.plan import Plan
 from world.scenario import Scenario
 
@@ -91,16 +91,20 @@ class EditContext(MissionContext):
     # ------------------------------------------------------------------
     # Verdicts while a mission is dragged.
 
+    def airframe_for(self, mission: Mission) -> Airframe:
+        """Return the airframe with the autopilot that flies a mission, as `make_setup` chooses it."""
+        return replace(self.airframe, autopilot=with_landing_parameters(self.airframe.autopilot, mission))
+
     def route(self, mission: Mission) -> Route:
         """Return the route that the autopilot flies in a mission, without notes for the user."""
-        frame, fly_over = self.airframe, self.scenario.flight.fly_over
+        frame, fly_over = self.airframe_for(mission), self.scenario.flight.fly_over
         rules = frame.autopilot.route_rules
         route = route_through_stops(self.place_mission(mission), frame.airspeed, fly_over, frame.limits, rules)
         return with_end_courses(route, self.scenario, frame.limits)
 
     def part_setup(self, mission: Mission, route: Route) -> FlightSetup:
         """Return a setup for judging a route, which may be a part of the mission's route."""
-        frame = self.airframe
+        frame = self.airframe_for(mission)
         return FlightSetup(
             scenario=self.scenario,
             mission=mission,

@@ -61,7 +61,7 @@ def judge_windows(
     route = None
     if previous_setup is not None:
         route = update_moved_route(
-            previous_setup.route, previous_setup.mission, mission, context.scenario, context.airframe
+            previous_setup.route, previous_setup.mission, mission, context.scenario, context.airframe_for(mission)
         )
     if route is None:
         route = context.route(mission)

@@ -224,6 +224,8 @@ class WindDirection:
     beyond: bool
     """True if the mission is flyable in every wind that was flown."""
     flown: list[WindFlights]
+    failed_by_rule: list[FailedRule]
+    """Failures of the flights in winds up to the upper bound of the interval; the rule with most flights decides."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

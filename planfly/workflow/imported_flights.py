@@ -36,7 +36,7 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.verdict import Verdict
 from planfly.flight_options import LogOptions, apply_options, flight_entries
 from planfly.named_fences import read_named_fences
-from planfly.workflow.airframe import find_airframe, load_airframe
+from planfly.workflow.airframe import find_airframe, load_airframe, max_turn_bank
 from planfly.workflow.file_autopilots import with_file_autopilot
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import check_mission_exists, mission_of_plan
@@ -234,20 +234,21 @@ def _flight_setup(
 def _path_limits(scenario: Scenario, autopilot: Autopilot, flight: LoggedFlight, default_airspeed: float) -> Limits:
     """Return the limits on path and speed at the cruise airspeed that the autopilot or else the scenario states.
 
-    If neither states an airspeed, the median airspeed of the log is used.
+    If neither states an airspeed, the median airspeed of the log is used.  If the log does not state the autopilot's
+    bank limit, the lower limit of scenario and autopilot applies.
 
     default_airspeed: airspeed of the aircraft, m/s, used if the log has no airspeed.
     """
     aircraft, _ = find_airframe(scenario)
     envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
-    airspeed, bank = scenario.flight.airspeed_mps or default_airspeed, math.radians(scenario.flight.max_bank_deg)
+    airspeed = scenario.flight.airspeed_mps or default_airspeed
     stated_airspeed = autopilot.stated_value(autopilot.speeds.cruise_parameter)
     if stated_airspeed is not None:
         airspeed = stated_airspeed
     elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
         airspeed = float(np.nanmedian(flight.columns["airspeed"]))
-    if autopilot.stated_value(autopilot.turns.bank_parameter) is not None:
-        bank = autopilot.turns.max_bank
+    is_bank_stated = autopilot.stated_value(autopilot.turns.bank_parameter) is not None
+    bank = autopilot.turns.max_bank if is_bank_stated else max_turn_bank(scenario, autopilot)
     return make_limits(scenario, envelope, max(5.0, airspeed), bank)
 
 

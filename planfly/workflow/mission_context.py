@@ -64,7 +64,9 @@ class MissionContext:
 
     def place_mission(self, mission: Mission) -> PlacedMission:
         """Return the stops of a mission on the map, with jumps unrolled."""
-        return place_stops(mission, self.scenario.origin, self.scenario.terrain, vertical_legs=True)
+        resets = self.airframe.autopilot.checks.resets_jump_counters
+        scenario = self.scenario
+        return place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True, resets_jump_counters=resets)
 
     def item_positions(self, mission: Mission, placed: PlacedMission | None = None) -> Floats:
         """Return east, north and altitude AMSL of each item of `flight.mission.edits.movable_indices`, (n, 3) m.

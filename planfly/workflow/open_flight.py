@@ -168,7 +168,7 @@ def make_setup(
     # A fence without valid zones could not be judged.
     fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
-    autopilot = _with_landing_parameters(airframe.autopilot, mission, scenario)
+    autopilot = with_landing_parameters(airframe.autopilot, mission)
     mission = replace(mission, autopilot=autopilot.name)
     resets = autopilot.checks.resets_jump_counters
     if placed is None:
@@ -179,9 +179,11 @@ def make_setup(
         )
     route = route_through_stops(placed, airspeed, fly_over, limits, autopilot.route_rules)
     route = with_end_courses(route, scenario, limits)
-    file_parameters = {} if autopilot.parameters is None else autopilot.parameters.by_origin("file")
+    file_parameters, assumed_parameters = (
+        {} if autopilot.parameters is None else autopilot.parameters.by_origin(origin) for origin in ("file", "assumed")
+    )
     notes = autopilot.checks.parameter_notes
-    notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters)
+    notes += preflight_notes(mission, route, scenario, autopilot.returns.rules, file_parameters, assumed_parameters)
     notes += _speed_limit_notes(mission, autopilot.speeds.limits, autopilot.title)
     notes += _item_count_notes(mission, autopilot.checks.dialect)
     route = replace(route, notes=(*route.notes, *notes)) if notes else route
@@ -201,14 +203,12 @@ def make_setup(
     )
 
 
-def _with_landing_parameters(autopilot: Autopilot, mission: Mission, scenario: Scenario) -> Autopilot:
+def with_landing_parameters(autopilot: Autopilot, mission: Mission) -> Autopilot:
     """Return an autopilot that arms with a mission's landing sequence, unless a file or the scenario says otherwise."""
-    if scenario.landing is not None or all(item.command != Command.DO_LAND_START for item in mission.items):
+    if all(item.command != Command.DO_LAND_START for item in mission.items):
         return autopilot
-    stated = scenario.returns
-    settings = RtlSettings(autoland=None if stated is None else stated.rtl_autoland, lands=True)
-    values = autopilot.returns.parameters_of(settings)
-    return autopilot.with_parameters(**values) if values else autopilot
+    values = autopilot.returns.parameters_of(RtlSettings(lands=True))
+    return autopilot.with_parameters("assumed", **values) if values else autopilot
 
 
 def _speed_limit_notes(mission: Mission, limits: SpeedLimits | None, title: str) -> tuple[str, ...]:

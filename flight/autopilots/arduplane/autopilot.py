@@ -25,7 +25,7 @@ from flight.autopilots.arduplane.open_settings import describe_open_settings
 from flight.autopilots.arduplane.parameters import HEIGHT_CANDIDATES, SIDE_CANDIDATES, ArduPilotParameters
 from flight.autopilots.arduplane.releases import choose_release, release_note, simulated_release
 from flight.autopilots.arduplane.tracking_error import tracking_error
-from flight.autopilots.autopilot import Autopilot, StoredAutopilot, StoredParameters
+from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parts import (
     ControlLaw,
@@ -356,9 +356,9 @@ class ArduPlane(Autopilot):
             track_candidates=SIDE_CANDIDATES,
         )
 
-    def with_parameters(self, **values: float) -> "ArduPlane":
+    def with_parameters(self, origin: Origin = "file", /, **values: float) -> "ArduPlane":
         """Return the simulated ArduPlane with the given parameters changed, also for a program."""
-        return ArduPlane(self.parameters.changed(**values))
+        return ArduPlane(self.parameters.changed(origin, **values))
 
 
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:

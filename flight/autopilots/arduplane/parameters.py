@@ -504,7 +504,7 @@ class ArduPilotParameters(ParameterSet):
         >>> ArduPilotParameters.defaults().in_release("4.6").climb_slope_height
         20.0
         """
-        sources: list[Stated] = [(origin, self.by_origin(origin)) for origin in ("file", "aircraft")]
+        sources: list[Stated] = [(origin, self.by_origin(origin)) for origin in ("file", "assumed", "aircraft")]
         return self._build(sources, self.source, self.unused, version, self.notes)
 
     @property

@@ -148,12 +148,14 @@ def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
 def load_user_parameters(setup: FlightSetup) -> dict[str, float]:
     """Return the user's parameters, from the scenario's parameter file and RTL settings, by present names.
 
+    Includes the parameters that are assumed for a mission with a landing, without which ArduPlane would not arm.
+
     Leaves out older names and names that are too long for MAVLink; the RTL settings have priority over the file.
 
     Raises ParameterError, in one line, if the file cannot be read or states a value that is not allowed.
     """
     file, parameters = setup.scenario.flight.params, setup.autopilot.parameters
-    scenario_values = {} if parameters is None else parameters.by_origin("file")
+    scenario_values = {} if parameters is None else parameters.by_origin("assumed") | parameters.by_origin("file")
     if file is None:
         return scenario_values
     old_names = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}

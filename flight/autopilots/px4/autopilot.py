@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple, Self, get_args
 
 from aircraft.catalog import Aircraft
 from aircraft.tracking import TrackingError
-from flight.autopilots.autopilot import Autopilot, StoredAutopilot, StoredParameters
+from flight.autopilots.autopilot import Autopilot, Origin, StoredAutopilot, StoredParameters
 from flight.autopilots.file_releases import choose_for_file, commented_release
 from flight.autopilots.gust_height import height_in_updrafts
 from flight.autopilots.parameter_files import MAX_BYTES
@@ -426,9 +426,9 @@ class Px4(Autopilot):
         """Return PX4's deviations with these parameters; ``fly_over`` has no effect, as PX4 flies over no waypoint."""
         return tracking_error(self.parameters, airspeed, nav, turbulence=turbulence)
 
-    def with_parameters(self, **values: float) -> "Px4":
+    def with_parameters(self, origin: Origin = "file", /, **values: float) -> "Px4":
         """Return a copy with the given parameters changed."""
-        return Px4(self.parameters.changed(**values))
+        return Px4(self.parameters.changed(origin, **values))
 
 
 def _transfer_state(previous_record: Record, record: Record, start: Floats) -> None:

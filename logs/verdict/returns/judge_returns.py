@@ -181,6 +181,7 @@ class Returns:
     stands_in: True if ArduPlane's return is simulated because the autopilot has no return law.
     unjudged_parts: parts that are not judged.
     autoland: RTL_AUTOLAND; None for the mission of another autopilot.
+    autoland_assumed: True if this value is assumed, because ArduPlane does not arm with 0.
     landings: the mission's landing sequences.
     omitted_count: number of further returns while the aircraft is on the ground, or so low in a take-off or a landing
         that it sinks to the ground before it can return.
@@ -197,6 +198,7 @@ class Returns:
     stands_in: bool = False
     unjudged_parts: tuple[UnjudgedPart, ...] = ()
     autoland: int | None = None
+    autoland_assumed: bool = False
     landings: tuple[LandingStart, ...] = ()
     omitted_count: int = 0
 
@@ -461,8 +463,7 @@ def judge_returns(
             continue
         targets = [world.target(row, ending) for row in starts.rows]
         min_heights = required_heights(world, starts)
-        results, paths = simulate_returns(world, starts, targets)
-        results = _with_clearance_to_landing_sequence(world, starts, targets, results, min_heights)
+        results, paths = simulate_judged_returns(world, starts, targets, min_heights)
         judged_returns = []
         for k, row in enumerate(results):
             advance(number * len(starts) + k, total_count)
@@ -494,6 +495,7 @@ def judge_returns(
         stands_in=world.stands_in,
         unjudged_parts=world.unjudged_parts,
         autoland=None if world.has_other_law else int(world.parameters.rtl_autoland),
+        autoland_assumed="RTL_AUTOLAND" in world.parameters.by_origin("assumed"),
         landings=world.landings,
         omitted_count=omitted_count,
     )
@@ -555,19 +557,33 @@ def simulate_returns(
     return result.results, result.tracks
 
 
-def _with_clearance_to_landing_sequence(
-    world: ReturnWorld, starts: ReturnStarts, targets: Sequence[ReturnTarget], results: Records, min_heights: Floats
-) -> Records:
-    """Return the results of returns, with the clearance up to the first item of a landing sequence if it is too low.
+def simulate_judged_returns(
+    world: ReturnWorld,
+    starts: ReturnStarts,
+    targets: Sequence[ReturnTarget],
+    min_heights: Floats,
+    min_sphere_distances: Floats | None = None,
+) -> tuple[Records, tuple[Floats, ...]]:
+    """Simulate returns, with the clearance up to the first item of a landing sequence if it is too low beyond it.
 
     Beyond this item a return flies the approach of the mission itself, which descends to the landing; there only the
     ground, the spheres, the zones and the energy limit it.
+
+    min_heights: required heights above ground, m, (n,).
+    min_sphere_distances: required distances outside spheres, m, (n,), to abort a return that is too close or too low;
+        None to simulate every return to its end.
+    Returns results and paths as `simulate_returns` does.
     """
-    is_low = results["clearance"] < min_heights - CLEARANCE_TOLERANCE_M
-    has_approach = [target.landing is not None and bool(target.landing.next_stops) for target in targets]
-    indices = np.flatnonzero(is_low & np.array(has_approach, dtype=np.bool_))
+    has_approach = np.array(
+        [target.landing is not None and bool(target.landing.next_stops) for target in targets], dtype=np.bool_
+    )
+    abort_limits = (
+        None if min_sphere_distances is None else (np.where(has_approach, -math.inf, min_heights), min_sphere_distances)
+    )
+    results, paths = simulate_returns(world, starts, targets, abort_limits)
+    indices = np.flatnonzero((results["clearance"] < min_heights) & has_approach)
     if not indices.size:
-        return results
+        return results, paths
     short_targets = [
         targets[k]._replace(landing=landing._replace(next_stops=()))
         for k in indices.tolist()
@@ -580,7 +596,7 @@ def _with_clearance_to_landing_sequence(
         # A return that meets the ground keeps the place where it does.
         is_airborne = results["outcome"][indices] != RETURN_GROUND_IMPACT
         values[indices[is_airborne]] = short_results[name][is_airborne]
-    return results
+    return results, paths
 
 
 def required_heights(world: ReturnWorld, starts: ReturnStarts) -> Floats:

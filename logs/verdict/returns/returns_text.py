@@ -250,7 +250,8 @@ def describe_landing(returns: Returns) -> list[str]:
             text = "a return follows the mission's return path, if it has one"
         case _:
             text = stays_text
-    lines = [f"RTL_AUTOLAND {returns.autoland}: {text}"]
+    assumed_text = " (assumed: with 0 ArduPlane does not arm)" if returns.autoland_assumed else ""
+    lines = [f"RTL_AUTOLAND {returns.autoland}{assumed_text}: {text}"]
     if returns.landings:
         lines.append("within the landing sequence, the loss of transmitter or station changes nothing")
     return lines

@@ -24,7 +24,7 @@ from logs.verdict.returns.judge_returns import (
     heights_above_ground,
     most_violated_zone,
     required_heights,
-    simulate_returns,
+    simulate_judged_returns,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
 from logs.verdict.tolerances import ENERGY_RESERVE_FRACTION
@@ -146,7 +146,7 @@ def _meets_criterion(
     With `_meets_all`, zones and energy are checked too.
     """
     sphere_distances = limits.sphere_distance if criterion is _meets_all else np.full(len(starts), -math.inf)
-    results, paths = simulate_returns(world, starts, targets, (limits.clearance, sphere_distances))
+    results, paths = simulate_judged_returns(world, starts, targets, limits.clearance, sphere_distances)
     is_met = criterion(world, results, limits)
     if criterion is not _meets_all:
         return is_met

@@ -96,11 +96,14 @@ def test_a_field_is_as_much_lower_as_the_ground_is_there() -> None:
     assert scenario.home is not None
     assert scenario.terrain is not None
     assert arduplane(scenario).parameters.landing_pitch_max == pytest.approx(math.radians(10.0))
+    # The scenario states rtl_autoland.
+    assert arduplane(scenario).parameters.by_origin("file") == {"RTL_AUTOLAND": 3.0}
     there = np.array([scenario.landing.east, scenario.landing.north])
     home = np.array([*there, float(scenario.terrain.height(*there))])
     strip = replace(scenario.landing, east=float(scenario.home[0]), north=float(scenario.home[1]))
     back = arduplane(replace(scenario, home=home, landing=strip))
     assert back.parameters.landing_pitch_max == pytest.approx(math.radians(-1.0))
+    assert back.parameters.by_origin("assumed") == {"TECS_LAND_PMAX": -1.0}
 
 
 def test_a_name_that_is_not_listed_is_one_line() -> None:

@@ -32,6 +32,7 @@ def notes(
     *lines: str,
     rules: ReturnRules = DEFAULT_RETURN_RULES,
     parameters: dict[str, float] | None = None,
+    assumed: dict[str, float] | None = None,
     home: str = "36.5 -84.2 100",
     ground: Terrain | None = None,
     **changes: Any,
@@ -39,7 +40,7 @@ def notes(
     setup = setup_of(*lines, home=home)
     changes |= {} if ground is None else {"terrain": ground}
     scenario: Scenario = replace(setup.scenario, **changes)
-    found = preflight_notes(setup.mission, setup.route, scenario, rules, parameters or {})
+    found = preflight_notes(setup.mission, setup.route, scenario, rules, parameters or {}, assumed or {})
     return [one for one in found if ": lands on " not in one]
 
 
@@ -47,7 +48,7 @@ def landed_on(ground: Terrain | None, wind: Wind, landing: LandingStrip | None =
     """The notes on where `WAY` lands."""
     setup = setup_of(*WAY, home="36.5 -84.2 100")
     scenario = replace(setup.scenario, terrain=ground, wind=wind, landing=landing)
-    found = preflight_notes(setup.mission, setup.route, scenario, DEFAULT_RETURN_RULES, {})
+    found = preflight_notes(setup.mission, setup.route, scenario, DEFAULT_RETURN_RULES, {}, {})
     return [one for one in found if ": lands on " in one]
 
 
@@ -119,7 +120,9 @@ def test_home_far_from_the_launch(north: float, told: bool) -> None:
     assert notes(*WAY, home=_home(0.0, north)) == []
     setup = setup_of(*WAY, home=_home(0.0, north))
     scenario = replace(setup.scenario, home=np.array([0.0, 0.0, 100.0]))
-    said = [one for one in preflight_notes(setup.mission, setup.route, scenario, ReturnRules(), {}) if "home" in one]
+    said = [
+        one for one in preflight_notes(setup.mission, setup.route, scenario, ReturnRules(), {}, {}) if "home" in one
+    ]
     assert bool(said) is told
     assert all(one.startswith("the mission's home is 51 m from the scenario's") for one in said)
 
@@ -177,8 +180,17 @@ def test_a_landing_sequence_that_does_not_arm(value: float | None, told: bool) -
     assert notes(*WAY, parameters={"RTL_AUTOLAND": 0.0}) == []
 
 
+def test_a_setting_that_is_assumed_for_a_landing_sequence_is_told() -> None:
+    way = (*WAY[:2], "2 189 0 0 0 0 0 0 0", *WAY[2:])
+    text = "item 3: DO_LAND_START: RTL_AUTOLAND 1 is assumed, because ArduPlane does not arm with its default 0"
+    assert notes(*way, assumed={"RTL_AUTOLAND": 1.0}) == [text]
+    # planfly writes the parameters of a scenario with a landing.
+    strip = LandingStrip(2500.0, 2000.0)
+    assert notes(*way, assumed={"RTL_AUTOLAND": 1.0}, landing=strip) == []
+
+
 def test_a_mission_without_home_has_no_return_to_speak_of() -> None:
     setup = setup_of(*WAY)
     nowhere = Mission(None, setup.mission.items)
-    found = preflight_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {})
+    found = preflight_notes(nowhere, setup.route, setup.scenario, ReturnRules(), {}, {})
     assert [one for one in found if ": lands on " not in one] == []

@@ -100,6 +100,8 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         f"Parameters: 1 from the file, 0 from the aircraft, {known} from ArduPlane's defaults;"
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
+    landing = lines_by(ArduPilotParameters.of_text("WP_RADIUS 50", "mine.parm").changed("assumed", RTL_AUTOLAND=1.0))
+    assert any(line.startswith("Parameters: 1 from the file, 1 assumed for the landing, 0 from") for line in landing)
     returns = ArduPilotParameters.of_text("RTL_AUTOLAND 1\nTERRAIN_FOLLOW 1\n", "mine.parm")
     lines = lines_by(returns)
     assert any(line.endswith("defaults; read but not simulated: TERRAIN_FOLLOW") for line in lines)

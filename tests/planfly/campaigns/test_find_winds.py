@@ -117,6 +117,22 @@ def test_failures_in_calm_air_are_known_by_rule_and_place(wind_base: CampaignBas
     assert windy.result().calm is None
 
 
+def test_failures_are_counted_by_direction_up_to_the_boundary(wind_base: CampaignBase) -> None:
+    """From N the slope fails from 5 m/s on, and in 20 m/s control; from E control fails; from S every flight flies."""
+    search = _Search(GOAL, wind_base)
+    slope, loss = (FlownFlight("not flyable", ((rule, LEG),)) for rule in ("slope", "departure"))
+    flies = FlownFlight("flyable", ())
+    flown = [(0, speed, flies if speed < 5.0 else slope) for speed in (1.0, 2.0, 3.0, 4.0, 5.0, 5.0) for _ in range(20)]
+    flown += [(0, 20.0, loss)] * 60 + [(1, 20.0, flies)] * 40 + [(1, 19.0, loss)] * 20 + [(2, 20.0, flies)] * 60
+    for number, (direction, speed, outcome) in enumerate(flown):
+        search.add_result(RequestedFlight(number, direction, speed, number), outcome)
+    found = search.result()
+    assert found.boundaries[0].high < 20.0
+    assert found.failures[1] == (RuleFailures("departure", 20, ((LEG, 20),)),)
+    assert found.failures[0] == (RuleFailures("slope", 40, ((LEG, 40),)),)
+    assert found.failures[2] == ()
+
+
 def flight_that_fails_in_calm_air(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """Every flight fails at leg 3 but that of draw 2 of seed 4."""
     row = replace(made_flight(base, index, wind), outcome="not flyable", failed=(("clearance", LEG),))

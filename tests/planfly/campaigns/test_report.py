@@ -168,6 +168,22 @@ def test_the_page_is_red_only_where_flights_show_that_calm_air_is_missed() -> No
     assert re.search(r"\.undecided \{ border-color: var\(--open\)", page)
 
 
+def test_the_rule_that_decides_is_named_for_each_direction(base: CampaignBase, tmp_path: Path) -> None:
+    clearance, slope = (RuleFailures(rule, 3, ((Place("leg", 4), 3),)) for rule in ("clearance", "slope"))
+    most = replace(slope, flights=4)
+    found = replace(FOUND, failures=((clearance, most), (slope,), (clearance, slope), ()))
+    line = "fails most often, up to the boundary: slopes from 0° to 90°; clearance from 180°"
+    assert [one for one in wind_lines(found) if one.startswith("fails most")] == [line]
+    assert not any(one.startswith("fails most") for one in wind_lines(FOUND))
+    write_winds(tmp_path, base, found, "planfly winds x")
+    directions = json.loads((tmp_path / "winds.json").read_text())["directions"]
+    rules = [[(rule["rule"], rule["flights"]) for rule in one["failed_by_rule"]] for one in directions]
+    assert rules == [[("clearance", 3), ("slope", 4)], [("slope", 3)], [("clearance", 3), ("slope", 3)], []]
+    assert directions[1]["failed_by_rule"][0]["places"][0]["where"] == "leg 4"
+    cells = re.findall(r'<td class="n">([a-z]*)</td></tr>', (tmp_path / "winds.html").read_text())
+    assert cells == ["slopes", "slopes", "clearance", ""]
+
+
 def test_what_flights_show_by_themselves_where_none_failed() -> None:
     """Of 132 in the largest wind 0.05 ** (1 / 132) at 95 %; fewer of one direction show less."""
     flights = (*((3, 20.0, True) for _ in range(132)), (3, 10.0, True), (0, 20.0, False))

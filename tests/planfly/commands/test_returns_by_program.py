@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import planfly
@@ -14,8 +15,10 @@ from planfly.cli import main
 from planfly.rtl import jsbsim_returns as return_flights
 from planfly.rtl import sitl_returns as program_returns
 from planfly.rtl.sitl_returns import ProgramReturn, ProgramReturns, worst_separated_returns
+from planfly.workflow.open_flight import open_flight
 from tests.autopilots import need_arduplane, shorten_run_in, write_fake, write_fake_px4
 from tests.logs.verdict.returns.hill import SCENARIO, hill_setup, mission_text
+from tests.logs.verdict.returns.valley import valley_mission
 from tests.soak import SOAK
 
 # A mound, 90 m high, 400 m from home, and a mission behind it at 180 m: a straight slope from there to 100 m over home
@@ -118,6 +121,20 @@ def test_the_worst_are_far_apart_and_what_is_worse_counts(tmp_path: Path) -> Non
     assert right.count("safe") == returns.count("safe") - 1
     assert [one.worse for one in both.pairs] == [True, False]
     assert "the simulated outcome applies, because it is worse" in both.lines(returns, setup.scenario)[1]
+
+
+def test_a_program_may_fly_a_low_approach(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The required height applies up to the first item of the landing sequence, as in the simulation."""
+    fly = program_returns.fly_and_judge
+    monkeypatch.setattr(program_returns, "fly_and_judge", lambda *given, autopilot, **how: fly(*given, **how))
+    setup = open_flight(valley_mission(tmp_path), {"terrain": "jacksboro"})
+    world, starts = make_return_world(setup).with_parameters(RTL_AUTOLAND=2), planned_starts(setup, 20.0)
+    returns = judge_returns(world, starts.subset(np.array([1])), 20.0)
+    (pair,) = program_returns.fly_by_program(world, starts, returns, tmp_path / "program", 1, None).pairs
+    assert pair.flown is not None
+    assert (pair.simulated.kind, pair.flown.kind) == ("safe", "safe")
+    assert pair.flown.clearance == pytest.approx(pair.simulated.clearance, abs=15.0)
+    assert pair.agrees
 
 
 @pytest.mark.client

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,13 @@ from flight.mission.route import Route
 from logs.verdict.findings import Finding
 from logs.verdict.judge_geometry import place_findings
 from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from planfly.studio.edit_context import EditContext
 from planfly.studio.incremental_verdict import judge_windows
 from planfly.studio.moved_route import update_moved_route
 from planfly.studio.session import Session
+from planfly.studio.settings import SetParameters
 from planfly.studio.states import violated_legs
+from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup
 from tests.planfly.studio.drafts import drawn_session
 from tests.soak import note, scaled
 from world.airspace.zones import Cylinder, Zone
@@ -129,6 +133,29 @@ def test_windows_violate_the_zones_that_the_whole_does() -> None:
                 assert seen.get(leg, set()) - again == legs.get(leg, set()) - again
                 found += len(seen.get(leg, ()))
     assert found >= 5
+
+
+def test_a_dragged_mission_is_flown_with_the_parameters_of_its_landing(tmp_path: Path) -> None:
+    """After an RTL it goes on to its landing sequence, with the RTL_AUTOLAND 1 that is assumed; by default it stays."""
+    setup = hill_setup(tmp_path, mission=HEAD + mission_rows())
+    context = EditContext.from_setup(setup).with_settings(setup.scenario, SetParameters())
+    mission = edits.raise_items(context.opened_setup.mission, [0], 50.0)
+    released = context.setup(mission)
+    route, (window, *_) = judge_windows(context, mission, 0, context.opened_setup)
+    assert released.route.waypoints[:, 0].max() > 5900.0
+    assert np.array_equal(route.waypoints, released.route.waypoints)
+    assert window.requirements.setup.autopilot == released.autopilot
+
+
+def mission_rows() -> str:
+    """Waypoints 1 and 2 km east of home, an RTL, and a landing sequence that begins 6 km east."""
+    places = ((16, 1000.0, 600.0), (16, 2000.0, 600.0), (20, None, 0.0), (189, None, 0.0))
+    landing = ((16, 6000.0, 100.0), (21, 7000.0, 1.0))
+    rows = ""
+    for number, (command, east, amsl) in enumerate((*places, *landing), 1):
+        lat, lon = (0.0, 0.0) if east is None else (46.0, 8.0 + east / DEGREE)
+        rows += f"{number}\t0\t0\t{command}\t0\t0\t0\t0\t{lat:.7f}\t{lon:.7f}\t{amsl:g}\t1\n"
+    return rows
 
 
 def test_a_moved_route_is_the_one_that_is_laid() -> None:

@@ -18,6 +18,7 @@ from logs.importers.imported_flight import make_flight
 from logs.importers.open_log import open_log
 from logs.importers.raw_log import ModeChange, example_raw_log
 from planfly.flight_options import LogOptions
+from planfly.workflow import imported_flights
 from planfly.workflow.imported_flights import ImportedFlight, fly_again, import_flight
 from tests.logs.importers.columns.column_files import circle, write_log
 from tests.logs.importers.judged_flights import judged
@@ -223,6 +224,23 @@ def test_notes_tell_what_a_person_should_know(tmp_path: Path) -> None:
 
 def silent(_done: float, _whole: float, _remark: str) -> None:
     """Report nothing."""
+
+
+@pytest.mark.parametrize(("stated", "limit_deg"), [(None, 45.0), (40.0, 40.0)])
+def test_a_log_is_judged_with_the_autopilots_bank_where_the_aircraft_can_more(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, stated: float | None, limit_deg: float
+) -> None:
+    """ArduPlane's default ROLL_LIMIT_DEG is 45; the scenario that is made around a mission allows 60 degrees."""
+    load = imported_flights.load_envelope
+    agile = math.radians(60.0)
+    monkeypatch.setattr(
+        imported_flights, "load_envelope", lambda *given, **how: replace(load(*given, **how), max_bank=agile)
+    )
+    raw = example_raw_log()
+    bank = {} if stated is None else {"ROLL_LIMIT_DEG": stated}
+    others = {name: value for name, value in raw.parameters.items() if name != "ROLL_LIMIT_DEG"}
+    flight = judged(tmp_path, replace(raw, parameters=others | bank))
+    assert math.degrees(flight.setup.limits.max_bank) == pytest.approx(limit_deg)
 
 
 def test_the_model_flies_the_legs_of_the_longest_stretch_in_the_wind_of_the_log(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flight.autopilots.arduplane.autopilot import ArduPlane
+from flight.autopilots.arduplane_sitl.process import load_user_parameters
 from flight.mission.fences import fence_shapes
 from flight.mission.items import Mission, MissionItem
 from flight.mission_files.formats import read_fence, read_mission
@@ -276,6 +278,28 @@ def test_a_mission_without_a_scenario_gets_one_made_around_it(short_mission: Pat
     assert setup.scenario.terrain is None
     # 0.01 degrees of a meridian near 46 degrees north are 1111.5 m.
     assert np.linalg.norm(np.diff(setup.route.waypoints[:, :2], axis=0)) == pytest.approx(1111.5, abs=0.5)
+
+
+def test_a_parameter_that_is_assumed_for_a_landing_sequence_is_not_of_the_file(tmp_path: Path) -> None:
+    mission, file = tmp_path / "a.waypoints", tmp_path / "mine.parm"
+    way = row(0, 0, 16, 0, 0, 0, 0.0) + row(1, 3, 16, 0, 100.0, 0, 100.0) + row(2, 3, 16, 0, 2000.0, 0, 100.0)
+    land = "3\t0\t2\t189" + 7 * "\t0" + "\t1\n" + row(4, 3, 16, 0, 3000.0, 0, 60.0) + row(5, 3, 21, 0, 4000.0, 0, 0.0)
+    mission.write_text(HEAD + way + land, encoding="utf-8")
+    setup = open_flight(mission, {"autopilot": "ardupilot"})
+    assert isinstance(setup.autopilot, ArduPlane)
+    # Also in a log, in another release, and for the program, which would not arm without it.
+    restored = ArduPlane.restore(setup.autopilot.store())
+    for found in (setup.autopilot.parameters, restored.parameters, setup.autopilot.parameters.in_release("4.6")):
+        assert (found.by_origin("assumed"), found.by_origin("file")) == ({"RTL_AUTOLAND": 1.0}, {})
+    assert load_user_parameters(setup) == {"RTL_AUTOLAND": 1.0}
+    assert any("RTL_AUTOLAND 1 is assumed" in note for note in setup.route.notes)
+    for stated in (1.0, 2.0):
+        file.write_text(f"RTL_AUTOLAND {stated:g}\n", encoding="utf-8")
+        setup = open_flight(mission, {"autopilot": "ardupilot", "params": str(file)})
+        assert setup.autopilot.parameters is not None
+        assert setup.autopilot.parameters.by_origin("file") == {"RTL_AUTOLAND": stated}
+        assert not setup.autopilot.parameters.by_origin("assumed")
+        assert not any("assumed" in note for note in setup.route.notes)
 
 
 def test_a_mission_is_judged_in_the_scenario_that_is_named(short_mission: Path) -> None:

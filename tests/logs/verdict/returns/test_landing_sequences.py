@@ -7,10 +7,14 @@ import pytest
 
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT
+from logs.verdict.returns.drawn_returns import min_safe_altitudes
 from logs.verdict.returns.judge_returns import Returns, judge_returns, make_return_world
 from logs.verdict.returns.return_starts import planned_starts
 from logs.verdict.returns.returns_text import describe_causes, describe_landing, headline
+from logs.verdict.returns.suggest_returns import meets_return_limits, suggest_parameters, suggest_rally_points
+from planfly.workflow.open_flight import open_flight
 from tests.logs.verdict.returns.hill import DEGREE, HEAD, hill_setup, mission_text
+from tests.logs.verdict.returns.valley import valley_mission
 
 EVERY = 4.0
 
@@ -64,6 +68,39 @@ def test_the_approach_after_the_first_item_may_be_low_but_not_in_the_ground(
     assert reaches(found, "ground") >= 700.0
 
 
+@pytest.mark.parametrize("value", [1, 2])
+def test_suggestions_and_drawn_altitudes_judge_an_approach_as_the_verdict_does(tmp_path: Path, value: int) -> None:
+    """Over the valley no return before the approach comes near the 30 m."""
+    setup = open_flight(valley_mission(tmp_path), {"terrain": "jacksboro"})
+    world = make_return_world(setup).with_parameters(RTL_AUTOLAND=value)
+    starts = planned_starts(setup, EVERY)
+    east = starts.rows["east"]
+    starts = starts.subset(np.flatnonzero(east > east.max() - 1900.0))
+    assert {one.kind for one in judge_returns(world, starts, EVERY).each} == {"safe"}
+    assert meets_return_limits(world, starts).all()
+    assert suggest_parameters(world, starts) == []
+    assert suggest_rally_points(world, starts) is None
+    # The valley floor and 30 m: below the mission's altitude everywhere.
+    altitudes = min_safe_altitudes(world, starts).altitude
+    assert np.all((altitudes > 325.0 + 25.0) & (altitudes < 356.0 + 30.0 + 15.0))
+
+
+def test_rally_points_are_found_before_a_low_approach(tmp_path: Path) -> None:
+    """A return to home goes on through the hill, 400 m high; from a rally point east of it, it does not."""
+    lower = WAY + row(3, 189) + row(4, 16, 6000.0, 100.0) + row(5, 16, 7000.0, 10.0) + row(6, 21, 8000.0, 1.0)
+    setup = hill_setup(tmp_path, mission=lower)
+    world, starts = make_return_world(setup).with_parameters(RTL_AUTOLAND=1), planned_starts(setup, 20.0)
+    starts = starts.subset(np.flatnonzero((starts.rows["east"] > 3800.0) & (starts.rows["east"] < 4900.0)))
+    assert {one.kind for one in judge_returns(world, starts, 20.0).each} == {"ground"}
+    remedy = suggest_rally_points(world, starts)
+    assert remedy is not None
+    assert remedy.rally is not None
+    assert len(remedy.rally) == 1
+    # The lowest altitude that is tried is 45 m above the ground, and from there the approach is flown.
+    assert remedy.rally[0].up < 100.0
+    assert {one.kind for one in judge_returns(remedy.apply_to(world), starts, 20.0).each} == {"safe"}
+
+
 def test_it_goes_on_from_its_circle_to_the_landing_sequence(tmp_path: Path) -> None:
     # At 100 m over home it comes home safely from before the hill, and goes on at 100 m into the hill, 400 m high.
     stays = judged(tmp_path, RTL_AUTOLAND=0)
@@ -92,7 +129,10 @@ def test_without_a_landing_sequence_a_return_stays_in_its_circle(tmp_path: Path,
 
 def test_a_mission_with_a_landing_sequence_is_judged_with_a_setting_that_arms(tmp_path: Path) -> None:
     """ArduPlane's default, 0, does not arm with DO_LAND_START."""
-    assert describe_landing(judged(tmp_path))[0].startswith("RTL_AUTOLAND 1: from its loiter")
+    assumed = "RTL_AUTOLAND 1 (assumed: with 0 ArduPlane does not arm): from its loiter"
+    assert describe_landing(judged(tmp_path))[0].startswith(assumed)
+    # A value that is stated is not assumed.
+    assert describe_landing(judged(tmp_path, RTL_AUTOLAND=1))[0].startswith("RTL_AUTOLAND 1: from its loiter")
 
 
 def test_what_each_value_says(tmp_path: Path) -> None:
