@@ -30,8 +30,8 @@ from logs.verdict.returns.judge_returns import (
     SimulatedReturn,
     badness,
     classify_return,
-    distance_to_limit,
     is_reachable_start,
+    limit_ratio,
     most_violated_zone,
 )
 from logs.verdict.returns.return_starts import ReturnStarts
@@ -191,7 +191,7 @@ def worst_separated_returns(
 
 def _worst_first_key(candidate: SimulatedReturn) -> tuple[int, float]:
     """Return a sort key that puts the worst outcome first, and safe returns last, the closest to a limit first."""
-    return (KINDS.index("safe"), distance_to_limit(candidate)) if candidate.safe else badness(candidate)
+    return (KINDS.index("safe"), limit_ratio(candidate)) if candidate.safe else badness(candidate)
 
 
 def _is_lead_in_clear(world: ReturnWorld, row: Record) -> bool:

@@ -8,6 +8,7 @@ from flight.mission.return_path import ReturnPoint
 from logs.verdict.returns.judge_returns import (
     KINDS,
     POINT_MASS_ERROR_M,
+    POINT_MASS_POSITION_ERROR_M,
     Kind,
     ReturnRange,
     Returns,
@@ -305,7 +306,8 @@ def _range_outcome_text(
         case "unsure":
             return (
                 f"{prefix}{height_text} according to the point-mass model, but this return or a similar one, flown in"
-                f" JSBSim, differs by more than {POINT_MASS_ERROR_M:.0f} m"
+                f" JSBSim, differs by more than {POINT_MASS_ERROR_M:.0f} m in height or"
+                f" {POINT_MASS_POSITION_ERROR_M:.0f} m in distance from a missile's sphere"
             )
     if worst_return.required_height < returns.limit:
         height_text += " (taking off or landing: the return begins below the required height)"

@@ -21,6 +21,7 @@ from logs.verdict.returns.judge_returns import (
     SimulatedReturn,
     badness,
     judge_returns,
+    limit_ratio,
     make_return_world,
 )
 from logs.verdict.returns.return_starts import ReturnStarts, planned_starts
@@ -154,15 +155,21 @@ def test_a_flight_that_finds_it_higher_makes_that_one_better_alone(
     stub = Stub(before, higher)
     after = judge_returns(world, starts, OFTEN, stub)
     asked = {one.time for one in stub.asked}
-    assert 0 < len(asked) <= 4
-    assert after.jsbsim_differences == pytest.approx([higher] * len(asked))
+    # Those within 10 m of the ground or of the required 30 m are flown, each of them.
+    distances = {one.time: min(abs(one.clearance), abs(one.clearance - 30.0)) for one in before.each}
+    assert asked == {time for time, distance in distances.items() if distance < 10.0}
+    assert len(asked) > 8
+    in_air = [one for one in stub.asked if max(one.clearance, one.clearance + higher) > 0.0]
+    assert after.jsbsim_differences == pytest.approx([higher] * len(in_air))
     for old, new in zip(before.each, after.each, strict=True):
         if old.kind == "ground" and old.time not in asked:
             assert new.kind == "ground"
         if old.time not in asked:
             assert KINDS.index(new.kind) <= KINDS.index(old.kind)
         if old.time in asked and higher <= 10.0:
-            assert new.clearance == pytest.approx(old.clearance + higher)
+            # A flight ends at the ground, so that depths below it are not compared.
+            hits_in_both = old.clearance + higher <= 0.0
+            assert new.clearance == pytest.approx(old.clearance + (0.0 if hits_in_both else higher))
             assert new.kind == ("ground" if new.clearance <= 0.0 else "low" if new.clearance < 29.9 else "safe")
         # So far apart, neither is believed.
         if old.time in asked and higher > 10.0:
@@ -179,7 +186,8 @@ def test_a_flight_that_finds_it_lower_makes_all_like_it_worse(
     assert not after.count("unsure")
     # Further apart than it may be: what was flown hits, and nobody knows of the others.
     stub = Stub(before, -50.0)
-    far = judge_returns(world, starts, OFTEN, stub)
+    far = judge_returns(world, starts, OFTEN, stub, 4)
+    assert len(stub.asked) == 4
     assert {one.kind for one in far.each if one.time in {asked.time for asked in stub.asked}} == {"ground"}
     assert far.count("unsure") > 5
     assert "JSBSim disagree" in headline(far)
@@ -198,6 +206,23 @@ def test_one_deep_in_the_ground_is_sure(hill: tuple[ReturnWorld, ReturnStarts, R
     stub = Stub(before, 5.0)
     judge_returns(world, starts, OFTEN, stub, 100)
     assert not deep & {one.time for one in stub.asked}
+
+
+@pytest.mark.parametrize(
+    ("clearance", "outside", "is_doubtful"),
+    [
+        *((9.9, math.inf, True), (10.1, math.inf, False), (19.9, math.inf, False), (20.1, math.inf, True)),
+        *((39.9, math.inf, True), (40.1, math.inf, False), (100.0, 34.9, True), (100.0, 35.1, False)),
+        (100.0, -34.9, True),
+    ],
+)
+def test_a_return_is_doubtful_within_10_m_of_a_height_and_35_m_of_a_sphere(
+    hill: tuple[ReturnWorld, ReturnStarts, Returns], clearance: float, outside: float, is_doubtful: bool
+) -> None:
+    """With 30 m required: 9.9 m is close to the ground, 20.1 m and 39.9 m to the requirement."""
+    safe = next(one for one in hill[2].each if one.kind == "safe")
+    one = replace(safe, clearance=clearance, required_height=30.0, sphere_distance=outside)
+    assert (limit_ratio(one) < 1.0) is is_doubtful
 
 
 @pytest.mark.parametrize("changed", [{"roll": 0.3}, {"velocity_east": 3.3}])
