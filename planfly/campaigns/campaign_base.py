@@ -5,7 +5,7 @@ import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from flight.simulation.setup import FlightSetup, make_limits
 from logs.verdict.conditions import Conditions, judging_conditions
+from planfly.campaigns.campaign_inputs import describe_differences, flatten_inputs, hash_input
 from planfly.campaigns.dispersions import DEFAULT_DISPERSIONS_NAME, QUANTITIES_OF_DRAWS, Dispersions, Draw, SpreadError
 from planfly.flight_options import MissionOptions, load_scenario_with_options
 from planfly.named_fences import NamedFences, read_named_fences
@@ -82,24 +83,33 @@ class CampaignBase:
         """Return the nominal conditions of the flights: aircraft, weather, world and autopilot."""
         return judging_conditions(self.nominal_setup())
 
-    def inputs_hash(self) -> str:
-        """Return a hash of all inputs of the flights except the code.
+    def inputs(self) -> dict[str, Any]:
+        """Return all inputs of the flights except the code, by name; long inputs as their hashes.
 
-        The inputs are scenario, terrain, mission, aircraft model, autopilot parameters, dispersions and seed.
+        The inputs are seed, scenario, terrain, mission, aircraft model, autopilot parameters and dispersions.
         """
-        model = self.airframe.aircraft
-        terrain = self.scenario.terrain
-        parts = (
-            json.dumps(self.scenario.to_json(), sort_keys=True),
-            "" if terrain is None else hashlib.sha256(terrain.heights.tobytes()).hexdigest(),
-            mission_text(self.mission, "waypoints"),
-            repr(self.mission.fences),
-            model_hash(model),
-            repr(self.airframe.autopilot.parameters),
-            json.dumps(self.dispersions.to_json(), sort_keys=True),
-            str(self.seed),
+        terrain, autopilot = self.scenario.terrain, self.airframe.autopilot
+        parameters = autopilot.parameters
+        return flatten_inputs(
+            {
+                "seed": self.seed,
+                **self.scenario.to_json(),
+                "elevations": None if terrain is None else hash_input(terrain.heights.tobytes()),
+                "mission": hash_input(mission_text(self.mission, "waypoints")),
+                "fences": hash_input(repr(self.mission.fences)),
+                "aircraft model": hash_input(model_hash(self.airframe.aircraft)),
+                "autopilot": f"{autopilot.title} {autopilot.version}",
+                "parameters": {}
+                if parameters is None
+                else {name: f"{value!r} ({origin})" for name, value, origin in parameters.values},
+                "unused parameters": "" if parameters is None else hash_input(repr(parameters.unused)),
+                "spread": hash_input(json.dumps(self.dispersions.to_json(), sort_keys=True)),
+            }
         )
-        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+    def inputs_hash(self) -> str:
+        """Return a hash of all inputs of the flights except the code."""
+        return hashlib.sha256(json.dumps(self.inputs(), sort_keys=True).encode()).hexdigest()[:16]
 
 
 def is_mission_file(target: str) -> bool:
@@ -137,7 +147,8 @@ def open_campaign(
         has_plan_file = plan_file is not None and plan_file.is_file()
         plan = read_plan(plan_file) if has_plan_file and plan_file is not None else _make_plan(scenario, seed, advance)
         if has_plan_file and plan.scenario.to_json() != scenario.to_json():
-            message = f"{plan_file}: this plan was made for another scenario, not {target}"
+            differences = describe_differences(*(flatten_inputs(one.to_json()) for one in (plan.scenario, scenario)))
+            message = f"{plan_file}: this plan was made for another scenario, not {target}: {differences}"
             raise MissionError(message, file=str(plan_file))
         if plan_file is not None and not has_plan_file:
             write_atomically(plan_file, plan_json(plan))

@@ -138,7 +138,13 @@ def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resum
     base: campaign base, whose dispersions must not contain `SEARCHED_QUANTITIES`.
     Raises StoreError, also for the table of a search with another goal.
     """
-    settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
+    settings = {
+        "name": base.name,
+        "seed": base.seed,
+        "spread": base.dispersions.to_json(),
+        "inputs": base.inputs(),
+        **asdict(goal),
+    }
     return WindsStore(folder / WINDS_DATABASE, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
 
 

@@ -79,7 +79,13 @@ def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) ->
 
     Raises StoreError, also if the table has more flights than the goal.
     """
-    settings = {"name": base.name, "seed": base.seed, "spread": base.dispersions.to_json(), **asdict(goal)}
+    settings = {
+        "name": base.name,
+        "seed": base.seed,
+        "spread": base.dispersions.to_json(),
+        "inputs": base.inputs(),
+        **asdict(goal),
+    }
     path = folder / CAMPAIGN_DATABASE
     return Store(path, f"{base.inputs_hash()}-{code_hash()}", settings, resume=resume)
 

@@ -55,7 +55,7 @@ from planfly.campaigns.summary import (
     summary_json,
     worst_flight_logs,
 )
-from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, Store, check_not_locked, is_same_flight
+from planfly.campaigns.tables import CAMPAIGN_DATABASE, WINDS_DATABASE, Store, check_not_locked, differing_columns
 from planfly.workflow.make_plan import Advance
 from planfly.workflow.open_flight import make_setup
 from planner.plan import plan_json
@@ -333,14 +333,19 @@ def write_files(
     write_atomically(folder / "report.html", campaign_page(base, summary, store, command))
 
 
+# Maximum number of differing columns that the message on a repeated flight names.
+_MAX_NAMED_COLUMNS = 5
+
+
 def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     """Repeat a flight of the table, and record it in a log.
 
     Raises PlanflyError if the result differs from the table, because another machine computed it differently.
     """
     new_row = fly_one(base, row.draw.index, log=log)
-    if not is_same_flight(row, new_row):
-        message = f"{log}: flight {row.draw.index} has a different outcome here than where it was flown"
+    if columns := differing_columns(row, new_row):
+        names = ", ".join(columns[:_MAX_NAMED_COLUMNS]) + (", ..." if len(columns) > _MAX_NAMED_COLUMNS else "")
+        message = f"{log}: flight {row.draw.index} has a different outcome here than where it was flown: {names}"
         raise PlanflyError(message, file=log, field="flight", value=row.draw.index)
     return new_row
 

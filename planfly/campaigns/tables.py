@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from logs.verdict.places import Place
 from logs.verdict.rule_words import RULE_WORDS
+from planfly.campaigns.campaign_inputs import describe_differences
 from planfly.campaigns.dispersions import NAMES, Draw
 from planfly.campaigns.flight_row import (
     COLUMN_FIELDS,
@@ -96,11 +97,15 @@ def make_flight_row(index: int, values: Mapping[str, Any]) -> FlightRow:
 
 def is_same_flight(first: FlightRow, second: FlightRow) -> bool:
     """Return True if two rows describe the same flight; the machine and its speed may differ."""
+    return first.draw.index == second.draw.index and not differing_columns(first, second)
+
+
+def differing_columns(first: FlightRow, second: FlightRow) -> list[str]:
+    """Return the names of the columns in which two rows differ, except those of the machine and its speed."""
     first_values, second_values = (row_values(replace(row, made_of="")) for row in (first, second))
-    is_same = all(
-        first_values[name] == second_values[name] for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS
-    )
-    return is_same and first.draw.index == second.draw.index
+    return [
+        name for name in ROW_COLUMNS if name not in RUN_DEPENDENT_COLUMNS and first_values[name] != second_values[name]
+    ]
 
 
 # ----------------------------------------------------------------------
@@ -218,13 +223,11 @@ class LockedTable:
                 f"{self.path}: schema {stored_settings.get('schema')!r}: expected {schema}", file=self.path
             )
         _check_settings_intact(stored_settings, self.path)
-        if stored_settings.get("made_of") != self.made_of:
-            raise StoreError(
-                f"{self.path}: belongs to another campaign: its code, mission, aircraft, scenario, dispersions or seed"
-                f" differs ({stored_settings.get('made_of')}, not {self.made_of})",
-                file=self.path,
-            )
         stored_request = json.loads(stored_settings["settings"])
+        if stored_settings.get("made_of") != self.made_of:
+            inputs = [json.loads(json.dumps(request.get("inputs", {}))) for request in (stored_request, settings)]
+            differences = describe_differences(*inputs) or "planfly's code differs"
+            raise StoreError(f"{self.path}: belongs to another campaign: {differences}", file=self.path)
         for name in self._kind.fixed:
             if stored_request[name] != settings[name]:
                 raise StoreError(

@@ -54,7 +54,8 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
         (["--refly", "9"], "no such flight"),
         (["--refly", "2", "--json", "-"], "--json: only with a campaign"),
         ([], "--resume continues it"),
-        (["--resume", "--seed", "2"], "another campaign"),
+        (["--resume", "--seed", "2"], "belongs to another campaign: seed 2 instead of 1"),
+        (["--refly", "1", "--wind", "8,250"], "belongs to another campaign: wind.speed_mps 8.0 instead of 5.0"),
         (["--resume", "--spread", "none.toml"], "cannot be read"),
         (["--overwrite", "--spread", "heavy.toml"], "aerosonde cannot fly level at 25 m/s"),
         (

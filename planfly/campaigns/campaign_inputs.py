@@ -1,0 +1,62 @@
+"""Compare the inputs of two campaigns: scenario, mission, aircraft, parameters, dispersions and seed, each by name."""
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+# Beginning of the value that stands for a list or a text.
+_HASH_PREFIX = "sha256:"
+# Maximum number of differences that are described.
+_MAX_DESCRIBED = 6
+
+
+def hash_input(content: str | bytes) -> str:
+    """Return the value that stands for a long input."""
+    data = content.encode() if isinstance(content, str) else content
+    return _HASH_PREFIX + hashlib.sha256(data).hexdigest()[:16]
+
+
+def flatten_inputs(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the inputs of a document by name, with ``table.key`` for those of a table, and a hash for each list.
+
+    >>> flatten_inputs({"seed": 1, "wind": {"speed_mps": 5.0}})
+    {'seed': 1, 'wind.speed_mps': 5.0}
+    """
+    inputs: dict[str, Any] = {}
+    for name, value in document.items():
+        if isinstance(value, Mapping):
+            inputs |= {f"{name}.{key}": entry for key, entry in flatten_inputs(value).items()}
+        else:
+            inputs[name] = hash_input(json.dumps(value)) if isinstance(value, list | tuple) else value
+    return inputs
+
+
+def describe_differences(stored: Mapping[str, Any], current: Mapping[str, Any]) -> str:
+    """Describe the inputs that differ, each with both values if they are short; "" if none differs.
+
+    >>> describe_differences({"seed": 1, "wind.speed_mps": 5.0}, {"seed": 1, "wind.speed_mps": 8.0, "landing": "a"})
+    'wind.speed_mps 8.0 instead of 5.0, landing a (not stated before)'
+    """
+    names = [name for name in dict.fromkeys((*stored, *current)) if stored.get(name) != current.get(name)]
+    # A number that was converted between units differs by rounding: name it only if nothing else differs.
+    names = [name for name in names if not _differs_by_rounding(stored.get(name), current.get(name))] or names
+    texts = [_difference_text(name, stored.get(name), current.get(name)) for name in names[:_MAX_DESCRIBED]]
+    if len(names) > _MAX_DESCRIBED:
+        texts.append(f"and {len(names) - _MAX_DESCRIBED} more")
+    return ", ".join(texts)
+
+
+def _differs_by_rounding(stored: Any, current: Any) -> bool:
+    """Return True if two values are numbers that are equal within rounding."""
+    return isinstance(stored, float) and isinstance(current, float) and math.isclose(stored, current, rel_tol=1e-12)
+
+
+def _difference_text(name: str, stored: Any, current: Any) -> str:
+    """Describe one input that differs; None stands for an input that is not stated."""
+    if str(stored if current is None else current).startswith(_HASH_PREFIX):
+        return name
+    if current is None:
+        return f"{name} not stated instead of {stored}"
+    return f"{name} {current} (not stated before)" if stored is None else f"{name} {current} instead of {stored}"

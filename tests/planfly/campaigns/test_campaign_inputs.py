@@ -1,0 +1,66 @@
+"""The inputs in which two campaigns differ, by name."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from planfly.campaigns.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.campaign_inputs import describe_differences
+from planfly.campaigns.dispersions import default_dispersions, parse_dispersions
+from planfly.flight_options import MissionOptions
+from tests.planfly.campaigns.made_campaigns import write_short
+
+
+@pytest.mark.parametrize(
+    ("changed", "text"),
+    [
+        ({}, ""),
+        ({"wind": (8.0, 250.0)}, "wind.speed_mps 8.0 instead of 5.0"),
+        ({"seed": 2}, "seed 2 instead of 1"),
+        ({"turbulence": "moderate"}, "wind.turbulence moderate instead of light"),
+    ],
+)
+def test_an_option_that_differs_is_named_with_both_values(tmp_path: Path, changed: MissionOptions, text: str) -> None:
+    mission, scenario = write_short(tmp_path)
+
+    def base(options: MissionOptions) -> CampaignBase:
+        given: MissionOptions = {"scenario": scenario, "seed": 1}
+        return open_campaign(str(mission), default_dispersions(), {**given, **options})
+
+    assert describe_differences(base({}).inputs(), base(changed).inputs()) == text
+
+
+def test_a_long_input_is_named_alone(base: CampaignBase) -> None:
+    spread = parse_dispersions('[mass]\ndistribution = "norm"\nloc = 1.0\nscale = 0.02\nsource = "x"', "x")
+    fenced = replace(base.mission, fences=base.mission.items[:1])
+    other = replace(base, dispersions=spread, mission=fenced)
+    assert describe_differences(base.inputs(), other.inputs()) == "fences, spread"
+
+
+def test_a_parameter_is_named_with_its_source(tmp_path: Path) -> None:
+    mission, scenario = write_short(tmp_path)
+    file = tmp_path / "mine.parm"
+    file.write_text("WP_RADIUS 50\n", encoding="ascii")
+    given: MissionOptions = {"scenario": scenario, "seed": 1, "autopilot": "ardupilot"}
+    first, second = (
+        open_campaign(str(mission), default_dispersions(), {**given, **more}).inputs()
+        for more in (MissionOptions(), MissionOptions(params=str(file)))
+    )
+    text = describe_differences(first, second)
+    assert f"flight.params {file} (not stated before)" in text
+    assert "parameters.WP_RADIUS 50.0 (file) instead of 90.0 (default)" in text
+
+
+def test_no_more_than_six_are_described() -> None:
+    stored, current = ({f"x{k}": value for k in range(8)} for value in (1, 2))
+    text = describe_differences(stored, current)
+    assert text.startswith("x0 2 instead of 1, ")
+    assert text.endswith(", x5 2 instead of 1, and 2 more")
+    assert describe_differences({"a": 1}, {}) == "a not stated instead of 1"
+
+
+def test_rounding_is_named_only_if_nothing_else_differs() -> None:
+    stored, current = {"a": 250.0, "b": 1.0}, {"a": 250.00000000000003, "b": 2.0}
+    assert describe_differences(stored, current) == "b 2.0 instead of 1.0"
+    assert describe_differences(stored, current | {"b": 1.0}) == "a 250.00000000000003 instead of 250.0"
