@@ -42,8 +42,8 @@ class ElectricMotor:
         """Return a copy with scaled thrust, speed per volt, propeller torque, winding resistance and idle current."""
         return replace(
             self,
-            thrust=_times(thrust, self.thrust),
-            torque=_times(torque, self.torque),
+            thrust=_scale_coefficients(thrust, self.thrust),
+            torque=_scale_coefficients(torque, self.torque),
             back_voltage=self.back_voltage / speed,
             resistance=self.resistance * resistance,
             idle_current=self.idle_current * idle,
@@ -66,7 +66,7 @@ class ElectricMotor:
         throttle: 0..1.
         voltage: battery voltage, V.
         """
-        q2, q1, q0 = self._torques(airspeed, density)
+        q2, q1, q0 = self._torque_coefficients(airspeed, density)
         kv = self.back_voltage
         driving = kv * voltage * throttle / self.resistance
         driven = _larger_root(q2, q1 + kv * kv / self.resistance, q0 - driving + kv * self.idle_current)
@@ -95,16 +95,16 @@ class ElectricMotor:
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
         """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
         speed = self.speed(airspeed, throttle, density, self.voltage)
-        q2, q1, q0 = self._torques(airspeed, density)
+        q2, q1, q0 = self._torque_coefficients(airspeed, density)
         return np.asarray(q2 * speed * speed + q1 * speed + q0)
 
-    def _torques(self, airspeed: Floats, density: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return q2, q1 and q0 of the propeller's torque, three arrays (n,)."""
+    def _torque_coefficients(self, airspeed: Floats, density: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return q2, q1 and q0 of the propeller's torque q2 w^2 + q1 w + q0, three arrays (n,)."""
         a, b, c = self.torque
         return density * a, density * b * airspeed, density * c * airspeed * airspeed
 
 
-def _times(factor: float, coefficients: tuple[float, float, float]) -> tuple[float, float, float]:
+def _scale_coefficients(factor: float, coefficients: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return three coefficients multiplied by a factor."""
     return factor * coefficients[0], factor * coefficients[1], factor * coefficients[2]
 
