@@ -312,7 +312,7 @@ def aircraft_slopes(table: PerformanceTable, course: float, amsl: float) -> tupl
 
 
 @inlined
-def _turn_radius(
+def _turn_radius_of_courses(
     table: PerformanceTable,
     ux: float,
     uy: float,
@@ -360,7 +360,7 @@ def turn_radius_between(table: PerformanceTable, course_in: float, course_out: f
     wx, wy = downwind_vector(table)
     # A U-turn may be flown in either direction.
     turn_sign = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
-    return _turn_radius(table, ux, uy, vx, vy, amsl, turn_sign, wx, wy)
+    return _turn_radius_of_courses(table, ux, uy, vx, vy, amsl, turn_sign, wx, wy)
 
 
 @inlined
@@ -379,7 +379,7 @@ def corner_tangent(
         return 0.0, 0.0
     if abs(cross) < 1e-6 and dot < 0.0:
         return math.inf, 0.0
-    radius = _turn_radius(table, ux, uy, vx, vy, amsl, cross, wx, wy)
+    radius = _turn_radius_of_courses(table, ux, uy, vx, vy, amsl, cross, wx, wy)
     return radius * abs(cross) / (1.0 + dot), radius
 
 

@@ -148,9 +148,11 @@ def algorithm_lines() -> str:
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
-    """Return the algorithm with this name, or the default for None. Raises ScenarioError for an unknown name.
+    """Return the algorithm with this name, or the default for None.
 
     source: origin of the name, with which the error message begins.
+
+    Raises ScenarioError for an unknown name.
 
     >>> find_algorithm(None, "example.toml").name, find_algorithm("umda-polar", "example.toml").encoding
     ('fda-seeded', 'polar')
@@ -163,5 +165,8 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
-    """Return the limits for an algorithm; without tracking error if it counts violations as the paper does."""
+    """Return the limits that an algorithm plans with.
+
+    An algorithm that counts violations, as the paper does, has no tracking error.
+    """
     return limits if algorithm.graded else replace(limits, tracking=None)

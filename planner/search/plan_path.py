@@ -163,7 +163,10 @@ def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, 
 
 
 def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Floats, Certificate]:
-    """Search, and repeat the search with finer grids and more samples while the certificate fails."""
+    """Search, and repeat the search with finer grids and more samples while the certificate fails.
+
+    Returns the best path (w, 3) and its certificate.
+    """
     attempts = len(ATTEMPTS) if search.algorithm.seeded else 1
     if is_limited(search.problem.search.airspace):
         attempts = min(attempts, MAX_ATTEMPTS_AMONG_ZONES)
@@ -196,9 +199,9 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
-    """Check that a path can be searched. Raises ScenarioError for the first obstacle.
+    """Check that a path can be searched; raise ScenarioError for the first reason against it.
 
-    Obstacles are: more wind than the airspeed (m/s) allows, too many values in a population, a budget below the
+    Reasons are: more wind than the airspeed (m/s) allows, too many values in a population, a budget below the
     population, and a start or destination inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
@@ -283,7 +286,10 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
 
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten or tighten the best path, and the result of the generations, if any, (d,)."""
+    """Shorten or tighten the best path, and the path of the last generation, if any.
+
+    last_vector: vector (d,) of that path.
+    """
     if search.can_shorten:
         if last_vector is not None:
             search.shorten(search.encoding.decode(last_vector[None])[0])

@@ -300,8 +300,8 @@ def test_a_search_that_was_cut_short_is_not_taken_for_proof() -> None:
     low = shared(scenario, airframe.limits)
     refused = ensure_altitude_margin(low, airframe, lambda limits: shared(scenario, limits))
     assert not refused.safe
-    assert shared.total(refused).ended == "interrupted"
-    assert shared.total(refused).evaluations > 2 * first.evaluations
+    assert shared.with_total_evaluations(refused).ended == "interrupted"
+    assert shared.with_total_evaluations(refused).evaluations > 2 * first.evaluations
 
 
 def test_no_other_plan_of_a_front_is_lower() -> None:
