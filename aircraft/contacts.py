@@ -111,10 +111,12 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
 
 
 def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
-    """Return the XML of one contact, with its position in meters aft, right and up from the model's reference point.
+    """Return the XML of one contact.
 
     contacts: all contacts; those on which the aircraft stands share its weight.
-    centre: centre of gravity in the same coordinates, m, (3,).
+    centre: centre of gravity, m, (3,).
+
+    Positions in the XML, and the centre, are in meters aft, right and up from the model's reference point.
     """
     standing_count = sum(other.is_support for other in contacts)
     stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
@@ -164,9 +166,10 @@ def _read_contacts(model: bytes) -> list[Contact]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the centre of gravity of the loaded aircraft: m aft, right and up of the reference point, (3,).
+    """Return the centre of gravity of the loaded aircraft, m aft, right and up of the reference point.
 
-    As in JSBSim, the load consists of the empty aircraft, its point masses and the initial contents of its tanks.
+    As in JSBSim, the load consists of the empty aircraft, its point masses and the initial contents of its tanks. The
+    result is (3,).
     """
     root = ElementTree.fromstring(model)
     cg_elements = [element for element in root.findall("mass_balance/location") if element.get("name") == "CG"]

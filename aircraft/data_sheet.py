@@ -334,7 +334,10 @@ def _weight(sheet: DataSheet) -> float:
 
 
 def _wing_area(sheet: DataSheet) -> float:
-    """Return the wing area, m^2: the stated area, or the area for the stall speed at the class's maximum lift."""
+    """Return the wing area, m^2.
+
+    It is the stated area, or else the area for the stall speed at the class's maximum lift.
+    """
     if sheet.area:
         return sheet.area
     return _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * CLASSES[sheet.layout].lift_max)
@@ -439,7 +442,9 @@ def elliptic_slope(aspect: float) -> float:
 
 
 def _estimate_coefficients(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerPrior) -> AeroCoefficients:
-    """Estimate the aerodynamic coefficients of an aircraft from its data sheet, its class and the prior of its drag.
+    """Estimate the aerodynamic coefficients of an aircraft from its data sheet and its class.
+
+    prior: gives the minimum drag.
 
     Raises FlightError if the stall speed is too low for the wing.
     """

@@ -189,9 +189,10 @@ def turn_radius(speed: float, bank: float) -> float:
 
 
 def _interpolate_bilinearly(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
-    """Interpolate a table over `xs` (rows) and `ys` (columns) at x and y; clip y, and return NaN for x outside `xs`.
+    """Interpolate a table over `xs` (rows) and `ys` (columns) at x and y.
 
-    Rows before the first row with a value take the values of that row.
+    y is clipped, and the result is NaN for x outside `xs`. Rows before the first row with a value take the values of
+    that row.
     """
     rows = _interpolate_rows(ys, table, y)
     first_finite_row = int(np.argmax(~np.isnan(rows)))

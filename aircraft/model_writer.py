@@ -339,7 +339,7 @@ def _aerodynamics_xml(numbers: ModelNumbers) -> str:
     <property value="1"> aero/drag-factor </property>
     <property value="1"> aero/control-factor </property>
 
-{_lift_curve(numbers.aero, numbers.factors)}
+{_lift_curve_xml(numbers.aero, numbers.factors)}
 
 {axes}
   </aerodynamics>"""
@@ -414,8 +414,11 @@ def _moment_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tu
     return roll, pitch, yaw
 
 
-def _lift_curve(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
-    """Return the XML of the lift by angle of attack: a straight line, and the lift of a flat plate beyond the stall."""
+def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
+    """Return the XML of the lift by angle of attack.
+
+    It is a straight line, and beyond the stall the lift of a flat plate.
+    """
     straight_line = add(
         f"<v> {number(aero.lift_0)} </v>",
         scale(aero.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors)),

@@ -277,9 +277,11 @@ def downwind_vector(table: PerformanceTable) -> tuple[float, float]:
 def slopes_along(
     table: PerformanceTable, tail_fraction: float, cross_fraction: float, amsl: float
 ) -> tuple[float, float]:
-    """Return the steepest climb and dive over the ground on a course, rad; (0, 0) if the course cannot be held.
+    """Return the steepest climb and dive over the ground on a course, rad.
 
     tail_fraction, cross_fraction: components of the wind's direction along and across the course (cosine and sine).
+
+    The result is (0, 0) if the course cannot be held.
     """
     count = table.amsl.size
     wind = wind_speed_at(table, amsl)
@@ -350,10 +352,11 @@ def _turn_radius_of_courses(
 
 @compiled_inline
 def turn_radius_between(table: PerformanceTable, course_in: float, course_out: float, amsl: float) -> float:
-    """Return the radius of the arc at the bank limit between two courses, m; inf if a course cannot be held.
+    """Return the radius (m) of the arc at the bank limit between two courses (rad).
 
-    The radius is for the highest ground speed in the turn. In turbulence one standard deviation of the gusts is added,
-    because the airspeed, and with it the bank for an arc over the ground, varies by that much.
+    The radius is for the highest ground speed in the turn, and inf if a course cannot be held. In turbulence one
+    standard deviation of the gusts is added, because the airspeed, and with it the bank for an arc over the ground,
+    varies by that much.
     """
     turn = wrap(course_out - course_in)
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)

@@ -95,7 +95,10 @@ _RAD_PER_REVOLUTION = 2.0 * math.pi
 
 
 def larger_root(square: float, linear: float, constant: float) -> float:
-    """Return the larger root of square x^2 + linear x + constant; a negative discriminant is replaced by 0."""
+    """Return the larger root of square x^2 + linear x + constant.
+
+    A negative discriminant is replaced by 0.
+    """
     return (math.sqrt(max(0.0, linear**2 - 4.0 * square * constant)) - linear) / (2.0 * square)
 
 
@@ -259,7 +262,7 @@ class FuelEngine:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorDisc:
-    """A propeller as a disc that accelerates the air, without a motor model (Beard and McLain, first edition, 4.3).
+    """Propeller as a disc that accelerates the air (Beard and McLain, first edition, 4.3).
 
     area: disc area, m^2.
     coefficient: C_prop.
@@ -268,7 +271,8 @@ class ActuatorDisc:
     efficiency: efficiency of motor and propeller beyond the disc's own loss, the power of the air over battery power.
     volts: V.
 
-    The thrust is 0.5 rho S C (v_e^2 - V^2), or 0.5 rho S C v_e (v_e - V) for a ducted disc; it is never negative.
+    The disc has no model of a motor. The thrust is 0.5 rho S C (v_e^2 - V^2), or 0.5 rho S C v_e (v_e - V) for a ducted
+    disc; it is never negative.
     """
 
     area: float
@@ -450,10 +454,12 @@ def _torque_xml(propeller: Propeller) -> str:
 
 
 def _root_xml(linear: str, constant: str) -> str:
-    """Return the XML of the larger root of ``motor/q2`` w^2 + linear w + constant; the discriminant is at least 0.
+    """Return the XML of the larger root of ``motor/q2`` w^2 + linear w + constant.
 
     linear: property of the linear coefficient.
     constant: element of the constant.
+
+    A negative discriminant is replaced by 0.
     """
     discriminant = f"""<difference>
               {multiply(f"<p> {linear} </p>", f"<p> {linear} </p>")}

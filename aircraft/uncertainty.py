@@ -134,7 +134,10 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
-    """Raise FlightError if a required key is missing (the model would then seem certain) or a key is unknown."""
+    """Raise FlightError if a required key is missing or a key is unknown.
+
+    Without a required key the model would seem certain.
+    """
     known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == UNCERTAINTY_FILES[0] else frozenset())
     missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
     suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
@@ -230,7 +233,9 @@ class Draws:
 
 
 def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW_COUNT, seed: int = 1) -> Draws:
-    """Draw each quantity independently: a factor log-normally with its estimate as the median, other values normally.
+    """Draw each quantity independently, `count` times.
+
+    A factor is drawn log-normally with its estimate as the median, another value normally.
 
     >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)
     >>> drawn = draw_quantities((one,)).values

@@ -186,10 +186,13 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
 
 
 def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
-    """Return the input of a first-order lag from its output: the output plus the lag times its rate of change.
+    """Return the input of a first-order lag from its output.
 
     values: output, (n,) or (n, k).
     lag: time constant, s.
+    hertz: samples per second.
+
+    The input is the output plus the lag times the output's rate of change.
 
     >>> invert_first_order_lag(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])

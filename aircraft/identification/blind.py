@@ -191,7 +191,10 @@ class BlindPrediction:
         return len(self._errors), len(self._starts)
 
     def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
-        """Return the band of each of `QUANTITIES` over the judged windows, predicted with draws of the aircraft."""
+        """Return the band of each of `QUANTITIES` over the judged windows.
+
+        draws: draws of the aircraft with which the windows are predicted.
+        """
         generator = np.random.default_rng(_SEED)
         blocks = generator.integers(len(self._errors), size=(len(draws), len(self._starts)))
         flights = np.stack(
@@ -243,7 +246,10 @@ def _scale_airspeed(signals: Signals, factor: float) -> Signals:
 
 
 def _kept_rows(count: int) -> Ints:
-    """Return the indices of the kept samples of a window with ``count`` samples; the measured start is not kept."""
+    """Return the indices of the kept samples of a window; the measured start is not kept.
+
+    count: number of samples in the window.
+    """
     return np.arange(_THINNING_FACTOR, count + 1, _THINNING_FACTOR)
 
 
@@ -263,7 +269,7 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
 
 
 def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
-    """Return the measured `QUANTITIES` over windows, (w, k, q); the power is NaN for a log without current."""
+    """Return the measured `QUANTITIES` over windows, (w, k, q); power is NaN for a log without current."""
     rows = starts[:, np.newaxis] + np.arange(count + 1)
     return _stack_quantities(
         signals.attitude[rows, :2],

@@ -39,7 +39,7 @@ class ElectricMotor:
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "ElectricMotor":
-        """Return a copy with scaled thrust, speed per volt, propeller torque, winding resistance and idle current."""
+        """Return a copy of the motor with scaled properties, as `Motor.with_factors` describes."""
         return replace(
             self,
             thrust=_scale_coefficients(thrust, self.thrust),
@@ -69,8 +69,8 @@ class ElectricMotor:
         q2, q1, q0 = self._torque_coefficients(airspeed, density)
         kv = self.back_voltage
         driving = kv * voltage * throttle / self.resistance
-        driven = _larger_root(q2, q1 + kv * kv / self.resistance, q0 - driving + kv * self.idle_current)
-        windmill = _larger_root(q2, q1, q0 + kv * self.idle_current)
+        driven = _larger_roots(q2, q1 + kv * kv / self.resistance, q0 - driving + kv * self.idle_current)
+        windmill = _larger_roots(q2, q1, q0 + kv * self.idle_current)
         return np.maximum(0.0, np.maximum(driven, windmill))
 
     def thrust_and_current(
@@ -109,6 +109,6 @@ def _scale_coefficients(factor: float, coefficients: tuple[float, float, float])
     return factor * coefficients[0], factor * coefficients[1], factor * coefficients[2]
 
 
-def _larger_root(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Return the larger root of a x^2 + b x + c, or the position of the minimum if there is no root, (n,)."""
+def _larger_roots(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Return the larger root of a x^2 + b x + c, or the position of the minimum without a root, (n,)."""
     return np.asarray((np.sqrt(np.maximum(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a))

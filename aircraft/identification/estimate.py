@@ -166,12 +166,13 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
 
 
 def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Combine the estimates of the moments with their priors by Bayes' rule; return values (n,) and covariance (n, n).
-
-    The refinement itself uses a prior that is wider by `PRIOR_SPREAD`, because its weights do not include the shifts.
+    """Combine the estimates of the moments with their priors by Bayes' rule.
 
     values: values of all parameters, (n,); the parameters of lift and drag are returned unchanged.
     covariance: covariance of the values, (n, n).
+
+    Returns values (n,) and covariance (n, n). The refinement itself uses a prior that is wider by `PRIOR_SPREAD`,
+    because its weights do not include the shifts.
     """
     prior = np.square(prior_sds())
     weight = np.where(IS_MOMENT, prior / (prior + np.diag(covariance)), 1.0)
@@ -260,7 +261,7 @@ def fit_parameters(
     dynamics: bool = True,
     nominal: Refinement | None = None,
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, without the shifts from quantities that are held fixed.
+    """Estimate all parameters from aligned signals, without the shifts from fixed quantities.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
     level: error of the autopilot's level, rad.

@@ -101,7 +101,7 @@ def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
 
 
 def apply_delay(values: Floats, delay: float) -> Floats:
-    """Return values delayed by ``delay`` seconds, with linear interpolation; a negative delay advances them.
+    """Return values delayed by ``delay`` (s), by linear interpolation; a negative delay advances them.
 
     values: (n,) or (n, k).
 

@@ -20,7 +20,10 @@ VANE_CUTOFF_HZ = 8.0
 
 
 class Flow(NamedTuple):
-    """Angle of attack and sideslip, rad, and lift coefficient due to the angle of attack alone, three arrays (n,)."""
+    """Flow angles, and the lift coefficient due to the angle of attack alone, three arrays (n,).
+
+    alpha, beta: angle of attack and sideslip, rad.
+    """
 
     alpha: Floats
     beta: Floats

@@ -76,10 +76,12 @@ class PredictedLog:
 
 @dataclass(frozen=True, slots=True)
 class GustFilter:
-    """Steady-state Kalman filter of the unmodelled moments about one axis: a first-order Gauss-Markov process.
+    """Steady-state Kalman filter of the unmodelled moments about one axis.
 
     decay: factor by which the process decays over a sample.
     gain: fraction of an innovation that is attributed to the process; the rest is white noise.
+
+    The moments are taken as a first-order Gauss-Markov process.
     """
 
     decay: float
@@ -317,8 +319,9 @@ def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
 
 
 def whiteness(innovations: Floats, lags: int) -> float:
-    """Return the fraction of the autocorrelations of a series (n,) within +-1.96 / sqrt(n), as for white noise.
+    """Return the fraction of a series' autocorrelations within +-1.96 / sqrt(n), as for white noise.
 
+    innovations: series, (n,).
     lags: the autocorrelations are those at lags of 1 to this number of samples.
 
     >>> whiteness(np.random.default_rng(1).normal(size=5000), 100) > 0.9

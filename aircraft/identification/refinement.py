@@ -143,7 +143,10 @@ def prediction_errors(
     filters: Sequence[GustFilter],
     horizons: Sequence[float] = HORIZONS_S,
 ) -> Floats:
-    """Return the measured minus the predicted angular rates, rad/s, by axis, start and time ahead, (3, n, h)."""
+    """Return the measured minus the predicted angular rates, rad/s, (3, n, h).
+
+    The axes of the result are roll, pitch and yaw; the n starts; the h times ahead.
+    """
     predicted = Predictor(signals, base, values, filters, with_flow=True).predict(starts, horizons)
     measured = [signals.rates[starts + round(horizon * signals.hertz)] for horizon in horizons]
     return np.stack(

@@ -6,7 +6,7 @@ actual calls.
 
 # Kernels of terrain and map projection.
 _FIELD = (
-    "world.least_squares._least_squares",
+    "world.least_squares._solve_gram_schmidt",
     "world.frames._evaluate_polymap",
     "world.terrain._ground_heights",
 )

@@ -189,7 +189,7 @@ class Multistart(BoxSearch):
         self._search: Gaussian | None = None
         if initial is None:
             self._search = self._start_search()
-            self._draw(self._search)
+            self._draw_generation(self._search)
 
     def tell(self, scores: Floats) -> None:
         """Process the scores (n, c) of the last samples of `ask`, and draw the next generation."""
@@ -208,7 +208,7 @@ class Multistart(BoxSearch):
                 or self._search.evaluations - self._slice_start >= SLICE_EVALUATIONS * self.lower.size
             ):
                 self._search = self._next_search(self._search)
-        self._draw(self._search)
+        self._draw_generation(self._search)
 
     def _store_generation(self, points: Floats, scores: Floats) -> None:
         """Store a generation, best first, after the best sample of all."""
@@ -220,7 +220,7 @@ class Multistart(BoxSearch):
         """Scale points (n, d) of the search box to the unit box."""
         return (points - self.lower) / (self.upper - self.lower)
 
-    def _draw(self, search: Gaussian) -> None:
+    def _draw_generation(self, search: Gaussian) -> None:
         """Draw the next generation of a search; store it scaled to the unit box and to the search box."""
         self._pending_unit_samples = search.draw(self._rng)
         self._pending_samples = np.clip(

@@ -70,7 +70,7 @@ class NicheSampling:
                 np.minimum(lower[groups, 0] + fractions * (upper - lower)[groups, 0], self._upper[groups])
             )
 
-        return self._draw(size, draw, MAX_FIRST_REDRAWS)
+        return self._draw_feasible(size, draw, MAX_FIRST_REDRAWS)
 
     def next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
@@ -96,12 +96,12 @@ class NicheSampling:
             )
             return np.clip(samples, self._lower[group_numbers], self._upper[group_numbers])
 
-        out = self._draw((groups, count, rows.shape[2]), draw, MAX_REDRAWS)
+        out = self._draw_feasible((groups, count, rows.shape[2]), draw, MAX_REDRAWS)
         is_selected = np.arange(parents) < counts[:, None]
         out[:, :parents][is_selected] = selected[is_selected]
         return out
 
-    def _draw(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
+    def _draw_feasible(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
         """Draw samples of a shape, and redraw infeasible samples.
 
         draw: function that returns samples (n, d) for group numbers (n,).

@@ -629,7 +629,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
 
 
 def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
-    """Return the corners (n, 3) of the shortest path from the plan's end to a line-up, or None and why not."""
+    """Return corners (n, 3) of the shortest path from the plan's end to a line-up, or None and why not."""
     waypoints, final_altitude = site.plan.waypoints, float(final.final_waypoints[0, 2])
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
     destination_course = site.scenario.destination_course

@@ -107,7 +107,7 @@ def begin_shortening(
     return Shortening(path.copy(), active, np.zeros(constraint_count(active)), 0, 0, corners_too)
 
 
-class _Descent(NamedTuple):
+class _DescentScratch(NamedTuple):
     """Scratch of a round's steps: corners (3,) of the box, model, matrix factor, step and trial path."""
 
     min_corner: Floats
@@ -125,7 +125,7 @@ def continue_shortening(
     """Continue a shortening by up to `max_rounds` rounds, and return it."""
     path, active, multipliers, round_number, models, corners_too = shortening
     limits, size = precompute_limits(data), 3 * (path.shape[0] - 2)
-    descent = _Descent(
+    descent = _DescentScratch(
         np.array([data.west, data.south, data.floor]),
         np.array([data.east, data.north, data.ceiling]),
         LagrangianModel(np.zeros(size), np.zeros((size, HESSIAN_HALF_BANDWIDTH)), np.zeros((4, 3))),
@@ -157,7 +157,7 @@ def _descend(
     multipliers: Floats,
     values: Floats,
     penalty: float,
-    descent: _Descent,
+    descent: _DescentScratch,
 ) -> int:
     """Minimise the merit of a path (w, 3) in place; return the number of models evaluated.
 
