@@ -185,16 +185,16 @@ def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Flo
     folded = own_count + np.flatnonzero(_IS_OF_AIRCRAFT)
     scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
-    def stack_both(force: Floats, current: Floats) -> Floats:
+    def stack_force_and_current(force: Floats, current: Floats) -> Floats:
         """Return forces and weighted currents in one array."""
         return np.concatenate([force, scale * current])
 
-    target = stack_both(*forces.predict(unknown))
+    target = stack_force_and_current(*forces.predict(unknown))
     folded_unknown = unknown.copy()
     folded_unknown[folded] = 0.0
     for _ in range(_MAX_FOLDING_STEPS):
-        columns = stack_both(*forces.slopes(folded_unknown))
-        residual = target - stack_both(*forces.predict(folded_unknown))
+        columns = stack_force_and_current(*forces.slopes(folded_unknown))
+        residual = target - stack_force_and_current(*forces.predict(folded_unknown))
         folded_unknown[:own_count] += np.linalg.lstsq(columns[:, :own_count], residual, rcond=None)[0]
     jacobian = np.zeros((own_count, len(unknown)))
     jacobian[:, :own_count] = np.eye(own_count)

@@ -117,7 +117,7 @@ def _is_stagnant(best_scores: list[Floats]) -> bool:
 
 # Maximum number of generations; the last ones move waypoints by decimetres.
 MAX_GENERATIONS = 10
-# Maximum number of generations with seeds, whose best path is tightened anyway.
+# Maximum number of generations with seeds, whose best path is finally shortened anyway.
 SEEDED_GENERATIONS = 6
 # Population with seeds, as a fraction of the usual population.
 SEEDED_POPULATION_FRACTION = 0.4

@@ -54,7 +54,7 @@ ATTEMPTS = (
 MAX_ATTEMPTS_AMONG_ZONES = 2
 # Maximum evaluations of the final pattern search.
 FINAL_SEARCH_EVALUATIONS = 200
-# Scales of the moves that finally tighten the best path, relative to the moves that fit a seed.
+# Scales of the final moves of the waypoints of the best path, relative to the moves that fit a seed.
 FINAL_MOVE_SCALES = (1.0, 0.5, 0.25, 0.12)
 # Rounds of each of these moves.
 FINAL_MOVE_ROUNDS = 4
@@ -281,12 +281,12 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
             waypoint_generations(search, population, settings.generations)
     else:
         last_vector = path_generations(search, population, settings.generations, starts)
-    if algorithm.tightened and search.end_reason == "completed":
+    if algorithm.final_shortening and search.end_reason == "completed":
         _finish_search(search, last_vector)
 
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten or tighten the best path, and the path of the last generation, if any.
+    """Shorten the best path and the path of the last generation, if any; otherwise move their waypoints.
 
     last_vector: vector (d,) of that path.
     """
@@ -297,10 +297,10 @@ def _finish_search(search: Search, last_vector: Floats | None) -> None:
     if search.shortest is None:
         # The result of the generations may take another route than the improved seed.
         if last_vector is not None:
-            search.tighten(last_vector, FINAL_MOVE_ROUNDS, 0.5, FINAL_SEARCH_EVALUATIONS)
+            search.move_and_improve(last_vector, FINAL_MOVE_ROUNDS, 0.5, FINAL_SEARCH_EVALUATIONS)
         for scale in FINAL_MOVE_SCALES:
             if search.must_end():
                 break
-            search.tighten(search.archive.vectors[0], FINAL_MOVE_ROUNDS, scale, FINAL_SEARCH_EVALUATIONS)
+            search.move_and_improve(search.archive.vectors[0], FINAL_MOVE_ROUNDS, scale, FINAL_SEARCH_EVALUATIONS)
     search.record_history()
     search.report_progress(0)

@@ -23,7 +23,7 @@ from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.shortening import MAX_MODELS, shorten_path
-from planner.seeding.waypoint_fitting import tighten
+from planner.seeding.waypoint_fitting import move_all_waypoints
 from world.arrays import Flags, Floats, Ints
 from world.errors import ScenarioError
 from world.geometry import path_length
@@ -84,8 +84,8 @@ SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
 MAX_SHORTENING_DEPTH_M = 15.0
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
-# Evaluations that `tighten` may take: with less budget left it is skipped.
-TIGHTENING_EVALUATIONS = 600
+# Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
+MIN_MOVE_BUDGET = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
 WAYPOINTS_PER_PAUSE = 4000
 # Number of pauses that a stopped search without a result may still take to find its first route: some 100 ms.
@@ -268,11 +268,11 @@ class Search:
         self.evaluations += evaluations - len(vectors)
         return np.asarray(scores[0])
 
-    def tighten(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
+    def move_and_improve(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it; return the best scores (8,)."""
-        if self._evaluation_budget() - self.evaluations < TIGHTENING_EVALUATIONS:
+        if self._evaluation_budget() - self.evaluations < MIN_MOVE_BUDGET:
             return self.improve(vector, max_evaluations)
-        moved_vector, evaluations = tighten(self.problem.search, self.encoding, vector, rounds, scale)
+        moved_vector, evaluations = move_all_waypoints(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += evaluations
         return self.improve(moved_vector, max_evaluations)
 
@@ -282,7 +282,7 @@ class Search:
 
         Shortening ignores zones.
         """
-        return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
+        return self.algorithm.final_shortening and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""

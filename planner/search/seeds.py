@@ -382,7 +382,7 @@ def _improve_and_shorten(search: Search, vector: Floats, routes: tuple[Floats, .
     for scale in MOVE_SCALES:
         if search.must_end() or search.first_safe_found():
             return
-        search.tighten(search.archive.vectors[0], MOVE_ROUNDS, scale, LATER_SEARCH_EVALUATIONS)
+        search.move_and_improve(search.archive.vectors[0], MOVE_ROUNDS, scale, LATER_SEARCH_EVALUATIONS)
     if search.can_shorten:
         for route in routes:
             search.shorten(resample(route, search.encoding.waypoints))

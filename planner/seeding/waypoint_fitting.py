@@ -1,8 +1,8 @@
 """Fit waypoints to a route by dynamic programming over candidate points, with evaluation of whole legs.
 
 `fit_points` chooses one candidate per interval so that the sum of leg costs is smallest, then repeats this with
-candidates around each chosen waypoint and shrinking moves. `tighten` applies the same moves to a path of the rotated
-encoding. Turns are not part of the cost.
+candidates around each chosen waypoint and shrinking moves. `move_all_waypoints` applies the same moves to a path of the
+rotated encoding. Turns are not part of the cost.
 """
 
 import math
@@ -209,7 +209,9 @@ def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit:
     return _candidates_to_world(frames, moved[:, None])[:, 0]
 
 
-def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
+def move_all_waypoints(
+    data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float
+) -> tuple[Floats, int]:
     """Shorten a path of the rotated encoding by moves of all its waypoints at once.
 
     vector: (d,).
