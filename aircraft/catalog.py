@@ -1,8 +1,8 @@
 """Read the metadata of aircraft in SI units, and make folders for a user's own aircraft.
 
 An aircraft is a folder with ``<name>.xml`` (JSBSim) and ``<name>.toml`` (metadata: masses, speeds, limits, energy).
-`find_aircraft` reads an embedded aircraft or a folder, `model_hash` identifies a model's files, and `make_own_folder`
-copies an aircraft under a new name.
+`find_aircraft` reads an embedded aircraft or a folder, `model_hash` identifies a model's files, and
+`copy_aircraft_folder` copies an aircraft under a new name.
 """
 
 import hashlib
@@ -117,7 +117,10 @@ class Aircraft:
 
 
 def jsbsim_folder() -> Path:
-    """Return JSBSim's package folder, with its own models; JSBSim is not imported."""
+    """Return the folder of the installed JSBSim package, without importing it.
+
+    The folder also has JSBSim's own models.
+    """
     spec = find_spec("jsbsim")
     return Path(spec.origin if spec and spec.origin else "jsbsim").parent
 
@@ -186,7 +189,7 @@ def read_aircraft(folder: Path) -> Aircraft:
     try:
         table = read_toml(file, "aircraft")
     except OSError as error:
-        advice = _toml_advice(folder) if isinstance(error, FileNotFoundError) else ""
+        advice = _missing_metadata_advice(folder) if isinstance(error, FileNotFoundError) else ""
         raise FlightError(f"{file}: {error.strerror}{advice}", file=file) from None
     except ValueError as error:  # a TOML or a UTF-8 error
         raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
@@ -209,8 +212,8 @@ def read_aircraft(folder: Path) -> Aircraft:
     return Aircraft(name=folder.name, title=title, folder=folder, model=model, **values)
 
 
-def _toml_advice(folder: Path) -> str:
-    """Return advice for a folder with a JSBSim model but without metadata; return "" for a folder without a model."""
+def _missing_metadata_advice(folder: Path) -> str:
+    """Return advice on the missing metadata file if a folder has a JSBSim model, otherwise ""."""
     models = sorted(file.stem for file in folder.glob("*.xml"))
     if not models:
         return ""
@@ -221,7 +224,10 @@ def _toml_advice(folder: Path) -> str:
 
 
 def _numeric_fields(table: dict[str, Any]) -> dict[str, float]:
-    """Return the numeric fields of `Aircraft` in SI units. Raises FlightError, whose message does not name the file."""
+    """Return the numeric fields of `Aircraft` in SI units, from the table of a metadata file.
+
+    Raises FlightError, whose message does not name the file, for a missing, unknown or invalid entry.
+    """
     energy_keys = _FUEL_KEYS if set(_FUEL_KEYS) & table.keys() else _BATTERY_KEYS
     allowed = {*_FIELD_BY_KEY, *energy_keys}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
@@ -266,7 +272,10 @@ def model_hash(aircraft: Aircraft) -> str:
 
 @cache
 def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> str:
-    """Return the hash of `model_hash`.  stamps: times and sizes of the files, which only belong to the cache key."""
+    """Return the SHA-256, in hexadecimal, of the names, sizes and contents of files.
+
+    stamps: modification times and sizes of the files, used only as part of the cache key.
+    """
     digest = hashlib.sha256()
     for file in files:
         data = read_at_most(file, MAX_MODEL_BYTES, "model")
@@ -275,7 +284,7 @@ def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) ->
     return digest.hexdigest()
 
 
-# --- Folders for a user's own aircraft ---
+# --- Copies of aircraft, for a user's own aircraft ---
 
 # Valid name of a folder.
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]*")
@@ -287,33 +296,33 @@ _SUFFIXES = frozenset({".xml", ".toml", ".parm", ".md", ".csv"})
 _SHIPPED_ENTRY = re.compile(r"^([ \t]*shipped_by_jsbsim\s*=\s*)\S.*\n", re.MULTILINE)
 
 
-def make_own_folder(
+def copy_aircraft_folder(
     folder: Path, source: Aircraft, model: Mapping[str, bytes] | None = None, *, overwrite: bool = False
 ) -> tuple[str, ...]:
-    """Create a folder with a copy of an aircraft under the folder's name; create it completely or not at all.
+    """Copy an aircraft into a new folder, under the folder's name; create all its files or none.
 
     model: contents of the files of a model that JSBSim ships, by name, to copy them; None to only refer to the model.
     overwrite: True to replace the folder of an aircraft.
 
-    Returns the sorted names of the created files.  Raises FlightError as `check_new_folder` does, and OSError if the
+    Returns the sorted names of the created files. Raises FlightError as `check_new_folder` does, and OSError if the
     folder cannot be written.
 
     >>> from tempfile import TemporaryDirectory
     >>> from aircraft.catalog import load_aircraft, read_aircraft
     >>> with TemporaryDirectory() as home:
-    ...     print(make_own_folder(Path(home) / "mine", load_aircraft("c172x")))
+    ...     print(copy_aircraft_folder(Path(home) / "mine", load_aircraft("c172x")))
     ...     read_aircraft(Path(home) / "mine").mass
     ('README.md', 'ardupilot.parm', 'ardupilot.toml', 'gains.toml', 'mine.toml')
     1124.9
     """
     target = check_new_folder(folder, overwrite=overwrite)
-    files = _files_under_new_name(source, target.name, model or {})
-    write_own_folder(target, files)
+    files = _copied_files(source, target.name, model or {})
+    write_aircraft_folder(target, files)
     return tuple(sorted(files))
 
 
-def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
-    """Write the files of an aircraft into a folder, completely or not at all.
+def write_aircraft_folder(target: Path, files: Mapping[str, bytes]) -> None:
+    """Write the files of an aircraft into a folder, all of them or none.
 
     In an existing folder the aircraft's files are replaced; files of other kinds are kept.
     """
@@ -323,7 +332,7 @@ def write_own_folder(target: Path, files: Mapping[str, bytes]) -> None:
 
 
 def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
-    """Return the absolute path of the folder of a new aircraft.
+    """Check that a folder can become the folder of an aircraft, and return its absolute path.
 
     overwrite: True to accept an existing folder of an aircraft.
 
@@ -346,10 +355,11 @@ def check_new_folder(folder: Path, *, overwrite: bool = False) -> Path:
     return target
 
 
-def _files_under_new_name(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the contents of the files of an aircraft and its model, by their paths in a folder with a new name.
+def _copied_files(source: Aircraft, name: str, model: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the contents of the files for a copy of an aircraft, by their paths in the new folder.
 
-    model: contents of the flight model's files by path; empty if the new aircraft refers to a model that JSBSim ships.
+    name: name of the copy; the files that are named after the aircraft, and its metadata, change accordingly.
+    model: contents of the JSBSim model's files by path; empty if the copy refers to a model that JSBSim ships.
     """
     folders = [source.folder, *(folder for folder in source.model_folders if source.folder in folder.parents)]
     source_files = [file for folder in folders if folder.is_dir() for file in folder.iterdir()]

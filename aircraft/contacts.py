@@ -64,7 +64,7 @@ class Contact:
 
 
 def default_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
-    """Return default contacts for a model without contacts, scaled by the span of the aircraft.
+    """Return default ground contacts for an aircraft whose model has none, scaled by the wing span.
 
     >>> from aircraft.catalog import load_aircraft
     >>> made = default_contacts(load_aircraft("aerosonde"), "belly")
@@ -98,7 +98,7 @@ def find_contacts(aircraft: Aircraft, gear: Gear) -> tuple[Contact, ...]:
 
 
 def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
-    """Return a model's XML with default contacts added; a model that has contacts is returned unchanged."""
+    """Return a model's XML with default contacts added; return a model that has contacts unchanged."""
     if _model_contacts(model):
         return model
     contacts = default_contacts(aircraft, gear)
@@ -111,10 +111,12 @@ def with_contacts(model: bytes, aircraft: Aircraft, gear: Gear) -> bytes:
 
 
 def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, ...], centre: Floats) -> str:
-    """Return the XML of one contact, with its position in meters aft, right and up from the model's reference point.
+    """Return the XML of one contact.
 
     contacts: all contacts; those on which the aircraft stands share its weight.
-    centre: centre of gravity in the same coordinates, m, (3,).
+    centre: centre of gravity, m, (3,).
+
+    Positions in the XML, and the centre, are in meters aft, right and up from the model's reference point.
     """
     standing_count = sum(other.is_support for other in contacts)
     stiffness = aircraft.mass * GRAVITY / (_SAG_SPANS * aircraft.wing_span) / standing_count
@@ -136,7 +138,7 @@ def _contact_xml(contact: Contact, aircraft: Aircraft, contacts: tuple[Contact, 
 
 
 def _model_contacts(model: bytes) -> tuple[Contact, ...]:
-    """Return the contacts in a model's XML, with contacts on which the aircraft stands first.
+    """Return the contacts in a model's XML, with the contacts on which the aircraft stands first.
 
     The aircraft stands on its wheels, or without wheels on its lowest points.
     """
@@ -150,7 +152,7 @@ def _model_contacts(model: bytes) -> tuple[Contact, ...]:
 
 
 def _read_contacts(model: bytes) -> list[Contact]:
-    """Return the contacts of a model, with `is_support` set for wheels only."""
+    """Return the contacts in a model's XML; only wheels have `is_support` set."""
     section = ElementTree.fromstring(model).find("ground_reactions")
     contacts, centre = [], _center_of_gravity(model)
     for element in [] if section is None else section.findall("contact"):
@@ -164,9 +166,10 @@ def _read_contacts(model: bytes) -> list[Contact]:
 
 
 def _center_of_gravity(model: bytes) -> Floats:
-    """Return the centre of gravity of the loaded aircraft: m aft, right and up of the reference point, (3,).
+    """Return the centre of gravity of the loaded aircraft, m aft, right and up of the reference point.
 
-    As in JSBSim, the load consists of the empty aircraft, its point masses and the initial contents of its tanks.
+    As in JSBSim, the load consists of the empty aircraft, its point masses and the initial contents of its tanks. The
+    result is (3,).
     """
     root = ElementTree.fromstring(model)
     cg_elements = [element for element in root.findall("mass_balance/location") if element.get("name") == "CG"]
@@ -194,7 +197,7 @@ def _read_mass(weight: ElementTree.Element | None) -> float:
 
 
 def _read_location(location: ElementTree.Element | None) -> Floats | None:
-    """Return the position in a location element of a model, m, (3,), or None if the element is missing."""
+    """Return the position in a location element of a model, m, (3,); None if the element is missing."""
     if location is None:
         return None
     unit = _METRES_PER_UNIT.get(location.get("unit", "IN"), 1.0)

@@ -266,9 +266,9 @@ def _is_within(value: float, min_value: float, max_value: float) -> bool:
 
 
 def check_sheet(sheet: DataSheet) -> DataSheet:
-    """Check that a sheet describes a small aircraft, and return it.
+    """Return a sheet if it describes a small aircraft.
 
-    Raises FlightError for a value out of range, in one line with the allowed range.
+    Raises FlightError, with the allowed range, for a value out of range.
 
     >>> check_sheet(DataSheet(2.1, 1.6, 15.0, 10.0)).mass
     2.1
@@ -281,13 +281,13 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
         if field not in ("mass", "span", "cruise", "stall") and value == 0.0:
             continue
         if not _is_within(value, min_value, max_value):
-            raise _out_of_range(option_name, value, f"allowed {min_value:g}..{max_value:g} {unit}", unit)
+            raise _range_error(option_name, value, f"allowed {min_value:g}..{max_value:g} {unit}", unit)
     min_value, max_value = (ratio * sheet.cruise for ratio in STALL_RATIO_RANGE)
     if not _is_within(sheet.stall, min_value, max_value):
-        raise _out_of_range("stall", sheet.stall, f"allowed {_speed_range_text(min_value, max_value, sheet)}", "m/s")
+        raise _range_error("stall", sheet.stall, f"allowed {_speed_range_text(min_value, max_value, sheet)}", "m/s")
     min_value, max_value = (ratio * sheet.cruise for ratio in TOP_RATIO_RANGE)
     if sheet.top and not _is_within(sheet.top, min_value, max_value):
-        raise _out_of_range("top", sheet.top, f"allowed {_speed_range_text(min_value, max_value, sheet)}", "m/s")
+        raise _range_error("top", sheet.top, f"allowed {_speed_range_text(min_value, max_value, sheet)}", "m/s")
     area = _wing_area(sheet)
     lift = _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * area)
     if not _is_within(lift, *LIFT_RANGE):
@@ -297,48 +297,54 @@ def check_sheet(sheet: DataSheet) -> DataSheet:
             f"allowed {min_stall:.3g}..{max_stall:.3g}"
             f" m/s without flaps for {sheet.mass:g} kg on {area:g} m2, or {areas}"
         )
-        raise _out_of_range("stall", sheet.stall, allowed, "m/s")
+        raise _range_error("stall", sheet.stall, allowed, "m/s")
     aspect = sheet.span**2 / area
     if not _is_within(aspect, *ASPECT_RANGE):
         min_span, max_span = (math.sqrt(aspect_limit * area) for aspect_limit in ASPECT_RANGE)
         allowed = f"allowed {min_span:.2f}..{max_span:.2f} m with a wing of {area:.3g} m2 ({_area_source(sheet)})"
-        raise _out_of_range("span", sheet.span, allowed, "m")
+        raise _range_error("span", sheet.span, allowed, "m")
     electric_options = [name for name, is_given in (("--battery", sheet.volts), ("--motor", sheet.motor)) if is_given]
     if sheet.burns_fuel and electric_options:
-        raise _out_of_range("fuel", sheet.fuel, f"cannot be combined with {' and '.join(electric_options)}", "kg")
+        raise _range_error("fuel", sheet.fuel, f"cannot be combined with {' and '.join(electric_options)}", "kg")
     if not _is_within(sheet.fuel, 0.0, 0.6 * sheet.mass):
-        raise _out_of_range("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
+        raise _range_error("fuel", sheet.fuel, f"allowed up to 60 % of the mass, {0.6 * sheet.mass:g} kg", "kg")
     if not sheet.burns_fuel and not _is_within(sheet.energy, 0.0, MAX_BATTERY * sheet.mass):
         max_energy = MAX_BATTERY / 3600.0
         allowed = f"allowed up to {max_energy * sheet.mass:g} Wh with a mass of {sheet.mass:g} kg, {max_energy:g} Wh/kg"
-        raise _out_of_range("battery", sheet.energy / 3600.0, allowed, "Wh")
+        raise _range_error("battery", sheet.energy / 3600.0, allowed, "Wh")
     return sheet
 
 
-def _out_of_range(option: str, value: float, allowed: str, unit: str) -> FlightError:
-    """Return the error for a value out of range; `allowed` is the text on the allowed range."""
+def _range_error(option: str, value: float, allowed: str, unit: str) -> FlightError:
+    """Return the FlightError for a value out of range.
+
+    allowed: text on the allowed range.
+    """
     return FlightError.of_argument(option, value, allowed, shown=f"{value:g} {unit}")
 
 
 def _speed_range_text(min_speed: float, max_speed: float, sheet: DataSheet) -> str:
-    """Describe a speed range (m/s) that depends on the cruise speed."""
+    """Return the text of a speed range (m/s) that depends on the sheet's cruise speed."""
     return f"{min_speed:.4g}..{max_speed:.4g} m/s at a cruise speed of {sheet.cruise:g} m/s"
 
 
 def _weight(sheet: DataSheet) -> float:
-    """Return the weight, N."""
+    """Return the weight of the aircraft, N."""
     return sheet.mass * GRAVITY
 
 
 def _wing_area(sheet: DataSheet) -> float:
-    """Return the wing area, m^2: the stated area, or the area for the stall speed at the class's maximum lift."""
+    """Return the wing area, m^2.
+
+    It is the stated area, or else the area for the stall speed at the class's maximum lift.
+    """
     if sheet.area:
         return sheet.area
     return _weight(sheet) / (0.5 * SEA_LEVEL * sheet.stall**2 * CLASSES[sheet.layout].lift_max)
 
 
 def _area_source(sheet: DataSheet) -> str:
-    """Describe where the wing area comes from."""
+    """Return a phrase on the source of the wing area, for a message."""
     return "as stated" if sheet.area else "that carries this mass at this stall speed; state the area if you know it"
 
 
@@ -380,7 +386,7 @@ def size_aircraft(
         aero, drag = _match_sink(full_sheet, aero, sheet.sink)
     propulsion, full_sheet = _size_propulsion(sheet, full_sheet, drag)
     if isinstance(propulsion, ElectricMotor):
-        propulsion = _with_battery_power(propulsion, full_sheet, drag, prior)
+        propulsion = _with_calibrated_power(propulsion, full_sheet, drag, prior)
     chord = full_sheet.area / full_sheet.span
     jx, jy, jz = (full_sheet.mass * (ratio * full_sheet.span) ** 2 for ratio in aircraft_class.gyration)
     numbers = ModelNumbers(
@@ -436,7 +442,9 @@ def elliptic_slope(aspect: float) -> float:
 
 
 def _estimate_coefficients(sheet: DataSheet, aircraft_class: AircraftClass, prior: PowerPrior) -> AeroCoefficients:
-    """Estimate the aerodynamic coefficients of an aircraft from its data sheet, its class and the prior of its drag.
+    """Estimate the aerodynamic coefficients of an aircraft from its data sheet and its class.
+
+    prior: gives the minimum drag.
 
     Raises FlightError if the stall speed is too low for the wing.
     """
@@ -459,7 +467,7 @@ def _estimate_coefficients(sheet: DataSheet, aircraft_class: AircraftClass, prio
             f"allowed {min_stall:.3g}..{STALL_RATIO_RANGE[1] * sheet.cruise:.4g}"
             f" m/s for a wing of aspect ratio {aspect:.1f}"
         )
-        raise _out_of_range("stall", sheet.stall, allowed, "m/s")
+        raise _range_error("stall", sheet.stall, allowed, "m/s")
     # An elevator just strong enough to reach the stall may be too weak for the fastest level flight.
     max_elevator_travel = MAX_ZERO_LIFT_ELEVATOR * aircraft_class.throw[0] - CRUISE_ELEVATOR
     elevator_moment = pitch_stiffness * max(alpha_range / -elevator_travel, cruise_lift / slope / max_elevator_travel)
@@ -505,6 +513,7 @@ def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
     """Return a function that computes the drag (N) in level flight at an airspeed (m/s)."""
 
     def drag(airspeed: float) -> float:
+        """Return the drag in level flight at an airspeed (m/s), N."""
         area_times_pressure = 0.5 * SHEET_DENSITY * airspeed**2 * sheet.area
         # The drag depends only on the angle of attack, as in the model; the elevator's lift is neglected.
         lift_coefficient = _weight(sheet) / area_times_pressure
@@ -514,7 +523,7 @@ def _drag_function(sheet: DataSheet, aero: AeroCoefficients) -> Drag:
 
 
 def _match_sink(sheet: DataSheet, aero: AeroCoefficients, sink: float) -> tuple[AeroCoefficients, Drag]:
-    """Return the coefficients with the minimum drag coefficient that gives a sink rate, and the new drag function.
+    """Match the minimum drag coefficient to a sink rate; return the coefficients and their drag function.
 
     sink: sink rate at cruise with the power off and the propeller folded, m/s.
 
@@ -545,9 +554,14 @@ class _NoPropellerError(Exception):
 
 
 def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
-    """Size motor or engine, and propeller; return them with the sheet's resulting climb and top speed.
+    """Size the motor or engine with its propeller; return it and the sheet with its performance.
 
-    Raises FlightError, with the allowed range of a stated value, if none fit the sheet.
+    stated_sheet: sheet with only the stated values.
+    sheet: the sheet with missing values filled in.
+    drag: function that returns the drag in level flight (N) at an airspeed (m/s).
+
+    The performance is the climb and the top speed in the returned sheet. Raises FlightError, with the feasible range of
+    a stated value, if no propeller meets the sheet.
     """
     try:
         return _size_any_motor(stated_sheet, sheet, drag)
@@ -556,16 +570,16 @@ def _size_propulsion(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> t
 
 
 def _size_any_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[Motor, DataSheet]:
-    """Size the engine of an aircraft that burns fuel, or the motor of an electric aircraft, with its propeller.
+    """Size the engine or the electric motor of an aircraft, with its propeller.
 
-    Raises _NoPropellerError if none fits.
+    Arguments and result are those of `_size_propulsion`. Raises _NoPropellerError if no propeller meets the sheet.
     """
     size_function = _size_engine if sheet.burns_fuel else _size_motor
     return size_function(stated_sheet, sheet, drag)
 
 
 def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[ElectricMotor, DataSheet]:
-    """Size motor and propeller for a sheet, and return them with the sheet's resulting climb and top speed.
+    """Size an electric motor and its propeller; return the motor and the sheet with its performance.
 
     A stated propeller fixes diameter and pitch, a stated motor its speed per volt; free values are chosen to meet the
     climb, and the throttle of level flight or the top speed. If motor and propeller are both stated, climb and top
@@ -584,11 +598,13 @@ def _size_motor(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[
             return _solve_motor(stated_sheet, sheet, drag, ["climb", "trim_throttle"])
     if stated_sheet.climb or not (stated_sheet.top or stated_sheet.trim_throttle):
         tops = [sheet.top] if stated_sheet.top else [ratio * sheet.cruise for ratio in _TOP_GUESSES]
-        return _solve_first(stated_sheet, [replace(sheet, top=top) for top in tops], drag)
+        return _solve_first_feasible(stated_sheet, [replace(sheet, top=top) for top in tops], drag)
     # Use a propeller of the usual size, and derive the speed per volt from the top speed or the throttle: both
     # determine the climb better than a guess.
     unstated = replace(stated_sheet, top=0.0, trim_throttle=0.0)
-    usual_motor, _ = _solve_first(unstated, [replace(sheet, top=ratio * sheet.cruise) for ratio in _TOP_GUESSES], drag)
+    usual_motor, _ = _solve_first_feasible(
+        unstated, [replace(sheet, top=ratio * sheet.cruise) for ratio in _TOP_GUESSES], drag
+    )
     propeller = stated_sheet.propeller if stated_sheet.propeller[0] else (usual_motor.propeller.diameter, 0.0)
     target_fields = ["top"] if stated_sheet.top else ["trim_throttle"]
     sized_sheet = replace(stated_sheet, propeller=propeller)
@@ -605,12 +621,13 @@ _D = TypeVar("_D", ElectricMotor, FuelEngine)
 def _solve_with_climb_limit(
     solve: Callable[[], tuple[_D, DataSheet]], solve_for_climb: Callable[[float], tuple[_D, DataSheet]]
 ) -> tuple[_D, DataSheet]:
-    """Return a motor and the sheet it gives; if none fits, or its climb is too steep, solve again for guessed climbs.
+    """Solve for a motor, and for guessed climbs if the solution climbs too steeply or does not exist.
 
     solve: function that solves without a climb.
     solve_for_climb: function that solves for a climb, rad.
 
-    Raises _NoPropellerError if no guessed climb has a solution.
+    The limit is `MAX_CLIMB`. Returns the motor and the sheet with its performance. Raises _NoPropellerError if no
+    guessed climb has a solution.
     """
     climbs = _CLIMB_GUESSES_DEG
     with contextlib.suppress(_NoPropellerError):
@@ -624,10 +641,12 @@ def _solve_with_climb_limit(
     raise _NoPropellerError
 
 
-def _solve_first(stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Drag) -> tuple[ElectricMotor, DataSheet]:
-    """Solve for a motor with the climb and top speed of a sheet; take the first sheet that has a solution.
+def _solve_first_feasible(
+    stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Drag
+) -> tuple[ElectricMotor, DataSheet]:
+    """Solve for a motor with the climb and top speed of the first sheet that has a solution.
 
-    Raises _NoPropellerError if no sheet has a solution.
+    Returns the motor and the sheet with its performance. Raises _NoPropellerError if no sheet has a solution.
     """
     for sheet in sheets:
         with contextlib.suppress(_NoPropellerError):
@@ -638,15 +657,15 @@ def _solve_first(stated_sheet: DataSheet, sheets: Sequence[DataSheet], drag: Dra
 def _solve_motor(
     stated_sheet: DataSheet, sheet: DataSheet, drag: Drag, target_fields: list[str]
 ) -> tuple[ElectricMotor, DataSheet]:
-    """Solve for the motor and propeller that give the sheet's values of some fields.
-
-    One number is free for each field: the size of the propeller, and the motor's speed per volt or the propeller's
-    pitch.
+    """Solve for the motor and propeller that meet some fields of a sheet; return motor and performance.
 
     stated_sheet: sheet with the stated motor and propeller only; these stay unchanged.
-    target_fields: fields of `DataSheet` whose values are met.
+    sheet: sheet with the values to meet.
+    target_fields: fields of `DataSheet` whose values are met. One number is free for each field: the size of the
+        propeller, and the motor's speed per volt or the propeller's pitch.
 
-    Raises _NoPropellerError if there is no solution, or only one with a propeller of unusual size.
+    The performance is the sheet with the resulting climb and top speed. Raises _NoPropellerError if there is no
+    solution, or only one with a propeller of unusual size.
     """
     volts, (diameter, pitch) = sheet.volts, stated_sheet.propeller
     # With the Aerosonde's blade shape the ratio of pitch to diameter is the zero-thrust ratio.
@@ -659,6 +678,7 @@ def _solve_motor(
     has_one_unknown = len(target_fields) == 1 and target_fields != ["climb"]
 
     def make_motor(free_factors: Sequence[float]) -> ElectricMotor:
+        """Return the motor for factors on the initial values of the free numbers."""
         size_factor, speed_factor = (1.0, free_factors[0]) if has_one_unknown else (*free_factors, 1.0, 1.0)[:2]
         propeller = (
             base.scale(blades=size_factor * initial_size)
@@ -666,20 +686,21 @@ def _solve_motor(
             else base.scale(diameter=size_factor * initial_size)
         )
         if emf:
-            return _motor_on_battery(propeller.scale(pitch=speed_factor), volts, emf, sheet.cruise)
-        return _motor_on_battery(propeller, volts, volts / (speed_factor * initial_speed), sheet.cruise)
+            return _motor_with_typical_losses(propeller.scale(pitch=speed_factor), volts, emf, sheet.cruise)
+        return _motor_with_typical_losses(propeller, volts, volts / (speed_factor * initial_speed), sheet.cruise)
 
     def errors(free_factors: Sequence[float]) -> list[float]:
+        """Return the relative thrust error of each target field."""
         motor = make_motor(free_factors)
         return [_thrust_error(motor, sheet, drag, name) for name in target_fields]
 
-    motor = make_motor(_solve_errors(errors, len(target_fields)))
+    motor = make_motor(_solve_for_factors(errors, len(target_fields)))
     if not _MIN_DIAMETER_M <= motor.propeller.diameter <= _MAX_DIAMETER_RATIO * sheet.span:
         raise _NoPropellerError
     return motor, _with_performance(sheet, motor, drag)
 
 
-def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
+def _motor_with_typical_losses(propeller: Propeller, volts: float, emf: float, cruise: float) -> ElectricMotor:
     """Return a motor whose losses, relative to its power in cruise, are those of the Aerosonde's motor.
 
     volts: battery voltage, V.
@@ -696,8 +717,12 @@ def _motor_on_battery(propeller: Propeller, volts: float, emf: float, cruise: fl
     return motor
 
 
-def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prior: PowerPrior) -> ElectricMotor:
-    """Return a motor whose battery power in level flight at cruise has the prior's efficiency and avionics power."""
+def _with_calibrated_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prior: PowerPrior) -> ElectricMotor:
+    """Return the motor with the prior's efficiency in level flight at cruise, and its avionics power.
+
+    `power_ratio` is set such that the battery power without avionics is drag times airspeed over the prior's propulsive
+    efficiency.
+    """
     thrust, min_throttle, max_throttle = drag(sheet.cruise), 0.0, 1.0
     for _ in range(60):
         throttle = 0.5 * (min_throttle + max_throttle)
@@ -710,9 +735,9 @@ def _with_battery_power(motor: ElectricMotor, sheet: DataSheet, drag: Drag, prio
 
 
 def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple[FuelEngine, DataSheet]:
-    """Size an engine with the stated climb or top speed; return it with the sheet's resulting climb and top speed.
+    """Size an engine and its propeller; return the engine and the sheet with its performance.
 
-    If both are stated, the propeller's pitch is chosen as well.
+    The engine meets the stated climb or top speed; if both are stated, the propeller's pitch is chosen as well.
     """
     # A stated top speed determines the climb better than a guess.
     target_fields = [name for name in ("climb", "top") if getattr(stated_sheet, name)] or ["climb"]
@@ -725,9 +750,9 @@ def _size_engine(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> tuple
 
 
 def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tuple[FuelEngine, DataSheet]:
-    """Solve for the engine torque that gives the sheet's value of a field; for two fields, also for the pitch.
+    """Solve for the engine torque that meets a field of a sheet; for two fields, also for the pitch.
 
-    Raises _NoPropellerError if there is no solution.
+    Returns the engine and the sheet with its performance. Raises _NoPropellerError if there is no solution.
     """
     needed_thrust = drag(sheet.cruise) + _weight(sheet) * math.sin(sheet.climb)
     diameter, pitch = sheet.propeller
@@ -739,6 +764,7 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
     initial_torque = 0.12 * needed_thrust * base_propeller.diameter
 
     def make_engine(free_factors: Sequence[float]) -> FuelEngine:
+        """Return the engine for factors on the initial torque and pitch."""
         torque_factor, pitch_factor = (*free_factors, 1.0)[:2]
         torque = torque_factor * initial_torque
         return FuelEngine(
@@ -750,25 +776,31 @@ def _solve_engine(sheet: DataSheet, drag: Drag, target_fields: list[str]) -> tup
         )
 
     def errors(free_factors: Sequence[float]) -> list[float]:
+        """Return the relative thrust error of each target field."""
         engine = make_engine(free_factors)
         return [_thrust_error(engine, sheet, drag, name) for name in target_fields]
 
-    engine = make_engine(_solve_errors(errors, len(target_fields)))
+    engine = make_engine(_solve_for_factors(errors, len(target_fields)))
     return engine, _with_performance(sheet, engine, drag)
 
 
 def _thrust_error(motor: Motor, sheet: DataSheet, drag: Drag, field: str) -> float:
-    """Return the excess of a motor's thrust over the thrust that a field of the sheet requires, as a ratio to it."""
+    """Return the relative excess of a motor's thrust over the thrust that a field of the sheet requires.
+
+    field: "climb" and "top" require their thrust at full throttle, "trim_throttle" requires the drag at that throttle.
+    """
     speed = sheet.top if field == "top" else sheet.cruise
     throttle = sheet.trim_throttle if field == "trim_throttle" else 1.0
     needed_thrust = drag(speed) + (_weight(sheet) * math.sin(sheet.climb) if field == "climb" else 0.0)
     return motor.thrust(throttle, speed, SHEET_DENSITY) / needed_thrust - 1.0
 
 
-def _solve_errors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
-    """Return `count` positive numbers near 1 at which all errors are 0.
+def _solve_for_factors(errors: Callable[[Sequence[float]], list[float]], count: int) -> list[float]:
+    """Find positive factors near 1 at which all errors are 0.
 
-    Raises _NoPropellerError if none are found.
+    errors: function that returns `count` errors for `count` factors.
+
+    Raises _NoPropellerError if no such factors are found.
     """
     if not count:
         return []
@@ -790,7 +822,10 @@ _THRUST_TOLERANCE_RATIO = 1e-7
 
 
 def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | None:
-    """Find the zero of the errors within the bound by Newton's method; return None if it fails.
+    """Find a zero of the errors by Newton's method; return None if it does not converge.
+
+    errors: function that returns the errors for some numbers.
+    x: first guess of the numbers, which stay within `_SEARCH_BOUND`.
 
     A step that does not reduce the errors is halved.
     """
@@ -816,7 +851,7 @@ def _solve_by_newton(errors: Callable[[Floats], Floats], x: Floats) -> Floats | 
 
 
 def _no_propeller_error(stated_sheet: DataSheet, sheet: DataSheet, drag: Drag) -> FlightError:
-    """Return the error for a climb and top speed that no propeller reaches, with the feasible range of a stated value.
+    """Return the error for a sheet that no propeller meets, with the feasible range of a stated value.
 
     sheet: the sheet with missing values filled in.
     """

@@ -107,7 +107,7 @@ def read_model(table: object, aircraft: str) -> Model:
 
 
 def _checked_table(value: object, key: str, known_keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return a value that must be a table.  Raises FlightError if it is not a table or has an unknown key."""
+    """Return a value that must be a table with known keys only. Raises FlightError otherwise."""
     if not isinstance(value, dict):
         raise FlightError(f"{key} = {value!r} is not a table", field=key, value=value)
     if unknown := sorted(value.keys() - set(known_keys)):
@@ -132,7 +132,7 @@ def _shipped_model(table: dict[str, Any], aircraft: str) -> str:
 
 
 def _read_flag(table: dict[str, Any], name: str) -> bool:
-    """Return a bool of the ``[model]`` table, by default False.  Raises FlightError for another value."""
+    """Return a bool of the ``[model]`` table, by default False. Raises FlightError for another type."""
     value = table.get(name, False)
     if not isinstance(value, bool):
         raise FlightError(f"model.{name} = {value!r} is not true or false", field=f"model.{name}", value=value)
@@ -140,7 +140,12 @@ def _read_flag(table: dict[str, Any], name: str) -> bool:
 
 
 def _read_entry(value: object, key: str, factor_count: int) -> tuple[Any, ...]:
-    """Return a property and its factors. Raises FlightError for an invalid name, or for a factor of 0."""
+    """Return the property and its factors from an entry such as ``["fcs/elevator-pos-rad", 1.0]``.
+
+    factor_count: required number of factors after the property.
+
+    Raises FlightError for another form, an invalid name of a property, or a factor of 0.
+    """
     is_valid = isinstance(value, list) and len(value) == 1 + factor_count and isinstance(value[0], str)
     # JSBSim aborts the process on a name with a space in it.
     if is_valid and isinstance(value, list):

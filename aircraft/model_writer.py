@@ -185,7 +185,10 @@ def _comment_text(text: str) -> str:
 
 
 def _flight_control_xml(numbers: ModelNumbers) -> str:
-    """Return the section of the servos and the motor's lag; elevons and ruddervators mix two commands."""
+    """Return the XML section of the servos and of the motor's lag.
+
+    Elevons and ruddervators mix two commands.
+    """
     elevator, aileron, rudder = numbers.throw
     travels = {"elevator": elevator, "aileron": aileron, "rudder": rudder}
     mixed_controls = {"tail": (), "wing": ("elevator", "aileron"), "vtail": ("elevator", "rudder")}[numbers.layout]
@@ -227,7 +230,7 @@ def _flight_control_xml(numbers: ModelNumbers) -> str:
 
 
 def _servo_xml(name: str, command: str, travel: float, numbers: ModelNumbers) -> str:
-    """Return the actuator of a surface, with lag, rate limit and stops.
+    """Return the XML of the actuator of a surface, with lag, rate limit and stops.
 
     name, command: properties of the surface and of its command.
     travel: travel in either direction, rad.
@@ -241,7 +244,10 @@ def _servo_xml(name: str, command: str, travel: float, numbers: ModelNumbers) ->
 
 
 def _fcs_function_xml(name: str, content: str) -> str:
-    """Return a function of the flight controls that sets a property."""
+    """Return the XML of a function of the flight controls that sets a property.
+
+    content: XML element of the property's value.
+    """
     return f"""      <fcs_function name="{name}">
         <function> {content} </function>
       </fcs_function>"""
@@ -260,7 +266,7 @@ _TORQUE_XML = """    <!-- The reaction to the propeller's torque rolls the aircr
 
 
 def _external_reactions_xml(numbers: ModelNumbers) -> str:
-    """Return the section of the propulsion: factors, functions, thrust and the propeller's torque."""
+    """Return the XML section of the propulsion: factors, functions, thrust and the propeller's torque."""
     factor_properties = "\n".join(f'    <property value="1"> ident/{name} </property>' for name in numbers.factors)
     x, y, z = numbers.propulsion.direction
     # JSBSim's structural axes point aft, right and up; the body's forward, right and down.
@@ -313,7 +319,7 @@ _CONTROL = "aero/control-factor"
 
 
 def _aerodynamics_xml(numbers: ModelNumbers) -> str:
-    """Return the section of the aerodynamic forces and moments."""
+    """Return the XML section of the aerodynamic forces and moments."""
     span, chord = "<p> metrics/bw-ft </p>", "<p> metrics/cbarw-ft </p>"
     drag, lift, side = _force_coefficients(numbers.aero, numbers.factors)
     roll, pitch, yaw = _moment_coefficients(numbers.aero, numbers.factors)
@@ -333,14 +339,18 @@ def _aerodynamics_xml(numbers: ModelNumbers) -> str:
     <property value="1"> aero/drag-factor </property>
     <property value="1"> aero/control-factor </property>
 
-{_lift_curve(numbers.aero, numbers.factors)}
+{_lift_curve_xml(numbers.aero, numbers.factors)}
 
 {axes}
   </aerodynamics>"""
 
 
 def _axis_xml(axis: str, name: str, content: str, frame: str = "") -> str:
-    """Return the element of an axis with one function, ``aero/NAME``."""
+    """Return the XML of an axis with one function, ``aero/NAME``.
+
+    content: XML element of the function.
+    frame: attribute of the axis, such as `` frame="STABILITY"``.
+    """
     return f"""    <axis name="{axis}"{frame}>
       <function name="aero/{name}">
         {content}
@@ -349,7 +359,7 @@ def _axis_xml(axis: str, name: str, content: str, frame: str = "") -> str:
 
 
 def _factor_property(name: str, factors: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the property of a factor as a tuple; () if the model lacks the factor."""
+    """Return a tuple of the property of a factor; () if the model lacks the factor."""
     return (f"ident/{name}",) if name in factors else ()
 
 
@@ -404,8 +414,11 @@ def _moment_coefficients(aero: AeroCoefficients, factors: tuple[str, ...]) -> tu
     return roll, pitch, yaw
 
 
-def _lift_curve(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
-    """Return the XML of the lift by angle of attack: a straight line, and the lift of a flat plate beyond the stall."""
+def _lift_curve_xml(aero: AeroCoefficients, factors: tuple[str, ...]) -> str:
+    """Return the XML of the lift by angle of attack.
+
+    It is a straight line, and beyond the stall the lift of a flat plate.
+    """
     straight_line = add(
         f"<v> {number(aero.lift_0)} </v>",
         scale(aero.lift_alpha, _ALPHA, *_factor_property("lift-slope", factors)),

@@ -91,7 +91,7 @@ class Limits:
     _tables: dict[float | None, PerformanceTable] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
-        """Return the steepest climb and dive over the ground on a course (rad) at an altitude (m AMSL), rad.
+        """Return the steepest climb and dive over the ground (rad) on a course (rad) at an altitude (m AMSL).
 
         airspeed: m/s; None for the airspeed of the limits.
 
@@ -105,27 +105,32 @@ class Limits:
         return replace(self, envelope=self.envelope.with_margin())
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
-        """Return the radius of the arc at `max_bank` between two courses, m, for the highest ground speed on the arc.
+        """Return the radius (m) of the arc at `max_bank` between two courses.
 
         course_in, course_out: rad.
         amsl: altitude, m.
         airspeed: m/s; None for the airspeed of the limits.
+
+        The arc is sized for the highest ground speed on it.
         """
         return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
-    def rates(self, amsl: float) -> tuple[float, float]:
-        """Return the maximum climb and sink rates in still air at an altitude (m AMSL) and at `airspeed`, m/s."""
+    def max_rates(self, amsl: float) -> tuple[float, float]:
+        """Return the maximum climb and sink rates (m/s) in still air at an altitude (m AMSL).
+
+        The airspeed is `airspeed`.
+        """
         table = self.performance()
         speed = float(true_airspeed(table, amsl))
         climb, sink = (speed * math.sin(np.interp(amsl, table.amsl, angles)) for angles in (table.climb, table.descent))
         return climb, sink
 
-    def climb_rates(self, waypoints: Floats) -> Floats:
+    def leg_climb_rates(self, waypoints: Floats) -> Floats:
         """Return the climb rate of each leg at its start and at its end, m/s, (legs, 2).
 
-        The rate is negative in a descent, and NaN if the aircraft cannot hold the leg in the wind.
-
         waypoints: m, (w, 3).
+
+        The rate is negative in a descent, and NaN if the aircraft cannot hold the leg in the wind.
         """
         legs, table = zip(leg_courses(waypoints), leg_slopes(waypoints), strict=True), self.performance()
         return np.array(
@@ -188,10 +193,13 @@ def derate(
     unused_climb: float = 0.0,
     unused_sink: float = 0.0,
 ) -> PerformanceTable:
-    """Return the performance with climb and descent reduced to fractions (0..1), and by rates (m/s) to be left unused.
+    """Return the performance with a reduced climb and descent.
 
-    The smaller result applies. A negative climb, which is a loss of altitude, is unchanged. An angle does not become
-    negative if the unused rate exceeds the aircraft's rate.
+    climb_fraction, sink_fraction: fractions (0..1) of the climb and descent angles that may be used.
+    unused_climb, unused_sink: climb and sink rates to be left unused, m/s.
+
+    The smaller of both reduced angles applies. A negative climb, which is a loss of altitude, is unchanged. An angle
+    does not become negative if the unused rate exceeds the aircraft's rate.
 
     >>> nothing = np.zeros(2)
     >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
@@ -201,7 +209,7 @@ def derate(
     airspeeds = np.array([true_airspeed(table, float(amsl)) for amsl in table.amsl])
 
     def reduce_angles(angles: Floats, fraction: float, unused_rate: float) -> Floats:
-        """Return the reduced angles of one table."""
+        """Return the reduced angles (h,) of one of the two tables."""
         reduced = np.where(angles > 0.0, fraction * angles, angles)
         if unused_rate <= 0.0:
             return _read_only(reduced)
@@ -269,9 +277,11 @@ def downwind_vector(table: PerformanceTable) -> tuple[float, float]:
 def slopes_along(
     table: PerformanceTable, tail_fraction: float, cross_fraction: float, amsl: float
 ) -> tuple[float, float]:
-    """Return the steepest climb and dive over the ground on a course, rad; (0, 0) if the course cannot be held.
+    """Return the steepest climb and dive over the ground on a course, rad.
 
     tail_fraction, cross_fraction: components of the wind's direction along and across the course (cosine and sine).
+
+    The result is (0, 0) if the course cannot be held.
     """
     count = table.amsl.size
     wind = wind_speed_at(table, amsl)
@@ -295,13 +305,16 @@ def slopes_along(
 
 @compiled_inline
 def aircraft_slopes(table: PerformanceTable, course: float, amsl: float) -> tuple[float, float]:
-    """Return the steepest climb and dive over the ground on a course, rad; (0, 0) without progress."""
+    """Return the steepest climb and dive over the ground on a course (rad), rad.
+
+    The result is (0, 0) if the course cannot be held.
+    """
     angle = table.wind_to - course
     return slopes_along(table, math.cos(angle), math.sin(angle), amsl)
 
 
 @inlined
-def _turn_radius(
+def _turn_radius_of_courses(
     table: PerformanceTable,
     ux: float,
     uy: float,
@@ -312,11 +325,13 @@ def _turn_radius(
     wx: float,
     wy: float,
 ) -> float:
-    """Return the radius of the arc at the bank limit between the unit courses u and v, m; inf if one cannot be held.
+    """Return the radius (m) of the arc at the bank limit between the unit courses u and v.
 
     ux, uy, vx, vy: east and north components of u and v.
     turn_sign: sign of the turn, 0 for either direction.
     wx, wy: components of `downwind_vector`.
+
+    The radius is inf if one of the courses cannot be held.
     """
     wind, airspeed = wind_speed_at(table, amsl), true_airspeed(table, amsl)
     if wind == 0.0:
@@ -337,35 +352,37 @@ def _turn_radius(
 
 @compiled_inline
 def turn_radius_between(table: PerformanceTable, course_in: float, course_out: float, amsl: float) -> float:
-    """Return the radius of the arc at the bank limit between two courses, m; inf if a course cannot be held.
+    """Return the radius (m) of the arc at the bank limit between two courses (rad).
 
-    The radius is for the highest ground speed in the turn. In turbulence one standard deviation of the gusts is added,
-    because the airspeed, and with it the bank for an arc over the ground, varies by that much.
+    The radius is for the highest ground speed in the turn, and inf if a course cannot be held. In turbulence one
+    standard deviation of the gusts is added, because the airspeed, and with it the bank for an arc over the ground,
+    varies by that much.
     """
     turn = wrap(course_out - course_in)
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
     wx, wy = downwind_vector(table)
     # A U-turn may be flown in either direction.
     turn_sign = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
-    return _turn_radius(table, ux, uy, vx, vy, amsl, turn_sign, wx, wy)
+    return _turn_radius_of_courses(table, ux, uy, vx, vy, amsl, turn_sign, wx, wy)
 
 
 @inlined
 def corner_tangent(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
 ) -> tuple[float, float]:
-    """Return the tangent length of the fly-by arc between the unit courses u and v, and its radius, m.
+    """Return the tangent length and the radius of the fly-by arc between the unit courses u and v, m.
+
+    ux, uy, vx, vy: east and north components of u and v.
+    wx, wy: components of `downwind_vector`.
 
     The tangent length R tan(theta/2) = R |sin theta| / (1 + cos theta) is 0 without a turn and inf for a U-turn.
-
-    wx, wy: components of `downwind_vector`.
     """
     cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
     if abs(cross) < 1e-9 and dot > 0.0:
         return 0.0, 0.0
     if abs(cross) < 1e-6 and dot < 0.0:
         return math.inf, 0.0
-    radius = _turn_radius(table, ux, uy, vx, vy, amsl, cross, wx, wy)
+    radius = _turn_radius_of_courses(table, ux, uy, vx, vy, amsl, cross, wx, wy)
     return radius * abs(cross) / (1.0 + dot), radius
 
 
@@ -386,12 +403,13 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
 
 @compiled_inline
 def fly_over_run(turn: float) -> float:
-    """Return the distance along the leg after a fly-over turn at which the track is back on this leg, in turn radii.
+    """Return the distance after a fly-over turn at which the track is back on the leg, in turn radii.
 
     turn: rad.
 
-    The distance is sin turn + 2 sin phi, with the overshoot angle phi given by cos phi = (1 + cos turn)/2. For turns
-    beyond the turn with the largest distance, the largest distance is returned, so the result never decreases.
+    The distance along the leg is sin turn + 2 sin phi, with the overshoot angle phi given by cos phi = (1 + cos
+    turn)/2. For turns beyond the turn with the largest distance, the largest distance is returned, so the result never
+    decreases.
     """
     # The maximum of sin turn + 2 sin phi is 2 sqrt 2, at this angle.
     angle = min(turn, math.acos(-1.0 / 3.0))
@@ -432,13 +450,13 @@ def roll_reversal_length(
     wx: float,
     wy: float,
 ) -> float:
-    """Return the length of leg in which the aircraft rolls from a turn into an opposite turn, m.
-
-    The length is 0 if the aircraft cannot make progress along the leg.
+    """Return the length of leg (m) that the aircraft needs to roll from a turn into an opposite turn.
 
     ux, uy: unit vector of the leg's course.
     radius_in, radius_out: radii of the two arcs, m.
     wx, wy: components of `downwind_vector`.
+
+    The length is 0 if the aircraft cannot make progress along the leg.
     """
     wind = wind_speed_at(table, amsl)
     airspeed = true_airspeed(table, amsl)

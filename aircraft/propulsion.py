@@ -67,13 +67,16 @@ class Propeller:
         )
 
     def thrust_at(self, w: float, airspeed: float, rho: float) -> float:
-        """Return the thrust, N, at a propeller speed (rad/s) and an airspeed (m/s)."""
+        """Return the thrust (N) at a propeller speed (rad/s), an airspeed (m/s) and an air density (kg/m^3)."""
         n, d = w / (2.0 * math.pi), self.diameter
         c0, c1, c2 = self.thrust
         return rho * (c0 * n**2 * d**4 + c1 * n * airspeed * d**3 + c2 * airspeed**2 * d**2)
 
     def torque_parabola(self, airspeed: float, rho: float) -> tuple[float, float, float]:
-        """Return the coefficients of the torque (N m) by falling power of the propeller speed (rad/s)."""
+        """Return the coefficients of the torque (N m) as a polynomial of the propeller speed (rad/s).
+
+        The coefficient of the highest power comes first.
+        """
         c0, c1, c2 = self.torque
         d, turn = self.diameter, 2.0 * math.pi
         return rho * d**5 * c0 / turn**2, rho * d**4 * airspeed * c1 / turn, rho * d**3 * airspeed**2 * c2
@@ -92,7 +95,10 @@ _RAD_PER_REVOLUTION = 2.0 * math.pi
 
 
 def larger_root(square: float, linear: float, constant: float) -> float:
-    """Return the larger root of square x^2 + linear x + constant; a negative discriminant is replaced by 0."""
+    """Return the larger root of square x^2 + linear x + constant.
+
+    A negative discriminant is replaced by 0.
+    """
     return (math.sqrt(max(0.0, linear**2 - 4.0 * square * constant)) - linear) / (2.0 * square)
 
 
@@ -143,7 +149,7 @@ class ElectricMotor:
         return self.power_ratio * volts * current + self.avionics
 
     def functions_xml(self, factors: tuple[str, ...]) -> str:
-        """Return the XML of the JSBSim functions."""
+        """Return the XML of the JSBSim functions of motor and propeller."""
         factor = _factor_element(factors)
         k, r, i0 = self.emf, self.resistance, self.idle_current
         speed_factor = factor("motor-speed")
@@ -222,12 +228,12 @@ class FuelEngine:
         return thrust if thrust > 0.0 else self.windmill * thrust
 
     def power(self, throttle: float, airspeed: float, rho: float) -> float:
-        """Return the heat of the fuel, W."""
+        """Return the heat flow of the fuel, W."""
         work = throttle * self.torque * rho / _SEA_LEVEL_DENSITY * self.speed(throttle, airspeed, rho)
         return work / self.efficiency
 
     def functions_xml(self, factors: tuple[str, ...]) -> str:
-        """Return the XML of the JSBSim functions."""
+        """Return the XML of the JSBSim functions of engine and propeller."""
         factor = _factor_element(factors)
         speed_factor = factor("motor-speed")
         factors_xml = (speed_factor, speed_factor, "<p> motor/throttle-norm </p>", "<p> motor/rho-kg_m3 </p>")
@@ -256,7 +262,7 @@ class FuelEngine:
 
 @dataclass(frozen=True, slots=True)
 class ActuatorDisc:
-    """A propeller as a disc that accelerates the air, without a motor model (Beard and McLain, first edition, 4.3).
+    """Propeller as a disc that accelerates the air (Beard and McLain, first edition, 4.3).
 
     area: disc area, m^2.
     coefficient: C_prop.
@@ -265,7 +271,8 @@ class ActuatorDisc:
     efficiency: efficiency of motor and propeller beyond the disc's own loss, the power of the air over battery power.
     volts: V.
 
-    The thrust is 0.5 rho S C (v_e^2 - V^2), or 0.5 rho S C v_e (v_e - V) for a ducted disc; it is never negative.
+    The disc has no model of a motor. The thrust is 0.5 rho S C (v_e^2 - V^2), or 0.5 rho S C v_e (v_e - V) for a ducted
+    disc; it is never negative.
     """
 
     area: float
@@ -335,7 +342,7 @@ class ShaftPower:
     position: Vector3 = (0.0, 0.0, 0.0)
 
     def functions_xml(self, factors: tuple[str, ...]) -> str:
-        """Return the XML of the JSBSim functions.
+        """Return the XML of the JSBSim functions of motor and propeller.
 
         J follows from P / (rho D^2 V^3) = CP(J) / J^3, whose cube root is tabulated.
         """
@@ -411,7 +418,10 @@ _SEA_LEVEL_DENSITY = 1.225
 
 
 def _factor_element(factors: tuple[str, ...]) -> Callable[[str], str]:
-    """Return a function that returns the XML element of a factor, by its name; 1 for a factor that the model lacks."""
+    """Return a function that returns the XML element of a factor by its name.
+
+    The element is 1 for a factor that the model lacks.
+    """
     return lambda name: f"<p> ident/{name} </p>" if name in factors else "<v> 1 </v>"
 
 
@@ -434,7 +444,7 @@ def _polynomial_xml(coefficients: tuple[float, ...], x: str) -> str:
 
 
 def _torque_xml(propeller: Propeller) -> str:
-    """Return the XML of the coefficients of a propeller's torque, Q = q2 w^2 + q1 w + q0, at the speed w, rad/s."""
+    """Return the XML of q2, q1 and q0 of a propeller's torque q2 w^2 + q1 w + q0, with w in rad/s."""
     square, linear, constant = propeller.torque_parabola(1.0, 1.0)
     rho, air = "motor/rho-kg_m3", "motor/airspeed-mps"
     return f"""    <!-- Torque of the propeller of {number(propeller.diameter)} m, q2 w^2 + q1 w + q0 at w rad/s. -->
@@ -444,10 +454,12 @@ def _torque_xml(propeller: Propeller) -> str:
 
 
 def _root_xml(linear: str, constant: str) -> str:
-    """Return the XML of the larger root of ``motor/q2`` w^2 + linear w + constant; the discriminant is at least 0.
+    """Return the XML of the larger root of ``motor/q2`` w^2 + linear w + constant.
 
     linear: property of the linear coefficient.
     constant: element of the constant.
+
+    A negative discriminant is replaced by 0.
     """
     discriminant = f"""<difference>
               {multiply(f"<p> {linear} </p>", f"<p> {linear} </p>")}
@@ -465,9 +477,10 @@ def _root_xml(linear: str, constant: str) -> str:
 
 
 def _thrust_and_torque_xml(propeller: Propeller, windmill: float, factor: Callable[[str], str]) -> str:
-    """Return the XML of the propeller's thrust and torque; a negative thrust is multiplied by ``windmill``.
+    """Return the XML of the propeller's thrust and torque.
 
-    factor: function of `_factor_element`.
+    windmill: factor on a negative thrust.
+    factor: function that `_factor_element` returned.
     """
     d, (c0, c1, c2) = propeller.diameter, propeller.thrust
     braking = "<min> <v> 0 </v> <p> motor/pull-n </p> </min>"

@@ -137,7 +137,7 @@ def _interpolate(table: Floats, airspeed: float, turn: float, ground_speed: floa
 
 @inlined
 def corner_deviation(tracking: Record, turn: float, ground_speed: float) -> tuple[float, float, float]:
-    """Return the maximum distance from the legs at a corner, and the affected lengths before and after the corner, m.
+    """Return the maximum distance from the legs at a corner, and the affected lengths of both legs, m.
 
     turn: rad, positive.
     ground_speed: m/s.

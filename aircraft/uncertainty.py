@@ -134,7 +134,10 @@ def read_uncertainty(folder: Path) -> Uncertainty | None:
 
 
 def _check_keys(table: dict[str, Any], file: Path) -> None:
-    """Raise FlightError if a required key is missing (the model would then seem certain) or a key is unknown."""
+    """Raise FlightError if a required key is missing or a key is unknown.
+
+    Without a required key the model would seem certain.
+    """
     known_keys = _REQUIRED_KEYS | _OPTIONAL_KEYS | (_LOG_KEYS if file.name == UNCERTAINTY_FILES[0] else frozenset())
     missing, unknown = sorted(_REQUIRED_KEYS - table.keys()), sorted(table.keys() - known_keys)
     suggestion = did_you_mean(unknown[0], sorted(known_keys - table.keys())) if unknown else ""
@@ -147,7 +150,7 @@ def _check_keys(table: dict[str, Any], file: Path) -> None:
 
 
 def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, max_value: float) -> float:
-    """Return a number of a table. Raises FlightError if it is missing or out of range."""
+    """Return a number in a table. Raises FlightError if it is missing or out of range."""
     value = table.get(key)
     if isinstance(value, bool) or not isinstance(value, int | float) or not min_value <= value <= max_value:
         raise FlightError.at(
@@ -157,7 +160,7 @@ def _read_number(table: dict[str, Any], key: str, file: Path, min_value: float, 
 
 
 def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
-    """Return the uncertain quantity in a [[quantity]] table.  Raises FlightError for an invalid entry."""
+    """Return the uncertain quantity in a [[quantity]] table. Raises FlightError for an invalid entry."""
     name = entry.get("property")
     _check_name(name, str(file), "property")
     estimate, sd = (
@@ -167,14 +170,14 @@ def _read_quantity(entry: dict[str, Any], file: Path) -> UncertainQuantity:
 
 
 def _check_name(name: object, file: str, key: str, error: type[PlanflyError] = FlightError) -> None:
-    """Raise `error` if a name is not the name of a property, ``ident/NAME``."""
+    """Raise `error` unless a name has the form ``ident/NAME`` of a property."""
     # JSBSim aborts the process on a name with a space in it.
     if not isinstance(name, str) or not name.startswith(_PREFIX) or not name.isascii() or len(name.split()) != 1:
         raise error.at(file, key, name, f"expected a property {_PREFIX}NAME", shown=repr(name))
 
 
 def uncertainty_text(uncertainty: Uncertainty) -> str:
-    """Write an uncertainty as the text of an ``uncertainty.toml``."""
+    """Return the text of an ``uncertainty.toml`` with an uncertainty."""
     lines = [
         "# What is not known of this aircraft.  Each property is a factor in the model, 1 for the estimate.",
         "",
@@ -230,7 +233,9 @@ class Draws:
 
 
 def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW_COUNT, seed: int = 1) -> Draws:
-    """Draw each quantity independently: a factor log-normally with its estimate as the median, other values normally.
+    """Draw each quantity independently, `count` times.
+
+    A factor is drawn log-normally with its estimate as the median, another value normally.
 
     >>> one = UncertainQuantity("ident/thrust", "factor", 1.0, 0.2)
     >>> drawn = draw_quantities((one,)).values
@@ -248,7 +253,7 @@ def draw_quantities(quantities: tuple[UncertainQuantity, ...], count: int = DRAW
 
 
 def draws_text(draws: Draws) -> str:
-    """Write draws as the text of a ``draws.csv``."""
+    """Return the text of a ``draws.csv`` with draws."""
     lines = [",".join(draws.names), *(",".join(f"{value:.9g}" for value in row) for row in draws.values.tolist())]
     return "\n".join(lines) + "\n"
 

@@ -21,7 +21,7 @@ _Length = Annotated[float, Field(gt=0.0, le=100_000.0)]
 
 @dataclass(frozen=True, slots=True)
 class ClimbOut:
-    """Departure: a launch at home, a climb straight ahead to the take-off altitude, and waypoints to the plan.
+    """Departure: launch at home, climb straight ahead to the take-off altitude, and waypoints to the plan.
 
     home: (3,) m, on the ground.
     course: launch course, rad clockwise from north.
@@ -43,7 +43,7 @@ class ClimbOut:
 
 @dataclass(frozen=True, slots=True)
 class Descent:
-    """Approach: waypoints from the plan's last waypoint to the line-up, and the line-up to the landing point.
+    """Approach: waypoints from the plan's end to the line-up, then the line-up and the landing point.
 
     waypoints: (n, 3) m, before the line-up.
     final_waypoints: (2, 3) m, two points at one altitude on the landing course; the glide begins at the second.
@@ -67,7 +67,7 @@ class Descent:
 
 @dataclass(frozen=True, slots=True)
 class DepartureAndApproach:
-    """Departure and approach of a plan; each is None if the scenario does not require it or if it is blocked."""
+    """Departure and approach of a plan; each is None if the scenario requires none, or if it is blocked."""
 
     climb: ClimbOut | None = None
     descent: Descent | None = None
@@ -113,7 +113,7 @@ class DepartureAndApproachFile(_FileTable):
     climb: _ClimbFile | None = None
     descent: _DescentFile | None = None
 
-    def ways(self) -> DepartureAndApproach:
+    def to_procedures(self) -> DepartureAndApproach:
         """Convert the file's entries to a departure and an approach; each is None if it is missing."""
         climb_file, descent_file = self.climb, self.descent
         climb = descent = None
@@ -142,7 +142,7 @@ def departure_and_approach_json(procedures: DepartureAndApproach) -> dict[str, A
 
     >>> climb = ClimbOut(np.zeros(3), 0.5, 80.0, np.array([[0.0, 600.0, 90.0]]), 0.15)
     >>> data = departure_and_approach_json(DepartureAndApproach(climb))
-    >>> list(data), DepartureAndApproachFile.model_validate(data).ways().climb.waypoints.tolist()
+    >>> list(data), DepartureAndApproachFile.model_validate(data).to_procedures().climb.waypoints.tolist()
     (['climb'], [[0.0, 600.0, 90.0]])
     """
     data: dict[str, Any] = {}

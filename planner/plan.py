@@ -62,8 +62,9 @@ class Violations(NamedTuple):
 
 
 class Objectives(NamedTuple):
-    """Objectives of a path, in the order of `Objective`: length / straight line, and three sums over its points.
+    """Objectives of a path in the order of `Objective`: length ratio, and three sums over its points.
 
+    length_ratio: length / straight line.
     height_sum: sum of the heights above ground, divided by the six points per leg (eq. 11), m.
     """
 
@@ -115,7 +116,7 @@ class Certificate:
 
 
 def path_digest(waypoints: Floats) -> str:
-    """Return a digest of a path (w, 3), by which its certificate is known again.
+    """Return a digest that identifies a path (w, 3), by which a certificate is matched to its path.
 
     >>> path_digest(np.zeros((2, 3))) == path_digest(np.ones((2, 3)))
     False
@@ -199,7 +200,10 @@ class Plan:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Problems with which no flight of the plan is flyable: those of a searched path, departure or approach."""
+        """Problems that make every flight of the plan not flyable: those of a searched path or of its ends.
+
+        The ends are the departure and the approach.
+        """
         return tuple(problem for problem in self._problems if problem not in self.unmet_margins)
 
     @property
@@ -240,7 +244,7 @@ class _CertificateFile(_Model):
     problems: list[str]
 
     def certificate(self, certified_path: Floats) -> Certificate:
-        """Return the certificate of a path (w, 3), m."""
+        """Return the certificate in the file, for a path (w, 3), m."""
         return Certificate(
             turn=self.turn_margin_rad,
             available_length=_none_to_inf(self.turn_room_m),
@@ -276,7 +280,7 @@ class _PlanFile(_Model):
 
 
 def _finite_or_none(value: float) -> float | None:
-    """Return a number, or None (null in JSON) if the number is inf or NaN."""
+    """Return a finite number, or None (null in JSON) for inf and NaN."""
     return float(value) if np.isfinite(value) else None
 
 
@@ -376,12 +380,16 @@ def parse_plan(
         history=history,
         ended=plan_file.ended,
         flown_legs=plan_file.flown_legs,
-        ways=None if plan_file.ground_ways is None else plan_file.ground_ways.ways(),
+        ways=None if plan_file.ground_ways is None else plan_file.ground_ways.to_procedures(),
     )
 
 
 def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
-    """Read the plan of a ``plan.json`` file; terrain: file that replaces the scenario's terrain.
+    """Read the plan of a ``plan.json`` file.
+
+    terrain: file that replaces the scenario's terrain.
+
+    Raises MissionError or the scenario's errors.
 
     >>> read_plan(Path("missing.json"))
     Traceback (most recent call last):
@@ -397,7 +405,7 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
 
 
 def _none_to_inf(value: float | None) -> float:
-    """Return a number, or inf for None; the inverse of `_finite_or_none`."""
+    """Return a number, or inf for None."""
     return np.inf if value is None else value
 
 

@@ -13,13 +13,16 @@ LLVM_MIN_FREE_BYTES = 192 * 2**20
 
 
 class AddressSpaceError(MemoryError):
-    """Error for a limit that leaves too little address space for a library; the machine is at fault, not a file."""
+    """Error for a limit that leaves too little address space for a library.
+
+    The machine is at fault, not a file.
+    """
 
 
-def has_room(size: int) -> bool:
+def has_address_space(size: int) -> bool:
     """Return True if ``size`` bytes can be mapped; the test mapping is released.
 
-    >>> has_room(2**20)
+    >>> has_address_space(2**20)
     True
     """
     try:
@@ -30,18 +33,20 @@ def has_room(size: int) -> bool:
 
 
 class AddressSpaceGuard:
-    """Import hook for the head of ``sys.meta_path`` that refuses imports if there is too little address space.
+    """Import hook that refuses imports if there is too little address space.
 
     limit: address space of this process, bytes.
+
+    It belongs at the head of ``sys.meta_path``.
     """
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
 
     def find_spec(self, name: str, path: object = None, target: object = None) -> None:
-        """Find no module.  Raise AddressSpaceError if too little address space is left."""
+        """Find no module; raise AddressSpaceError if too little address space is left."""
         room = LLVM_MIN_FREE_BYTES if name.startswith("llvmlite") else MIN_FREE_BYTES
-        if not has_room(room):
+        if not has_address_space(room):
             limit = f"{self._limit // 1024:,} kB of address space (ulimit -v)"
             library = name.partition(".")[0]
             raise AddressSpaceError(f"the limit of {limit} leaves less than {room // 2**20} MB to import {library}")

@@ -70,10 +70,12 @@ class Launch:
         return _LAUNCH_LENGTH_M[self.method] if self.length is None else self.length
 
     def release_speed(self, min_speed: float) -> float:
-        """Return the ground speed at the end of the launch, m/s: the stated speed, or else the method's default.
+        """Return the ground speed at the end of the launch, m/s.
 
         min_speed: lowest speed in level flight, m/s.
-        The default is 0 for a runway, where the aircraft accelerates under its own power.
+
+        It is the stated speed, or else the method's default, which is 0 for a runway, where the aircraft accelerates
+        under its own power.
 
         >>> [Launch(method).release_speed(15.0) for method in ("catapult", "hand", "runway")]
         [18.0, 10.0, 0.0]
@@ -118,9 +120,10 @@ class LandingStrip:
     height_sd: float | None = None
 
     def landing_course(self, wind: Wind, amsl: float) -> float | None:
-        """Return the landing course, rad: the stated course, or else the course into the wind at ``amsl``.
+        """Return the landing course, rad: the stated course, or else the course into the wind.
 
         amsl: altitude of the wind, m AMSL.
+
         Returns None if no course is stated and there is no wind: then any course is suitable.
 
         >>> LandingStrip(0.0, 0.0).landing_course(Wind(5.0, 2.0, 0.0, "none", None, 100.0), 100.0)
@@ -134,10 +137,12 @@ class LandingStrip:
 
 
 def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[float, float]:
-    """Return two ground slopes of a strip, m per m: along a landing course, and across it to the right.
+    """Return the ground slopes of a strip along a landing course and across it, m per m.
 
-    course: rad.  A rising slope is positive.  Each slope is the mean between two opposite ends of the strip, and NaN if
-    the ground height at one of these ends is not known.
+    course: rad.
+
+    A slope that rises along the course, or to its right, is positive. Each slope is the mean between two opposite ends
+    of the strip, and NaN if the ground height at one of these ends is not known.
     """
     slopes = []
     for heading, length in ((course, strip.length), (course + 0.5 * math.pi, max(_MIN_MEASURED_WIDTH_M, strip.width))):
@@ -149,7 +154,7 @@ def strip_slopes(ground: Terrain, strip: LandingStrip, course: float) -> tuple[f
 
 @dataclass(frozen=True, slots=True)
 class ReturnRequirements:
-    """Requirements on RTL (return to launch), glides and go-arounds, and the RTL settings of a planned mission.
+    """Requirements on RTL (return to launch), glides and go-arounds, and RTL settings of a plan's mission.
 
     require: contains "rtl" if every RTL must be safe, "glide" if the engine may fail anywhere, "go_around" if a landing
         may be aborted anywhere on its glide.
@@ -177,10 +182,12 @@ class ReturnRequirements:
 def make_home(
     table: HomeTable | None, source: str, origin: GeoOrigin, ground: Terrain | None, bounds: Floats, start: Floats
 ) -> Floats | None:
-    """Convert a scenario's [home] table to a position on the ground, (3,) m; return None if there is no table.
+    """Convert a scenario's [home] table to a position on the ground, (3,) m; return None without a table.
 
-    start: (3,) m; home is below it if place = "start".  source: name of the file in messages.
+    source: name of the file in messages.
     bounds: area of the scenario, (2, 2) m.
+    start: (3,) m; home is below it if place = "start".
+
     Raises ScenarioError if home is outside the area, or if the ground height at home is not known.
     """
     if table is None:
@@ -235,7 +242,7 @@ def make_return_requirements(
 def _position_on_ground(
     key: str, position: tuple[float, float], source: str, ground: Terrain | None, bounds: Floats
 ) -> Floats:
-    """Return a position with its ground height added, (3,) m.  Raises ScenarioError as `make_home` does."""
+    """Return a position with its ground height added, (3,) m. Raises ScenarioError as `make_home` does."""
     check_in_area(key, np.array(position), source, bounds)
     ground_height = float(ground.height(*position)) if ground is not None else math.nan
     if math.isnan(ground_height):

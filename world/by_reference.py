@@ -51,10 +51,10 @@ class _Layout(NamedTuple):
 
 
 def by_reference(cls: _Class) -> _Class:
-    """Return a subclass of a `typing.NamedTuple` class; kernels take its instances as one pointer and read the fields.
+    """Decorate a `typing.NamedTuple` class: kernels take its instances as one pointer and read the fields.
 
-    The fields must be numbers, arrays, records or named tuples of these.  Records are copied when an instance is first
-    passed to a kernel.
+    The fields must be numbers, arrays, records or named tuples of these. Records are copied when an instance is first
+    passed to a kernel. Returns a subclass.
 
     >>> import numba
     >>> from world.airspace.zone_kernels import zone_records
@@ -126,7 +126,10 @@ def _lay_out_in_memory(numba_type: Any, value: Any) -> Any:
 
 
 def _find_field(reference: Reference, name: str) -> tuple[int, Any]:
-    """Return the index and type of a field; the type is a `Reference` if the field's class is marked `by_reference`."""
+    """Return the index and the numba type of a field.
+
+    The type is a `Reference` if the field's class is marked `by_reference`.
+    """
     index = reference.tuple_type.fields.index(name)
     member = reference.tuple_type.types[index]
     if _is_named_tuple(member) and hasattr(member.instance_class, "_address"):
@@ -150,7 +153,10 @@ class _Field(AttributeTemplate):
 
 @lower_getattr_generic(Reference)
 def _read_field(context: Any, builder: Any, reference: Reference, pointer: Any, name: str) -> Any:
-    """Generate the code that reads a field; a field whose class is marked `by_reference` is read as a pointer."""
+    """Generate the code that reads a field.
+
+    A field whose class is marked `by_reference` is read as a pointer.
+    """
     index, member = _find_field(reference, name)
     field_pointer = cgutils.gep_inbounds(builder, pointer, 0, index)
     if isinstance(member, Reference):

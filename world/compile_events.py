@@ -32,7 +32,7 @@ def notify_before_compiling(callback: BeforeCompiling) -> Iterator[None]:
 class CompileTimer:
     """Timer of the time during which kernels were compiled in this process.
 
-    seconds: time of the compilations that have ended, s; of compilations at the same time the time is counted once.
+    seconds: time of the compilations that have ended, s; time in which several compilations run is counted once.
     """
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class CompileTimer:
         self._start = 0.0
 
     def begin(self) -> None:
-        """Begin a compilation, perhaps within another one."""
+        """Begin a compilation, which may be within another compilation."""
         if not self._running_count:
             self._start = time.monotonic()
         self._running_count += 1

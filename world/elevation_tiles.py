@@ -29,7 +29,7 @@ MAX_GRID_OFFSET_PIXELS = 0.01
 
 
 def tile_files(path: Path) -> list[Path] | None:
-    """Return the files of a folder or of a virtual raster, sorted by name; None for a file that is neither.
+    """Return the files of a folder or of a virtual raster, sorted by name; None for any other file.
 
     Raises TerrainError for a folder without elevation files, and for a virtual raster that cannot be read.
     """
@@ -86,9 +86,11 @@ def _virtual_files(path: Path) -> list[Path]:
 
 
 def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
-    """Join tiles into one raster.  name: name of that raster in messages.
+    """Join tiles into one raster.
 
-    Where tiles overlap, the first tile with data is used.  Raises TerrainError for tiles that are not on one grid.
+    name: name of the raster in messages.
+
+    Where tiles overlap, the first tile with data is used. Raises TerrainError for tiles that are not on one grid.
     """
     first = tiles[0]
     if len(tiles) == 1:
@@ -100,6 +102,7 @@ def join_tiles(tiles: Sequence[RasterFile], name: str) -> RasterFile:
     offsets = [(row - top, col - left) for row, col in positions]
 
     def read(r0: int, r1: int, c0: int, c1: int) -> NDArray[np.float32]:
+        """Return the heights of a window of rows and columns, from the first tile with data at each pixel."""
         block = np.full((r1 - r0, c1 - c0), np.nan, dtype=np.float32)
         for (row, col), tile in zip(offsets, tiles, strict=True):
             first_row, last_row = max(r0, row), min(r1, row + tile.shape[0])

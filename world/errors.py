@@ -80,11 +80,12 @@ class PlanflyError(Exception):
 
     @classmethod
     def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
-        """Convert an error to this class, with the location of the value that caused it, and keep its attributes.
+        """Convert an error to this class, with the location of the value that caused it.
 
         file, field, value: location that led to the error, added before the message; empty to keep the message.
-        They become the attributes if the error names no field; otherwise its own field and value are kept, and its
-        file if it has one.
+
+        The error's attributes are kept. The location becomes the attributes if the error names no field; otherwise its
+        own field and value are kept, and its file if it has one.
 
         >>> inner = FlightError("mine.toml: mass_kg = -1", file="mine.toml", field="mass_kg", value=-1)
         >>> found = ScenarioError.from_error(inner, "tight", "flight.aircraft", "./mine")
@@ -124,9 +125,11 @@ class ParameterError(PlanflyError):
 class StartError(FlightError):
     """Error for a flight that cannot start as its mission states.
 
+    source: mission or command that requires the flight.
+    reason: why the flight cannot start.
+    field, value, allowed: as in `PlanflyError`.
+
     The aircraft and the place are known, but no flight is possible there.
-    source: mission or command that requires it.  reason: why it cannot start.  field, value, allowed: as in
-    `PlanflyError`.
 
     >>> str(StartError("a.plan", "no progress"))
     'a.plan: no progress'
@@ -152,5 +155,7 @@ class ArgumentError(PlanflyError, ValueError):
 class MissingExtraError(PlanflyError, ImportError):
     """Error for a feature whose extra of planfly is not installed.
 
-    value: the extra's name.  allowed: the command that installs it.  name: the module that is missing.
+    value: the extra's name.
+    allowed: the command that installs it.
+    name: the module that is missing.
     """

@@ -105,7 +105,7 @@ def missing_extra(extra: Extra, module: str, needs: str = "") -> MissingExtraErr
 
 
 def requires_extra(name: str, needs: str = "") -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
-    """Decorate a function to call `require_extra` first."""
+    """Return a decorator that makes a function call `require_extra` first."""
 
     def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
         @functools.wraps(function)

@@ -14,15 +14,14 @@ except ImportError:  # Windows
 LOCKS_FOLDERS = fcntl is not None
 
 
-def lock_now(handle: int) -> bool:
-    """Lock an open file, or on Linux and macOS a folder, until it is closed.
+def try_lock(handle: int) -> bool:
+    """Lock an open file, or on Linux and macOS a folder, until it is closed; return True if successful.
 
-    Return False if it is already locked.
-    Raises OSError if the file system does not support locks.
+    Returns False if it is already locked. Raises OSError if the file system does not support locks.
 
     >>> from tempfile import TemporaryFile
     >>> with TemporaryFile() as file:
-    ...     lock_now(file.fileno())
+    ...     try_lock(file.fileno())
     True
     """
     # Windows raises PermissionError where other systems raise BlockingIOError.

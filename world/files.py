@@ -26,7 +26,9 @@ _MAX_DOTS = 100
 
 
 class TextLine(NamedTuple):
-    """Line of a file, as messages name it.  number: from 1.
+    """Line of a file, as messages name it.
+
+    number: from 1.
 
     >>> print(TextLine("a.waypoints", 4))
     a.waypoints:4
@@ -83,7 +85,9 @@ def read_at_most(path: Path, max_bytes: int, kind: str) -> bytes:
 
 
 def absolute_path(path: Path) -> str:
-    """Return the absolute path of a file or folder with links resolved; a link that leads to itself is not resolved.
+    """Return the absolute path of a file or folder, with links resolved.
+
+    A link that leads to itself is not resolved.
 
     >>> absolute_path(Path("/usr/../none/"))
     '/none'
@@ -143,7 +147,7 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
 
 
 def did_you_mean(name: str, known_names: Iterable[str]) -> str:
-    """Return the end of a message about an unknown name: a suggestion of the most similar known name, or "".
+    """Return the end of a message about an unknown name: the most similar known name, or "".
 
     >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
     (": did you mean 'jacksboro'?", '')
@@ -282,7 +286,7 @@ def lock_path(path: Path) -> Iterator[None]:
     lock_file = path if file_locks.LOCKS_FOLDERS else path.with_name(f".{path.name}.planfly-lock")
     handle = os.open(lock_file, os.O_RDONLY if file_locks.LOCKS_FOLDERS else os.O_RDWR | os.O_CREAT)
     try:
-        if not file_locks.lock_now(handle):
+        if not file_locks.try_lock(handle):
             raise PlanflyError(f"{path}: another planfly process is writing there; name another target", file=path)
         yield
     finally:

@@ -112,9 +112,9 @@ def crs_transformer(crs: str) -> "Transformer":
 
 
 def height_unit(crs: str) -> tuple[str, float]:
-    """Return the name of a CRS's unit of height and its length in m; ("metre", 1) for a CRS without heights.
+    """Return the name of a CRS's unit of height and its length, m.
 
-    Raises ValueError for a CRS that PROJ does not know.
+    The unit is ("metre", 1) for a CRS without heights. Raises ValueError for a CRS that PROJ does not know.
     """
     from pyproj import CRS
     from pyproj.exceptions import ProjError
@@ -193,7 +193,10 @@ class PolyMap:
 
 
 def _make_record(centre: Floats, half_widths: Floats, u: Floats, v: Floats) -> PolyMapRecord:
-    """Make a record of `POLYMAP`.  u, v: coefficients of both components, (n, n) each."""
+    """Make a record of `POLYMAP`.
+
+    u, v: coefficients of both components, (n, n) each.
+    """
     size = len(u)
     record = np.zeros(1, dtype=POLYMAP)[0]
     record["centre_x"], record["centre_y"] = centre
@@ -221,11 +224,13 @@ def fit_polymap(
     half_widths = np.array([max((x1 - x0) / 2, 1e-9), max((y1 - y0) / 2, 1e-9)])
 
     def node_grid(count: int) -> tuple[Floats, Floats]:
+        """Return the Chebyshev nodes of a grid over the unit square, two arrays (count^2,)."""
         nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)
         u, v = np.meshgrid(nodes, nodes)
         return u.ravel(), v.ravel()
 
     def function_values(u: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Return the function's values at points of the unit square."""
         return function(centre[0] + half_widths[0] * u, centre[1] + half_widths[1] * v)
 
     nodes_u, nodes_v = node_grid(14)
@@ -256,7 +261,10 @@ def fit_polymap(
 
 @inlined
 def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:
-    """Return both components of a polynomial map at one point (x, y), by Horner's scheme.  record: see `PolyMap`."""
+    """Evaluate both components of a polynomial map at one point (x, y), by Horner's scheme.
+
+    record: see `PolyMap`.
+    """
     a = (x - record.centre_x) / record.half_x
     b = (y - record.centre_y) / record.half_y
     u = 0.0

@@ -45,12 +45,12 @@ _HORIZONTAL_TAG = re.compile(r"horiz|linear|planar|xy", re.IGNORECASE)
 
 
 def open_geotiff(file: Path, _name: str) -> RasterFile:
-    """Open a GeoTIFF in any reference system, with heights in metres.  Raises TerrainError."""
+    """Open a GeoTIFF in any reference system, with heights in metres. Raises TerrainError."""
     return _open_raster_file(file, "GTiff", "not a readable GeoTIFF file")
 
 
 def open_hgt(file: Path, _name: str) -> RasterFile:
-    """Open an SRTM tile, whose name gives its position.  Raises TerrainError."""
+    """Open an SRTM tile, whose name gives its position. Raises TerrainError."""
     expected = "expected a name such as N46E008.hgt and the bytes of 1201 x 1201 or 3601 x 3601 heights"
     return _open_raster_file(file, "SRTMHGT", f"not a readable SRTM tile; {expected}")
 
@@ -63,7 +63,12 @@ def _open_dataset(file: Path, driver: str) -> Any:
 
 
 def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
-    """Open and check a file with one GDAL driver.  Raises TerrainError; ``failure_text`` says what was expected."""
+    """Open and check a file with one GDAL driver.
+
+    failure_text: beginning of the message if GDAL cannot open the file.
+
+    Raises TerrainError.
+    """
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError
 
@@ -75,7 +80,7 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
                 _check_layout(file, source)
                 shape, grid = (source.height, source.width), tuple(source.transform)[:6]
                 scale, crs = (source.scales[0], source.offsets[0]), _read_crs(file, driver, source)
-                unit = _height_unit(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
+                unit = _stated_height_unit(source.units[0] or "", {**source.tags(), **source.tags(1)}.items())
                 may_have_gaps = driver == "GTiff" and source.nodata is None
     except NotGeoreferencedWarning:
         _raise_unplaced(file)
@@ -83,6 +88,7 @@ def _open_raster_file(file: Path, driver: str, failure_text: str) -> RasterFile:
         raise TerrainError(f"{file}: {failure_text}: {_first_error_line(error)}", file=file) from error
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        """Return the heights of a window of rows and columns; NaN for missing data."""
         try:
             with rasterio.Env(**GUARD), _open_dataset(file, driver) as source:
                 heights = _read_strips(source, (top, bottom, left, right), *scale)
@@ -103,7 +109,10 @@ def _first_error_line(error: BaseException) -> str:
 
 
 def _check_layout(file: Path, source: Any) -> None:
-    """Raise TerrainError unless the file has one band of real numbers in blocks that are small enough to unpack."""
+    """Raise TerrainError unless the file has one band of real numbers in blocks that can be unpacked.
+
+    A block has at most `MAX_BLOCK_PIXELS` pixels.
+    """
     number_kind = np.dtype(source.dtypes[0]).kind
     if source.count != 1 or number_kind not in "iuf":
         allowed = "an elevation file has 1 band of numbers"
@@ -135,8 +144,8 @@ def _read_crs(file: Path, driver: str, source: Any) -> str | None:
     return crs_to_wkt(wkt, with_height=has_height)
 
 
-def _height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
-    """Return the unit of a file's heights: the unit of its band, or feet if a tag says so; "" if not stated.
+def _stated_height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
+    """Return the unit of a file's heights: that of its band, or feet if a tag says so; "" if not stated.
 
     GDAL treats the tags of other programs as remarks, and would report such heights as metres although they are feet.
     """
@@ -153,7 +162,10 @@ def _height_unit(unit: str, tags: Iterable[tuple[str, str]]) -> str:
 def _make_raster_file(
     file: Path, shape: tuple[int, int], grid: Grid, crs: str | None, unit: str, read: Any
 ) -> RasterFile:
-    """Make a raster file from its georeferencing.  Raises TerrainError, also if its heights are not in metres."""
+    """Make a raster file from its georeferencing.
+
+    Raises TerrainError, also if its heights are not in metres.
+    """
     a, b, c, d, e, f = grid
     determinant = a * e - b * d
     if crs is None or determinant == 0.0:
@@ -170,6 +182,7 @@ def _make_raster_file(
     middle_longitude = a * cols / 2 + b * rows / 2 + c if is_geographic(crs) else math.nan
 
     def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
+        """Convert longitudes and latitudes (deg) to fractional columns and rows of pixel centres."""
         x, y = (
             np.asarray(coordinates)
             for coordinates in transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
@@ -180,6 +193,7 @@ def _make_raster_file(
         return col - 0.5, row - 0.5
 
     def to_lon_lat(col: Floats, row: Floats) -> tuple[Floats, Floats]:
+        """Convert fractional columns and rows of pixel centres to longitudes and latitudes (deg)."""
         pixel_x, pixel_y = col + 0.5, row + 0.5
         x, y = a * pixel_x + b * pixel_y + c, d * pixel_x + e * pixel_y + f
         lon, lat = transformer.transform(np.asarray(x), np.asarray(y), direction="INVERSE")
@@ -212,9 +226,11 @@ def _read_strips(source: Any, window: tuple[int, int, int, int], scale: float, o
 
 
 def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: int) -> None:
-    """Set the heights in blocks that a GeoTIFF omits to NaN, because GDAL reads 0 there if no nodata value is stated.
+    """Set the heights in blocks that a GeoTIFF omits to NaN.
 
     top, left: first row and column of ``heights`` in the file.
+
+    GDAL reads 0 there if no nodata value is stated.
     """
     rows, cols = source.block_shapes[0]
     bottom, right = top + len(heights), left + heights.shape[1]
@@ -228,7 +244,7 @@ def _clear_unwritten(source: Any, heights: NDArray[np.float32], top: int, left: 
 
 
 def _block_bytes(source: Any, block_row: int, block_column: int) -> tuple[int, int] | None:
-    """Return the bytes [begin, end) of a block of an open GeoTIFF; None for a block that was never written."""
+    """Return the bytes [begin, end) of a block of an open GeoTIFF; None for a block never written."""
     offset, size = (
         source.get_tag_item(f"BLOCK_{tag}_{block_column}_{block_row}", "TIFF", bidx=1) for tag in ("OFFSET", "SIZE")
     )
@@ -236,7 +252,10 @@ def _block_bytes(source: Any, block_row: int, block_column: int) -> tuple[int, i
 
 
 def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple[int, int]]:
-    """Yield the bytes [begin, end) of the blocks of a GeoTIFF that a window (top, bottom, left, right) touches."""
+    """Yield the bytes [begin, end) of each block of a GeoTIFF that a window touches.
+
+    window: top, bottom, left, right.
+    """
     import rasterio
 
     top, bottom, left, right = window
@@ -255,7 +274,10 @@ def block_spans(file: Path, window: tuple[int, int, int, int]) -> Iterator[tuple
 
 
 def geotiff_bytes(heights: NDArray[np.float32], grid: Grid, crs: str, nodata: float) -> bytes:
-    """Return the bytes of a GeoTIFF of heights, m, compressed with deflate.  crs: a definition that PROJ accepts."""
+    """Return the bytes of a GeoTIFF of heights (m), compressed with deflate.
+
+    crs: a definition that PROJ accepts.
+    """
     import rasterio
     from rasterio.io import MemoryFile
 

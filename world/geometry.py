@@ -31,9 +31,11 @@ def turning_angles(waypoints: ArrayLike) -> Floats:
 
 
 def signed_turns(waypoints: ArrayLike) -> Floats:
-    """Return the course change at each inner waypoint, rad in (-pi, pi], positive to the right, shape (..., w - 2).
+    """Return the course change at each inner waypoint, rad in (-pi, pi], (..., w - 2).
 
     waypoints: (..., w, 3) metres; altitudes are ignored.
+
+    A turn to the right is positive.
 
     >>> signed_turns([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
     [-1.5708]
@@ -95,9 +97,12 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 def tangent_length(turn: float, radius: float) -> float:
-    """Return the distance from a waypoint at which a fly-by arc leaves one leg and joins the next, R tan(turn / 2), m.
+    """Return the distance from a waypoint at which a fly-by arc leaves its leg, R tan(turn / 2), m.
 
-    turn: rad, from 0 to below pi.  radius: m.
+    turn: rad, from 0 to below pi.
+    radius: m.
+
+    The arc joins the next leg at the same distance.
 
     >>> round(tangent_length(math.radians(90.0), 100.0), 3)
     100.0
@@ -108,7 +113,8 @@ def tangent_length(turn: float, radius: float) -> float:
 def fly_by_offset(turn: float, radius: float) -> float:
     """Return the distance at which a fly-by arc passes its waypoint, R (1 / cos(turn / 2) - 1), m.
 
-    turn: rad, from 0 to below pi.  radius: m.
+    turn: rad, from 0 to below pi.
+    radius: m.
 
     >>> round(fly_by_offset(math.radians(90.0), 100.0), 3)
     41.421
@@ -135,8 +141,10 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
     """Intersect the segment a-b with a sphere.
 
     a, b, centre: (3,) m.
+    radius: m.
+
     Returns the smallest distance from the segment to the centre, m, and the fractions of the segment at which it enters
-    and leaves the sphere, in [0, 1]; both are 0 if the segment stays outside.  A point on the surface is inside (paper
+    and leaves the sphere, in [0, 1]; both are 0 if the segment stays outside. A point on the surface is inside (paper
     eq. 9: d <= R).
     """
     length2 = 0.0
@@ -162,12 +170,12 @@ def sphere_window(a: Floats, b: Floats, centre: Floats, radius: float) -> tuple[
 
 @inlined
 def segment_exposure(a: Floats, b: Floats, centre: Floats, radius: float, scale: float) -> tuple[float, float]:
-    """Return the fraction of the segment a-b inside a sphere, and the segment's exposure to the sphere's centre.
+    """Return the fraction of the segment a-b inside a sphere, and the segment's exposure to its centre.
 
     The exposure is the mean of (scale/d)^4 over the whole segment, with 0 outside the sphere, for the distance d from
-    the centre.  Exact: with perpendicular distance h (at least `MIN_RANGE_M`) and path coordinate s from the closest
-    point, the integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The exposure follows the paper's
-    eq. 9 and 10, as a density along the path instead of a sum over six points.
+    the centre. Exact: with perpendicular distance h (at least `MIN_RANGE_M`) and path coordinate s from the closest
+    point, the integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3). The exposure follows the paper's eq.
+    9 and 10, as a density along the path instead of a sum over six points.
     """
     _, begin_fraction, end_fraction = sphere_window(a, b, centre, radius)
     if end_fraction <= begin_fraction:
@@ -190,9 +198,10 @@ def window_exposure(
 ) -> float:
     """Return the exposure of the part of a segment between two fractions, averaged over the whole segment.
 
-    See `segment_exposure` for the formula.  length2: squared length of the segment, m^2.  dot: dot product of the
-    segment's vector and the vector from the centre to the segment's start.  start2: squared distance of the start from
-    the centre, m^2.
+    length2: squared length of the segment, m^2.
+    dot: dot product of the segment's vector and the vector from the centre to the segment's start.
+    start2: squared distance of the start from the centre, m^2.
+    scale: see `segment_exposure`, also for the formula.
     """
     if length2 < 1e-12:
         return (end_fraction - begin_fraction) * scale**4 / max(start2, MIN_RANGE_M * MIN_RANGE_M) ** 2

@@ -40,9 +40,7 @@ class HeightDatum:
 
 
 def is_above_ellipsoid(crs: str) -> bool:
-    """Return True if a reference system's heights are above an ellipsoid.
-
-    Return False for a system without heights.
+    """Return True if a reference system's heights are above an ellipsoid; False without heights.
 
     >>> is_above_ellipsoid("EPSG:4979"), is_above_ellipsoid("EPSG:4326+5773"), is_above_ellipsoid("EPSG:4326")
     (True, False, False)
@@ -89,9 +87,13 @@ def _constant_sea_level(height: float) -> Callable[[Floats, Floats], Floats]:
 
 
 def _make_sea_level_function(transformer: Any) -> Callable[[Floats, Floats], Floats]:
-    """Make a function for the geoid's height above the ellipsoid, which is minus the converted ellipsoidal height 0."""
+    """Make a function that returns the geoid's height above the ellipsoid.
+
+    transformer: conversion of heights above the ellipsoid to heights above the geoid.
+    """
 
     def heights(lon: Floats, lat: Floats) -> Floats:
+        """Return minus the converted ellipsoidal height 0 at longitudes and latitudes (deg), m."""
         _, _, negated_heights = transformer.transform(lon, lat, np.zeros(np.shape(lon)))
         return -np.asarray(negated_heights, dtype=np.float64)
 
@@ -115,12 +117,14 @@ def _find_geoid() -> tuple[str, Any]:
 
 
 def _is_depth(crs: str) -> bool:
+    """Return True if a reference system has depths, which are positive downwards."""
     from pyproj import CRS
 
     return any(axis.direction == "down" for axis in CRS.from_user_input(crs).axis_info)
 
 
 def _vertical_name(crs: str) -> str:
+    """Return the name of the vertical part of a reference system; "" without one."""
     from pyproj import CRS
 
     return next((part.name for part in CRS.from_user_input(crs).sub_crs_list if part.is_vertical), "")

@@ -14,11 +14,13 @@ from world.kernels import compiled, inner
 from world.terrain import Terrain, segment_clearance
 
 
-def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, rows: int, columns: int) -> Floats:
-    """Return the highest ground in each square cell, sides included, m: an array of shape (rows, columns).
+def highest_in_cells(terrain: Terrain, west: float, south: float, cell_side: float, rows: int, columns: int) -> Floats:
+    """Return the highest ground in each square cell, sides included, m, (rows, columns).
 
-    west, south: outer corner of the first cell, m.  cell: side of a cell, m.  Rows go north, columns east.
-    The value is NaN for a cell that is partly without data.
+    west, south: outer corner of the first cell, m.
+    cell_side: side of a cell, m.
+
+    Rows go north, columns east. The value is NaN for a cell that is partly without data.
 
     >>> from world.terrain import make_gridded_terrain
     >>> line = np.arange(-100.0, 101.0, 50.0)
@@ -28,27 +30,27 @@ def highest_in_cells(terrain: Terrain, west: float, south: float, cell: float, r
     [[40.0, 50.0, 40.0]]
     """
     max_heights = np.full((rows, columns), -math.inf)
-    _fill_cells(terrain.heights, terrain.to_pixel.record, west, south, cell, max_heights)
+    _fill_cells(terrain.heights, terrain.to_pixel.record, west, south, cell_side, max_heights)
     return max_heights
 
 
 @compiled
 def _fill_cells(
-    heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float, max_heights: Floats
+    heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell_side: float, max_heights: Floats
 ) -> None:
     """Set `max_heights` to the highest ground on the sides of each cell and at the pixels inside it."""
     rows, columns = max_heights.shape
     start, end = np.zeros(3), np.zeros(3)
     for i in range(rows + 1):
         for j in range(columns + 1):
-            start[0], start[1] = west + j * cell, south + i * cell
+            start[0], start[1] = west + j * cell_side, south + i * cell_side
             if j < columns:
-                end[0], end[1] = west + (j + 1) * cell, start[1]
+                end[0], end[1] = west + (j + 1) * cell_side, start[1]
                 side_height = -segment_clearance(heights, to_pixel, start, end)[0]
                 _raise_cell(max_heights, i - 1, j, side_height)
                 _raise_cell(max_heights, i, j, side_height)
             if i < rows:
-                end[0], end[1] = start[0], south + (i + 1) * cell
+                end[0], end[1] = start[0], south + (i + 1) * cell_side
                 side_height = -segment_clearance(heights, to_pixel, start, end)[0]
                 _raise_cell(max_heights, i, j - 1, side_height)
                 _raise_cell(max_heights, i, j, side_height)
@@ -56,13 +58,19 @@ def _fill_cells(
         for j in range(columns):
             if not math.isnan(max_heights[i, j]):
                 _raise_cell(
-                    max_heights, i, j, _highest_pixel(heights, to_pixel, west + j * cell, south + i * cell, cell)
+                    max_heights,
+                    i,
+                    j,
+                    _highest_pixel(heights, to_pixel, west + j * cell_side, south + i * cell_side, cell_side),
                 )
 
 
 @inner
 def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
-    """Raise the value of cell (i, j) to ``height`` if that is higher or NaN; ignore a cell outside the array."""
+    """Raise the value of cell (i, j) to ``height`` if that is higher or NaN.
+
+    A cell outside the array is ignored.
+    """
     if (
         0 <= i < max_heights.shape[0]
         and 0 <= j < max_heights.shape[1]
@@ -72,14 +80,14 @@ def _raise_cell(max_heights: Floats, i: int, j: int, height: float) -> None:
 
 
 @inner
-def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell: float) -> float:
+def _highest_pixel(heights: Heights, to_pixel: PolyMapRecord, west: float, south: float, cell_side: float) -> float:
     """Return the height of the highest pixel in a cell whose sides are straight in pixel coordinates.
 
     Returns -inf for a cell without a pixel, and NaN if a pixel has no data.
     """
     col, row = polymap(to_pixel, west, south)
-    east_col, east_row = polymap(to_pixel, west + cell, south)
-    north_col, north_row = polymap(to_pixel, west, south + cell)
+    east_col, east_row = polymap(to_pixel, west + cell_side, south)
+    north_col, north_row = polymap(to_pixel, west, south + cell_side)
     east_col, east_row, north_col, north_row = east_col - col, east_row - row, north_col - col, north_row - row
     area = east_col * north_row - north_col * east_row
     first_row = math.ceil(row + min(0.0, east_row) + min(0.0, north_row))

@@ -26,7 +26,10 @@ _TRACKER_OPTION = "ignore:resource_tracker:UserWarning"
 
 
 class Interrupted(KeyboardInterrupt):
-    """Raised when a signal asks the work to end.  number: number of the signal."""
+    """Exception that a signal raises to end the work.
+
+    number: number of the signal.
+    """
 
     def __init__(self, number: int) -> None:
         super().__init__(number)
@@ -66,7 +69,7 @@ def interrupt(number: int, _frame: FrameType | None = None) -> None:
 
 
 class delay_signals:
-    """Context manager that completes its block, and then raises `Interrupted` if a signal arrived in the block.
+    """Context manager that completes its block, and then raises `Interrupted` if a signal arrived.
 
     >>> import signal
     >>> try:
@@ -93,9 +96,10 @@ class delay_signals:
 
 @contextlib.contextmanager
 def remove_at_end(path: Path) -> Iterator[None]:
-    """Register a temporary file or folder for `remove_temporary_paths`, and remove it at the end of the block.
+    """Register a temporary file or folder, and remove it at the end of the block.
 
-    A folder that cannot be removed at the end, because another process still writes in it, stays registered.
+    `remove_temporary_paths` removes registered paths. A folder that cannot be removed at the end, because another
+    process still writes in it, stays registered.
 
     >>> with remove_at_end(Path("never-made")):
     ...     pass

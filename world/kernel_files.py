@@ -65,7 +65,10 @@ def use_checked_files(dispatcher: Any) -> None:
 
 
 def _read_checked(path: Path, label: str) -> Any:
-    """Return the object in a file, or None if its digest does not match or it cannot be read."""
+    """Return the object in a file, or None if its digest does not match or it cannot be read.
+
+    label: text that is part of the digest.
+    """
     try:
         content = path.read_bytes()
     except OSError:

@@ -14,7 +14,7 @@ from typing import Any
 
 from numba.core import event
 
-from world.file_locks import lock_now
+from world.file_locks import try_lock
 
 # Timeout of the lock, s: a save takes milliseconds, but a process may be suspended while it saves.
 LOCK_TIMEOUT_S = 10.0
@@ -56,7 +56,7 @@ class CacheWriteLock:
             state.handle = os.open(self._lock, os.O_RDWR | os.O_CREAT, 0o600)
             state.lock_depth = getattr(state, "depth", 0)
             deadline = time.monotonic() + LOCK_TIMEOUT_S
-            while not lock_now(state.handle) and time.monotonic() < deadline:
+            while not try_lock(state.handle) and time.monotonic() < deadline:
                 time.sleep(0.002)
 
 

@@ -55,7 +55,9 @@ if _usable_folder is not None:
 
 
 def cache_folder() -> Path:
-    """Return the folder of compiled kernels: `PREFERRED_FOLDER`, or a temporary folder if it cannot be written.
+    """Return the folder of compiled kernels: `PREFERRED_FOLDER`, or a temporary folder.
+
+    A temporary folder is used if the preferred folder cannot be written.
 
     >>> cache_folder().is_absolute() or bool(_settings.CACHE_DIR)
     True
@@ -78,7 +80,7 @@ def compiled(kernel: _Kernel) -> _Kernel:
 
 
 def compiled_inline(kernel: _Kernel) -> _Kernel:
-    """Compile a function as `compiled` does, and let LLVM inline it into the kernels that call it, as with `inlined`.
+    """Compile a function as `compiled` does, and let LLVM inline it into the kernels that call it.
 
     >>> from world.geometry import wrap
     >>> round(wrap(4.0), 6)
@@ -101,11 +103,11 @@ def inner(kernel: _Kernel) -> _Kernel:
 
 
 def inlined(kernel: _Kernel) -> _Kernel:
-    """Compile a function as `inner` does, and let LLVM inline it into the inner loops of the kernels that call it.
+    """Compile a function as `inner` does, and let LLVM inline it into the kernels that call it.
 
     A call passes seven numbers per array and increments its reference count, which is more work than many kernels do
-    themselves.  The planner's graded scores take a quarter longer with calls only.  Inlined by numba
-    (`inline="always"`) the function would run no faster, but each copy would be typed and translated again.
+    themselves. The planner's graded scores take a quarter longer with calls only. Inlined by numba (`inline="always"`)
+    the function would run no faster, but each copy would be typed and translated again.
     """
     return cast("_Kernel", _InnerKernel(kernel, forceinline=True))
 
@@ -213,7 +215,7 @@ def read_only(array: _Array) -> _Array:
 
 
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
-    """Make the type of a record whose fields are read and set as attributes, in Python and in compiled code.
+    """Make the type of a record whose fields are attributes, in Python and in compiled code.
 
     entries: fields in order, each the name of a float64, or (name, type) or (name, type, shape) as in numpy.
 

@@ -17,18 +17,20 @@ _DEPENDENT_NORM_RATIO = 1e-12
 def least_squares(basis: Floats, values: Floats) -> Floats:
     """Return the coefficients c, (k,), that minimise the norm of basis c - values.
 
-    basis: (n, k).  values: (n,).
-    By modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6).  The coefficient
-    of a column that depends linearly on earlier columns, to 1e-6 of the longest column, is 0.
+    basis: (n, k).
+    values: (n,).
+
+    By modified Gram-Schmidt (Golub and Van Loan, Matrix Computations, 4th edition, algorithm 5.2.6). The coefficient of
+    a column that depends linearly on earlier columns, to 1e-6 of the longest column, is 0.
 
     >>> least_squares(np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]]), np.array([1.0, 3.0, 5.0])).round(9).tolist()
     [1.0, 2.0]
     """
-    return _least_squares(np.ascontiguousarray(basis), np.ascontiguousarray(values))
+    return _solve_gram_schmidt(np.ascontiguousarray(basis), np.ascontiguousarray(values))
 
 
 @compiled
-def _least_squares(basis: Floats, values: Floats) -> Floats:
+def _solve_gram_schmidt(basis: Floats, values: Floats) -> Floats:
     """Return the coefficients of `least_squares` for contiguous arrays."""
     row_count, column_count = basis.shape
     # Orthogonalise the columns and the values together.

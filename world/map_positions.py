@@ -24,7 +24,9 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
     """Return the position that a table states: east, north, altitude AMSL, (3,) m.
 
     key, source: names of the table and its file in messages.
-    A stated height above ground is added to the terrain height; raises ScenarioError if there is no terrain.
+
+    A stated height above ground is added to the terrain height. Raises ScenarioError if there is no terrain to add it
+    to.
     """
     east, north = map_coordinates(table, origin)
     if table.amsl_m is not None:
@@ -41,7 +43,11 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
 
 
 def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
-    """Raise ScenarioError for a position outside the area.  point: (2,) or (3,) m.  bounds: area, (2, 2) m."""
+    """Raise ScenarioError for a position outside the area.
+
+    point: (2,) or (3,) m.
+    bounds: area, (2, 2) m.
+    """
     for axis, name in enumerate(("east", "north")):
         min_coordinate, max_coordinate = bounds[axis]
         if not min_coordinate <= point[axis] <= max_coordinate:
@@ -55,9 +61,11 @@ def check_in_area(key: str, point: Floats, source: str, bounds: Floats) -> None:
 def check_inside(
     key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
 ) -> None:
-    """Raise ScenarioError for a start or destination outside the area, outside floor..ceiling or not above the ground.
+    """Raise ScenarioError for a start or destination outside the area and its altitudes, or in the ground.
 
-    key, source: names of the point and its file in messages.  point: (3,) m.  bounds: area, (2, 2) m.
+    key, source: names of the point and its file in messages.
+    point: (3,) m.
+    bounds: area, (2, 2) m.
     floor, ceiling: m AMSL.
     """
     check_in_area(key, point, source, bounds)
@@ -77,9 +85,10 @@ def check_above_ground(key: str, point: Floats, source: str, ground: Terrain | N
 
 
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
-    """Convert the threats of a scenario file to threats on the map; a threat without a height is on the ground.
+    """Convert the threats of a scenario file to threats on the map.
 
-    Raises ScenarioError for a threat that states no altitude AMSL, at a position without terrain.
+    A threat without a height is on the ground. Raises ScenarioError for a threat that states no altitude AMSL, at a
+    position without terrain.
     """
     positions = np.zeros((len(tables), 3))
     for k, table in enumerate(tables):

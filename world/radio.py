@@ -77,7 +77,10 @@ def make_link(table: LinkTable | None, source: str, origin: GeoOrigin, ground: T
 
 
 def free_space_loss(distance: float, frequency: float) -> float:
-    """Return the free-space loss, dB (ITU-R P.525-4).  distance: m.  frequency: Hz.
+    """Return the free-space loss, dB (ITU-R P.525-4).
+
+    distance: m.
+    frequency: Hz.
 
     >>> round(free_space_loss(1000.0, 1e9), 2)
     92.45
@@ -129,7 +132,10 @@ class PathLoss(NamedTuple):
 
 
 def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathProfile:
-    """Sample the ground between two antennas at the spacing of the terrain.  station, aircraft: (3,) m."""
+    """Sample the ground between two antennas at the spacing of the terrain.
+
+    station, aircraft: positions of the antennas, (3,) m.
+    """
     length = math.dist(station[:2], aircraft[:2])
     count = min(_MAX_PROFILE_POINTS, math.ceil(length / max(1.0, terrain.spacing)))
     fractions = np.arange(1, count) / max(1, count)
@@ -143,7 +149,8 @@ def path_profile(terrain: Terrain, station: Floats, aircraft: Floats) -> PathPro
 def path_loss(profile: PathProfile, station_altitude: float, aircraft_altitude: float, frequency: float) -> PathLoss:
     """Return the radio loss between two antennas over a ground profile; NaN if the ground is unknown.
 
-    station_altitude, aircraft_altitude: altitudes of the antennas, m AMSL.  frequency: Hz.
+    station_altitude, aircraft_altitude: altitudes of the antennas, m AMSL.
+    frequency: Hz.
     """
     slant_distance = math.hypot(profile.length, aircraft_altitude - station_altitude)
     free_loss = free_space_loss(slant_distance, frequency)
@@ -217,7 +224,8 @@ class LinkPoints(NamedTuple):
 def link_points(link: RadioLink, terrain: Terrain, station: Floats, positions: Floats) -> LinkPoints:
     """Compute the radio link between a station and each position of the aircraft.
 
-    station: antenna, (3,) m.  positions: (t, 3) m.
+    station: antenna, (3,) m.
+    positions: (t, 3) m.
     """
     losses = [
         path_loss(path_profile(terrain, station, position), float(station[2]), float(position[2]), link.frequency)

@@ -13,7 +13,9 @@ _STREAM_COUNT = 3
 
 
 def stream(seed: int, number: int) -> np.random.Generator:
-    """Return the generator of one stream, `PLANNER`, `TURBULENCE` or `NAVIGATION`, all spawned from one seed.
+    """Return the random generator of one of the streams that are spawned from one seed.
+
+    number: `PLANNER`, `TURBULENCE` or `NAVIGATION`.
 
     >>> stream(1, PLANNER).integers(100, size=3).tolist()
     [1, 69, 82]

@@ -54,7 +54,8 @@ def make_degree_raster(
 ) -> RasterFile:
     """Make a raster file from an array of heights on a grid of longitudes and latitudes.
 
-    heights: rows from north to south.  edges: west, east, south and north edge of the outermost pixels, deg.
+    heights: rows from north to south.
+    edges: west, east, south and north edge of the outermost pixels, deg.
 
     Raises TerrainError for too few or too many pixels, and for edges that are not on the globe.
     """
@@ -67,20 +68,20 @@ def make_degree_raster(
     if not (-180.0 <= west < east <= 360.0 and -90.0 <= south < north <= 90.0):
         allowed = "expected degrees of longitude -180..360 and latitude -90..90"
         raise TerrainError.at(name, "west, east, south, north edge", list(edges), allowed)
-    pitch_x, pitch_y = (east - west) / cols, (north - south) / rows
+    pixel_width, pixel_height = (east - west) / cols, (north - south) / rows
 
     def to_pixels(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
         near = longitude_near(lon, (west + east) / 2)
-        return (near - west) / pitch_x - 0.5, (north - lat) / pitch_y - 0.5
+        return (near - west) / pixel_width - 0.5, (north - lat) / pixel_height - 0.5
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
         return heights[top:bottom, left:right].astype(np.float32)
 
     def to_lon_lat(col: Floats, row: Floats) -> tuple[Floats, Floats]:
-        return west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y
+        return west + (col + 0.5) * pixel_width, north - (row + 0.5) * pixel_height
 
     corners = np.stack(to_lon_lat(*outline(cols, rows)), axis=1)
-    grid = (pitch_x, 0.0, west, 0.0, -pitch_y, north)
+    grid = (pixel_width, 0.0, west, 0.0, -pixel_height, north)
     return RasterFile(name, (rows, cols), to_pixels, to_lon_lat, corners, file_sha256(file), read, grid)
 
 
@@ -96,10 +97,10 @@ _SHIPPED_TILE_TOLERANCE_DEG = 1e-5
 
 
 def open_npz(file: Path, name: str) -> RasterFile:
-    """Open an .npz with `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees.
+    """Open an .npz file of heights. Raises TerrainError.
 
-    The order within each pair does not matter, except in the tile that planfly ships: see `_corrected_edges`.
-    Raises TerrainError.
+    The file has `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees. The order
+    within each pair does not matter, except in the tile that planfly ships: see `_corrected_edges`.
     """
     heights, edges = _read_npz(file, name)
     if heights.ndim != 2 or heights.dtype.kind not in "iuf":
@@ -110,7 +111,9 @@ def open_npz(file: Path, name: str) -> RasterFile:
 
 
 def _corrected_edges(stated_edges: list[float], rows: int) -> tuple[float, float, float, float]:
-    """Return the west, east, south and north edges, deg, from a file's xmin, xmax, ymin, ymax in this order.
+    """Return the west, east, south and north edges, deg, from a file's xmin, xmax, ymin and ymax.
+
+    stated_edges: xmin, xmax, ymin, ymax.
 
     Correct the edges of the tile that planfly ships: its ymin lies one tile height north of its ymax, not south of it.
     """
@@ -166,7 +169,9 @@ _OPENERS: dict[str, Callable[[Path, str], RasterFile]] = {".tif": open_geotiff, 
 def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
     """Open an elevation file, a folder or .vrt of tiles, or the built-in file of a name.
 
-    base: folder of relative paths.  datum: vertical datum of the heights; None for the datum that the file states.
+    base: folder of relative paths.
+    datum: vertical datum of the heights; None for the datum that the file states.
+
     Raises TerrainError for anything that is not a file of one band in one of `world.elevation_formats.FORMATS`, and for
     heights above an ellipsoid that this machine cannot convert.
 
@@ -213,7 +218,7 @@ def open_raster(path: str, base: Path | None = None, datum: StatedDatum | None =
 def open_tiles(paths: Sequence[str], base: Path | None = None, datum: StatedDatum | None = None) -> RasterFile:
     """Open one elevation file, as `open_raster` does, or join several files on one grid.
 
-    Where they overlap, the first file with data is used.  Raises TerrainError as `open_raster` does.
+    Where they overlap, the first file with data is used. Raises TerrainError as `open_raster` does.
 
     >>> open_tiles(["jacksboro", "jacksboro"]).name
     'jacksboro and 1 more'
@@ -253,8 +258,9 @@ _HOLES_PER_STEP = 2**16
 def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
     """Read the part of a raster that covers an area of the map and a buffer around it.
 
-    bounds: area, [[e0, e1], [n0, n1]] m.  buffer: width of the buffer, m; it is clipped at the tile's edge without a
-    message.
+    bounds: area, [[e0, e1], [n0, n1]] m.
+    buffer: width of the buffer, m; it is clipped at the tile's edge without a message.
+
     Raises TerrainError if the area extends beyond the tile, if data is missing inside it, or if it has too many pixels.
 
     >>> raster = open_raster("jacksboro")
@@ -295,10 +301,10 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
         )
     centre = box.mean(axis=1)
     col, row = to_pixel(centre[0] + np.array([0.0, 100.0, 0.0]), centre[1] + np.array([0.0, 0.0, 100.0]))
-    # Columns and rows per metre of the map; the pitch is the length of the shorter pixel side.
+    # Columns and rows per metre of the map; the spacing is the length of the shorter pixel side.
     per_metre = np.array([[col[1] - col[0], col[2] - col[0]], [row[1] - row[0], row[2] - row[0]]]) / 100.0
-    pitch = float(np.min(np.linalg.norm(np.linalg.inv(per_metre), axis=0)))
-    terrain = Terrain(heights, to_pixel, pitch, raster.name, raster.sha256, raster.datum.text)
+    spacing = float(np.min(np.linalg.norm(np.linalg.inv(per_metre), axis=0)))
+    terrain = Terrain(heights, to_pixel, spacing, raster.name, raster.sha256, raster.datum.text)
     _check_holes(terrain, box, per_metre)
     return terrain
 
@@ -379,7 +385,7 @@ def _check_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
 def _outline_window(
     raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
-    """Return the range of columns and rows that a map box and a buffer around it cover: (col0, col1, row0, row1)."""
+    """Return the columns and rows that a map box and a buffer around it cover: col0, col1, row0, row1."""
     ramp = np.linspace(0.0, 1.0, 41)
     (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
@@ -397,11 +403,9 @@ def _window_pixels(
 
 
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Return the largest map box, with sides to the east and north, inside the tile: [[e0, e1], [n0, n1]] m.
+    """Return the largest upright map box inside the tile: [[e0, e1], [n0, n1]] m.
 
-    Its size is found to within half a percent.
-
-    Raises TerrainError if no box fits.
+    Its sides run east and north, and its size is found to within half a percent. Raises TerrainError if no box fits.
 
     >>> raster = open_raster("jacksboro")
     >>> tile_bounds(raster, raster.centre).round(-2).tolist()

@@ -55,14 +55,17 @@ class RasterFile:
 
     @property
     def centre(self) -> GeoOrigin:
-        """The centre of the tile, with a longitude in -180..180 even if the tile lies across the 180th meridian."""
+        """Centre of the tile, with a longitude in -180..180.
+
+        This also holds for a tile that lies across the 180th meridian.
+        """
         lat = (self.corners[:, 1].min() + self.corners[:, 1].max()) / 2
         lon = longitude_near(self.corners[:, 0], float(self.corners[0, 0]))
         return GeoOrigin(float(lat), float(longitude_near((lon.min() + lon.max()) / 2, 0.0)))
 
 
 def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Return a mask that is True for heights (m) of ground, and False for NaN and values that mark missing data.
+    """Return a mask: True for heights (m) of ground, False for NaN and values that mark missing data.
 
     >>> is_ground(np.array([-9999.0, 480.0, np.nan], dtype=np.float32)).tolist()
     [False, True, False]
@@ -72,7 +75,7 @@ def is_ground(heights: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 def longitude_near(lon: NDArray[np.float64] | float, centre: float) -> Floats:
-    """Shift longitudes (deg) to within 180 degrees of ``centre``; longitudes within that range are unchanged."""
+    """Shift longitudes (deg) by full turns to within 180 degrees of ``centre``."""
     return np.asarray(lon - 360.0 * np.round((np.asarray(lon) - centre) / 360.0))
 
 
@@ -96,7 +99,10 @@ def shift_grid(grid: Grid, rows: int, cols: int) -> Grid:
 
 
 def require_min_pixels(name: str | Path, shape: tuple[int, int]) -> None:
-    """Raise TerrainError if a raster has too few rows or columns to interpolate heights.  shape: (rows, cols)."""
+    """Raise TerrainError if a raster has too few rows or columns to interpolate heights.
+
+    shape: (rows, cols).
+    """
     if min(shape) < 2:
         raise TerrainError.at(name, "rows, columns", shape, "expected at least 2 x 2 pixels")
 

@@ -58,7 +58,8 @@ class _IncompleteAnswer(Exception):
 class RemoteFile:
     """File on a server, and its copy.
 
-    size: size in bytes.  version: its ETag or its time of change; "" if the server states neither.
+    size: size in bytes.
+    version: its ETag or its time of change; "" if the server states neither.
     parts: the parts that the copy contains, [begin, end), and the SHA-256 of each.
     """
 
@@ -84,10 +85,9 @@ class RemoteFile:
         return [(part_begin, part_end) for part_begin, part_end in parts if part_begin < part_end]
 
     def fetch(self, begin: int, end: int, on_bytes: OnBytes = lambda _: None) -> None:
-        """Fetch the bytes of [begin, end) that the copy does not contain yet.
+        """Fetch the bytes of [begin, end) that the copy does not contain yet. Raises TerrainError.
 
         on_bytes: function that is called with the size of each received chunk, bytes.
-        Raises TerrainError.
         """
         for part_begin, part_end in self.missing_parts(begin, min(end, self.size)):
             for attempt in range(_MAX_ATTEMPTS):
@@ -141,7 +141,7 @@ class RemoteFile:
                 raise _IncompleteAnswer(f"{position - begin:,} of {end - begin:,} bytes were received")
 
     def clear_copy(self) -> None:
-        """Replace the copy by an empty file of the same size, without parts.  Raises OSError."""
+        """Replace the copy by an empty file of the same size, without parts. Raises OSError."""
         _notes_path(self.copy).unlink(missing_ok=True)
         self.parts = {}
         # A new file, so that another process that reads the old one can go on.
@@ -193,7 +193,7 @@ class _TimedHead(http.client.HTTPConnection):
     """Connection whose answer's head must arrive in time; a socket's timeout starts again with each byte."""
 
     def getresponse(self) -> http.client.HTTPResponse:
-        """Return the answer after its head has arrived.  Raises OSError if the head does not arrive in time."""
+        """Return the answer after its head has arrived. Raises OSError if the head does not arrive in time."""
         is_late = threading.Event()
 
         def shut_down_connection() -> None:

@@ -19,7 +19,10 @@ class RunningClock:
     """
 
     def __init__(self, real: Callable[[], float] | None = None) -> None:
-        """Start the clock.  real: returns seconds from any epoch; the system's monotonic clock by default."""
+        """Start the clock.
+
+        real: function that returns seconds from any epoch; None for the system's monotonic clock.
+        """
         self._real = real or time.monotonic
         self._last = self._real()
         self._seconds = 0.0

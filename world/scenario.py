@@ -68,7 +68,7 @@ _Class = TypeVar("_Class")
 
 
 def _with_clear_errors(scenario_class: type[_Class]) -> type[_Class]:
-    """Decorate a class: wrong arguments raise an ArgumentError that names the function that makes a scenario."""
+    """Decorate a class: wrong arguments raise an ArgumentError that names `planfly.make_scenario`."""
     initialise = scenario_class.__init__
 
     @wraps(initialise)
@@ -329,7 +329,10 @@ def scenario_from_spec(
 
 
 def _with_absolute_paths(flight: FlightTable, base: Path | None) -> FlightTable:
-    """Return a copy of the table in which the paths of the aircraft's folder and the parameter file are absolute."""
+    """Return a copy of the table with absolute paths of the aircraft's folder and the parameter file.
+
+    base: folder of relative paths.
+    """
     changes = {}
     if names_folder(flight.aircraft):
         changes["aircraft"] = absolute_path(Path(base or "", flight.aircraft))
@@ -340,6 +343,8 @@ def _with_absolute_paths(flight: FlightTable, base: Path | None) -> FlightTable:
 
 def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
     """Return a scenario's file with its terrain replaced by an elevation file and its map origin kept.
+
+    terrain: path of the elevation file.
 
     A scenario without a stated origin has the centre of the replaced tile as its origin, which is then stated.
     """
@@ -357,7 +362,10 @@ def _replace_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path |
 def _with_file_zones(
     spec: ScenarioFile, file_zones: FileZones, source: str, origin: GeoOrigin, bounds: Floats
 ) -> ScenarioFile:
-    """Return a scenario's file with the zones of zone files that are near its area, and a note on the other zones."""
+    """Return a scenario's file with those zones of zone files that are near its area.
+
+    A note states how many zones are omitted.
+    """
     if not file_zones.zones and not file_zones.notes:
         return spec
     zones_nearby = select_near_zones(file_zones.zones, source, origin, bounds)
@@ -380,7 +388,10 @@ def _active_zones(spec: ScenarioFile) -> list[ZoneTable]:
 
 
 def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
-    """Open a scenario's elevation file; return it and the [terrain] table with its absolute path and SHA-256."""
+    """Open a scenario's elevation file; return it and the [terrain] table that identifies it.
+
+    The table has its absolute path and SHA-256.
+    """
     paths = [str(table.path)] if not isinstance(table.path, list) else table.path
     path_text = ", ".join(paths)
     try:
@@ -491,9 +502,9 @@ def with_terrain(scenario: Scenario, terrain: str) -> Scenario:
 
 
 def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
-    """Return a scenario's JSON data with the altitudes of two points as the altitudes of its start and destination.
+    """Return a scenario's JSON data with the given altitudes of start and destination.
 
-    start, destination: (3,) m, altitude AMSL.  The altitude replaces a height above ground (`height_m`).
+    start, destination: (3,) m, altitude AMSL. The altitude replaces a height above ground (`height_m`).
 
     >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
     >>> with_absolute_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
@@ -510,7 +521,9 @@ def with_absolute_ends(spec: dict[str, Any], start: Floats, destination: Floats)
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
     """Return a scenario in another wind; None keeps the present value.
 
-    speed: m/s, with from_course: direction that the wind blows from, rad.  turbulence: "none", "light" or "moderate".
+    speed, from_course: m/s, and direction that the wind blows from, rad; they only apply together.
+    turbulence: "none", "light" or "moderate".
+
     Raises ScenarioError for a wind that is not allowed in a scenario file.
 
     >>> with_wind(load_scenario("tight"), 5.0, math.radians(270.0), "light").wind.velocity_at(75.0)
@@ -590,7 +603,9 @@ def without_ground_phases(scenario: Scenario) -> Scenario:
 def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, notes: Sequence[str] = ()) -> Scenario:
     """Return a scenario with additional zones, if they are near its area.
 
-    source: name of the zones in messages.  notes: notes on reading their file.
+    source: name of the zones in messages.
+    notes: notes on reading their file.
+
     Raises ScenarioError for an invalid shape, for a level above ground without terrain, and for more zones than a
     scenario may have; also for a zone that an end violates, except in an external scenario.
 
@@ -614,7 +629,9 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str, not
 def with_flight_time(scenario: Scenario, at: str | None) -> Scenario:
     """Return a scenario with another time of flight; None keeps the present time.
 
-    at: time span as `world.airspace.zone_times.parse_span` reads it.  Raises ScenarioError for an invalid time.
+    at: time span as `world.airspace.zone_times.parse_span` reads it.
+
+    Raises ScenarioError for an invalid time.
 
     >>> with_flight_time(load_scenario("tight"), "2026-05-01T10:00Z").spec.at
     '2026-05-01T10:00Z'
@@ -639,10 +656,11 @@ def with_threats(
     """Return a scenario with additional threats on the ground.
 
     added_threats: east, north, kill radius and detection radius of each, m; a radius of 0 for no missile or radar.
+    source: name of the threats in messages.
+    preceding: tables to insert before the added threats.
+
     The ratio of scale to radius is the median of the scenario's threats, or a quarter for kill and a third for
-    detection.
-    source: name of the threats in messages.  preceding: tables to insert before the added threats.
-    Raises ScenarioError for a threat that is not allowed in a scenario file.
+    detection. Raises ScenarioError for a threat that is not allowed in a scenario file.
 
     >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
     >>> more.threats.names[-1], float(more.threats.kill_radius[-1])
@@ -650,6 +668,7 @@ def with_threats(
     """
 
     def scale_ratio(radius: Floats, scale: Floats, default: float) -> float:
+        """Return the median ratio of scale to radius, or a default without any radius."""
         has_radius = radius > 0.0
         return float(np.median(scale[has_radius] / radius[has_radius])) if has_radius.any() else default
 
@@ -670,7 +689,10 @@ def with_threats(
 
 
 def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
-    """Return a scenario with changed keys of [planner]; ``source`` names the change in messages.
+    """Return a scenario with changed keys of [planner].
+
+    source: name of the change in messages.
+    changes: values by key.
 
     Raises ScenarioError for a value that is not allowed in a scenario file.
 

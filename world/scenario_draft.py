@@ -54,8 +54,10 @@ class Draft:
 
     terrain: path of the elevation file as the scenario states it; None for flat ground at mean sea level.
     start, destination: positions at `height` m above ground.
-    box: [[east0, east1], [north0, north1]] m about `origin`.  ceiling: m above mean sea level.
-    aircraft, autopilot: see [flight].  version: release of the autopilot, None for the newest.
+    box: [[east0, east1], [north0, north1]] m about `origin`.
+    ceiling: m above mean sea level.
+    aircraft, autopilot: see [flight].
+    version: release of the autopilot, None for the newest.
     airspeed: cruise speed of the aircraft, m/s.
     """
 
@@ -94,10 +96,11 @@ def make_draft(
     """Make the draft of a scenario for a flight from a start to a destination.
 
     height: height of start and destination above ground, m.
-    raster: elevation file; None for flat ground.  terrain: path of that file as the scenario file states it.
+    raster: elevation file; None for flat ground.
+    terrain: path of that file as the scenario file states it.
+
     The area extends about a third of the line's length beyond the line on all sides, clipped to the elevation file's
-    data.
-    Raises ArgumentError for positions that are outside the file, or too near to or too far from each other, and
+    data. Raises ArgumentError for positions that are outside the file, or too near to or too far from each other, and
     TerrainError if there is no data even near the line.
     """
     east, north = (float(value) for value in to_map(GeoOrigin(*start), destination.lat, destination.lon))
@@ -127,12 +130,14 @@ def make_draft(
 def _survey_ground(
     raster: RasterFile, origin: GeoOrigin, positions: Mapping[str, GeoPosition], endpoints: Floats, margin: float
 ) -> tuple[Floats, float]:
-    """Return an area around start and destination that has elevation data, (2, 2) m, and its highest ground, m.
+    """Return an area around start and destination that has elevation data, and its highest ground, m.
 
-    positions: start and destination, by their keywords.  endpoints: the same two positions on the map, (2, 2) m.
+    positions: start and destination, by their keywords.
+    endpoints: the same two positions on the map, (2, 2) m.
     margin: largest width of the area around the positions, m; smaller widths are tried if data is missing.
 
-    Raises ArgumentError for a position that the file does not cover, and TerrainError if every width lacks data.
+    The area is (2, 2) m. Raises ArgumentError for a position that the file does not cover, and TerrainError if every
+    width lacks data.
     """
     for fraction in _MARGIN_REDUCTIONS:
         bounds = _clip_to_file(_enclosing_box(endpoints, fraction * margin), raster, origin)
@@ -149,7 +154,10 @@ def _survey_ground(
 
 
 def _enclosing_box(endpoints: Floats, margin: float) -> Floats:
-    """Return the box around two positions with a margin (m) on all sides, (2, 2) m.  endpoints: (2, 2) m."""
+    """Return the box around two positions with a margin (m) on all sides, (2, 2) m.
+
+    endpoints: (2, 2) m.
+    """
     return np.stack([endpoints.min(axis=0) - margin, endpoints.max(axis=0) + margin], axis=1)
 
 
@@ -171,7 +179,7 @@ def _clip_to_file(area: Floats, raster: RasterFile, origin: GeoOrigin) -> Floats
 
 
 def draft_text(draft: Draft) -> str:
-    """Write the scenario file of a draft as TOML text.
+    """Return the scenario file of a draft as TOML text.
 
     >>> start, destination = GeoPosition(46.5, 8.0), GeoPosition(46.55, 8.05)
     >>> print(draft_text(make_draft("site", start, destination, 120.0)).split("[area]")[0])
@@ -308,7 +316,10 @@ def _flight_text(draft: Draft) -> str:
 
 
 def _examples_text(draft: Draft) -> str:
-    """Return the commented examples: a threat and a zone near the straight line, small enough to fly around."""
+    """Return the commented examples of a scenario file: a threat and a zone near the straight line.
+
+    They are small enough to fly around.
+    """
     radius = max(50.0, round(float(np.diff(draft.box, axis=1).min()) / 200.0) * 10.0)
     threat, zone = (
         GeoPosition(*(float(degrees) for degrees in to_geo(draft.origin, *point)))
@@ -341,7 +352,7 @@ def _examples_text(draft: Draft) -> str:
 
 
 def _example_positions(draft: Draft, radius: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return two positions for examples, (east, north) m: one on each side of the line from start to destination.
+    """Return two positions for examples, (east, north) m, one on each side of the straight line.
 
     Each is a third of the line's length from one end, and half of ``radius`` (m) off the line.
     """

@@ -19,11 +19,12 @@ MAX_BYTES = 16 * 2**20
 
 
 def parse_scenario(text: str, source: str) -> ScenarioFile:
-    """Parse and check the text of a TOML scenario file; ``source`` names the file in messages.
+    """Parse and check the text of a TOML scenario file.
 
-    Sets `aircraft_by_default` if the text names no aircraft.
+    source: name of the file in messages.
 
-    Raises ScenarioError with one line: file, key, value and what is allowed.
+    Sets `aircraft_by_default` if the text names no aircraft. Raises ScenarioError with one line: file, key, value and
+    what is allowed.
     """
     try:
         data = toml_table(text)
@@ -58,7 +59,10 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
 
 
 def checked_table(make_table: Callable[[], Table], source: str) -> Table:
-    """Return the table that a function makes; convert pydantic's error to a ScenarioError about ``source``."""
+    """Return the table that a function makes, with pydantic's error as a ScenarioError.
+
+    source: name of the file in messages.
+    """
     try:
         return make_table()
     except ValidationError as error:
@@ -66,7 +70,7 @@ def checked_table(make_table: Callable[[], Table], source: str) -> Table:
 
 
 def read_scenario_text(path: Path) -> str:
-    """Read the text of a scenario file.  Raises ScenarioError if it is missing, too large or not UTF-8."""
+    """Read the text of a scenario file. Raises ScenarioError if it is missing, too large or not UTF-8."""
     data = read_small_file(path, MAX_BYTES, "scenario", ScenarioError)
     try:
         return data.decode("utf-8-sig")
@@ -77,7 +81,9 @@ def read_scenario_text(path: Path) -> str:
 class Fault(NamedTuple):
     """Invalid value in a file.
 
-    field: key of the value.  value: the value; None if it is missing, a table or a list.  allowed: the expected values.
+    field: key of the value.
+    value: the value; None if it is missing, a table or a list.
+    allowed: the expected values.
     text: the fault as it appears in a message.
     """
 
@@ -89,7 +95,8 @@ class Fault(NamedTuple):
     def at(self, source: str, part: str = "") -> dict[str, Any]:
         """Return the arguments of a `PlanflyError` about this fault.
 
-        source: name of the file.  part: part of the file that has the fault; "" for the whole file.
+        source: name of the file.
+        part: part of the file that has the fault; "" for the whole file.
         """
         location = f"{source}: {part}" if part else source
         message = f"{location}: {self.text}"
@@ -165,7 +172,7 @@ def _known_keys(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]
 
 
 def _data_keys(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
-    """Return the parts of a location that are keys of the data; omit the names of pydantic's union branches."""
+    """Return the parts of a location that are keys of the data, without pydantic's union branches."""
     keys = []
     for part in parts:
         known_keys = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()

@@ -31,12 +31,13 @@ def in_range(
 ) -> AfterValidator:
     """Make a validator that allows ``min_value``..``max_value`` and names this range in its error.
 
-    exclude_min, exclude_max: exclude ``min_value``, exclude ``max_value``.
+    exclude_min, exclude_max: True to exclude ``min_value`` or ``max_value``.
     also: text for the message about other values that the field takes.
     """
 
     def check(value: float) -> float:
         # The comparisons are written so that NaN fails.
+        """Return the value; raise ValueError outside the range."""
         if (min_value < value if exclude_min else min_value <= value) and (
             value < max_value if exclude_max else value <= max_value
         ):
@@ -194,7 +195,10 @@ class PeakTable(ScenarioTable):
 
 
 def _check_datum(datum: StatedDatum) -> StatedDatum:
-    """Return the datum; raise ValueError unless it is a known name or a plausible height of mean sea level, m."""
+    """Return the datum; raise ValueError unless it is a known name or a plausible height, m.
+
+    The height is that of mean sea level in the file.
+    """
     names = get_args(NamedDatum)
     if datum in names or (not isinstance(datum, str) and abs(datum) <= MAX_SEA_LEVEL):
         return datum
@@ -430,8 +434,8 @@ _PX4 = "px4"
 class Steering(NamedTuple):
     """Autopilot, guidance law and navigation accuracy of a flight.
 
-    autopilot: "ardupilot" for ArduPlane's laws, "planfly" for planfly's guidance, or another one of
-    `flight.autopilots.catalog`.
+    autopilot: "ardupilot" for ArduPlane's laws, "planfly" for planfly's guidance, or another autopilot of
+        `flight.autopilots.catalog`.
     guidance: the guidance law of "planfly"; other autopilots ignore it.
     nav: navigation accuracy, a key of `flight.guidance.navigation_error.ERRORS`.
     """
@@ -501,7 +505,10 @@ class FlightTable(ScenarioTable):
         return Steering(autopilot, self.guidance or "path", self.nav or default_nav)
 
     def with_stated_defaults(self) -> "FlightTable":
-        """Return a copy with the default autopilot, release and navigation as entries, as plans and logs store it."""
+        """Return a copy with the default autopilot, release and navigation as entries.
+
+        Plans and logs store a flight in this form.
+        """
         autopilot, guidance, nav = self.steering
         autopilot_entries: dict[str, str] = (
             {"autopilot": autopilot} if autopilot != OWN_GUIDANCE else {"guidance": guidance}
@@ -524,7 +531,7 @@ class WindTable(ScenarioTable):
 
 
 class HomeTable(PositionTable):
-    """[home]: the position on the ground where the mission begins; place = "start" for the ground below the start."""
+    """[home]: position on the ground where the mission begins; place = "start" for the ground below it."""
 
     place: Literal["start"] | None = None
 
@@ -590,6 +597,7 @@ _OR_WIND = ', or "wind"'
 
 
 def _check_course(value: Any) -> Any:
+    """Return the value; raise ValueError unless it is a number or "wind"."""
     if value != "wind" and (isinstance(value, bool) or not isinstance(value, int | float)):
         raise ValueError(f"allowed -360..360{_OR_WIND}")
     return value
@@ -633,7 +641,10 @@ class RallyTable(PointTable):
 
 
 def _check_autoland(value: Any) -> Any:
-    """Return the value; raise ValueError if it is not one of RTL_AUTOLAND, also for true and 1.0, which equal 1."""
+    """Return the value; raise ValueError if it is not one of RTL_AUTOLAND.
+
+    True and 1.0, which equal 1, are not allowed either.
+    """
     if type(value) is not int or value not in (1, 2, 3):
         raise ValueError("allowed 1, 2 or 3")
     return value

@@ -31,7 +31,7 @@ class Terrain:
 
     heights: (rows, cols) float32 m at pixel centres, NaN if there is no data.
     to_pixel: map (east, north) to fractional (col, row).
-    spacing: the finer pixel pitch, m.
+    spacing: smaller spacing of the pixels, of both directions, m.
     source, sha256: name and hash of the elevation file.
     datum: vertical datum that the file states.
     vertical_error: error that the file states, m, or None.
@@ -54,19 +54,21 @@ class Terrain:
         object.__setattr__(self, "heights", heights)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle with a function that locks the raster again, as compiled code distinguishes writable arrays."""
+        """Pickle with a function that locks the raster again: compiled code distinguishes writable arrays."""
         return _rebuild_terrain, tuple(getattr(self, field.name) for field in fields(self))
 
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
-        """Return the ground height at map positions of any shape, m AMSL; NaN outside the raster or without data."""
+        """Return the ground height at map positions of any shape, m AMSL; NaN without data or off the raster."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
         return _ground_heights(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
-        """Return the smallest height of the segment a-b above ground, m, and its position as a fraction of the segment.
+        """Return the smallest height of the segment a-b above ground, m, and its position.
 
-        a, b: (3,) m.  The height is exact for the bilinearly interpolated ground, and NaN if the segment leaves the
-        raster or its data.
+        a, b: (3,) m.
+
+        The position is a fraction of the segment. The height is exact for the bilinearly interpolated ground, and NaN
+        if the segment leaves the raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
         clearance, fraction = segment_clearance(self.heights, self.to_pixel.record, start, end)
@@ -81,7 +83,7 @@ def _rebuild_terrain(heights: Heights, *others: Any) -> Terrain:
 
 @inlined
 def pixel_height(heights: Heights, col: float, row: float) -> float:
-    """Return the bilinearly interpolated height at fractional pixel coordinates, m; NaN outside the raster.
+    """Return the bilinearly interpolated height at fractional pixel coordinates, m; NaN off the raster.
 
     The raster extends `EDGE_TOLERANCE` beyond the outer pixel centres.
     """
@@ -102,11 +104,12 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:
 
 
 @compiled
-def steepest_slopes(heights: Heights, pitch: float) -> Heights:
+def steepest_slopes(heights: Heights, spacing: float) -> Heights:
     """Return an upper bound of the slope of the bilinearly interpolated ground in each tile, m per m.
 
-    A tile has `TILE_PIXELS` x `TILE_PIXELS` cells.  Pixels without data (NaN) are ignored.
-    pitch: distance between pixels, m.
+    spacing: distance between pixels, m.
+
+    A tile has `TILE_PIXELS` x `TILE_PIXELS` cells. Pixels without data (NaN) are ignored.
     """
     rows, cols = heights.shape
     tiles = np.zeros(((rows - 2) // TILE_PIXELS + 1, (cols - 2) // TILE_PIXELS + 1), dtype=np.float32)
@@ -121,13 +124,13 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:
     for i in range(tiles.shape[0]):
         for j in range(tiles.shape[1]):
             # Slightly more, to cover the rounding of single precision.
-            tiles[i, j] = math.sqrt(tiles[i, j]) / pitch * (1.0 + 1e-6)
+            tiles[i, j] = math.sqrt(tiles[i, j]) / spacing * (1.0 + 1e-6)
     return tiles
 
 
 @inlined
 def ground_height(heights: Heights, to_pixel: PolyMapRecord, east: float, north: float) -> float:
-    """Return the ground height at one map position; NaN outside the raster."""
+    """Return the ground height at one map position, m AMSL; NaN outside the raster."""
     col, row = polymap(to_pixel, east, north)
     return pixel_height(heights, col, row)
 
@@ -144,9 +147,10 @@ def _ground_heights(
 
 @compiled
 def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats) -> tuple[float, float]:
-    """Return the smallest height of the segment a-b above the bilinearly interpolated ground, m, and its position.
+    """Return the smallest height of the segment a-b above ground, m, and its position.
 
-    The position is a fraction of the segment.  The height is NaN if the segment leaves the raster.
+    The position is a fraction of the segment. The ground is interpolated bilinearly. The height is NaN if the segment
+    leaves the raster.
     """
     piece_count = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE_M))
     min_clearance = math.inf
@@ -170,7 +174,7 @@ def segment_clearance(heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: F
 
 @inlined
 def _next_crossing(start: float, step: float, fraction: float) -> float:
-    """Return the next larger fraction at which start + fraction * step is a whole number; inf if there is none."""
+    """Return the next larger fraction at which start + fraction * step is a whole number; inf if none."""
     if step == 0.0:
         return math.inf
     position = start + fraction * step
@@ -240,7 +244,8 @@ def make_gridded_terrain(
 ) -> Terrain:
     """Make terrain from heights on a regular grid.
 
-    heights: (n, e) m.  east: (e,) and north: (n,) m, evenly increasing.
+    heights: (n, e) m.
+    east, north: (e,) and (n,) m, evenly increasing.
     """
     step_e, step_n = east[1] - east[0], north[1] - north[0]
     to_pixel = fit_polymap(
@@ -254,7 +259,8 @@ def make_gridded_terrain(
 def make_flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
     """Make level ground at an altitude (m AMSL).
 
-    bounds: [[e0, e1], [n0, n1]] m.  buffer: width of terrain around the bounds, m.
+    bounds: [[e0, e1], [n0, n1]] m.
+    buffer: width of terrain around the bounds, m.
     """
     east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
     north = np.linspace(bounds[1, 0] - buffer, bounds[1, 1] + buffer, 3)
@@ -275,15 +281,18 @@ class Peak(NamedTuple):
 def make_peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terrain:
     """Make terrain of Gaussian hills on level ground at sea level.
 
-    bounds: [[e0, e1], [n0, n1]] m.  buffer: width of terrain around the bounds, m.
-    The grid pitch is a sixteenth of the smallest sigma (at most 1,500 pixels a side), which keeps each summit within
+    bounds: [[e0, e1], [n0, n1]] m.
+    buffer: width of terrain around the bounds, m.
+
+    The grid spacing is a sixteenth of the smallest sigma (at most 1,500 pixels a side), which keeps each summit within
     0.05 % of its height.
     """
     width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * buffer
-    pitch = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
+    spacing = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
 
     def axis(minimum: float, maximum: float) -> Floats:
-        return np.linspace(minimum - buffer, maximum + buffer, 2 + int((maximum - minimum + 2 * buffer) / pitch))
+        """Return evenly spaced coordinates of an axis, with the buffer on both sides, m."""
+        return np.linspace(minimum - buffer, maximum + buffer, 2 + int((maximum - minimum + 2 * buffer) / spacing))
 
     east, north = axis(*bounds[0]), axis(*bounds[1])
     heights = np.zeros((north.size, east.size))

@@ -54,9 +54,12 @@ class Box(NamedTuple):
 class CutTerrain(NamedTuple):
     """Summary of the written file.
 
-    file: the GeoTIFF.  shape: its rows and columns.  tiles: names of its source tiles.
+    file: the GeoTIFF.
+    shape: its rows and columns.
+    tiles: names of its source tiles.
     absent: degrees (south-west corners) for which the server has no tile.
-    empty: pixels without data.  fetched: bytes received from the server.
+    empty: pixels without data.
+    fetched: bytes received from the server.
     """
 
     file: Path
@@ -72,7 +75,7 @@ class CutTerrain(NamedTuple):
 
 
 def cut_from_files(source: Path, box: Box, out: Path) -> CutTerrain:
-    """Write the part of local tiles that covers an area, in their own reference system and on their own grid.
+    """Write the part of local tiles that covers an area, in their reference system and on their grid.
 
     Raises TerrainError if the tiles do not reach beyond the area, have no data in it, or cannot be read.
     """
@@ -88,7 +91,7 @@ def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
 
     Raises TerrainError if the raster does not cover the area.
     """
-    col, row = raster.to_pixels(*_outline(box))
+    col, row = raster.to_pixels(*_box_outline(box))
     rows, cols = raster.shape
     if not (col.min() >= 0.0 and row.min() >= 0.0 and col.max() <= cols - 1 and row.max() <= rows - 1):
         south, west, north, east = box
@@ -100,7 +103,7 @@ def _window(raster: RasterFile, box: Box) -> tuple[int, int, int, int]:
     return top, min(rows, math.ceil(row.max()) + 2), left, min(cols, math.ceil(col.max()) + 2)
 
 
-def _outline(box: Box) -> tuple[Floats, Floats]:
+def _box_outline(box: Box) -> tuple[Floats, Floats]:
     """Return longitudes and latitudes of points along the edge of an area, deg."""
     ramp = np.linspace(0.0, 1.0, 41)
     lons, lats = box.west + ramp * (box.east - box.west), box.south + ramp * (box.north - box.south)
@@ -114,7 +117,10 @@ def _count_empty(heights: Heights) -> int:
 
 
 def _write_geotiff(out: Path, heights: Heights, grid: Sequence[float], crs: str) -> None:
-    """Write a GeoTIFF atomically.  grid: affine coefficients that convert columns and rows to coordinates."""
+    """Write a GeoTIFF atomically.
+
+    grid: affine coefficients that convert columns and rows to coordinates.
+    """
     if heights.size > MAX_PIXELS:
         message = f"{heights.size:,} pixels; at most {MAX_PIXELS:,} are written"
         raise TerrainError(f"{out}: {message}", file=out, value=heights.size, allowed=message)
@@ -139,7 +145,9 @@ def tile_name(lat: int, lon: int) -> str:
 
 
 def degree_corners(box: Box) -> list[tuple[int, int]]:
-    """Return the south-west corners of the one-degree squares that an area touches; longitudes in -180..179.
+    """Return the south-west corners of the one-degree squares that an area touches.
+
+    Longitudes are in -180..179.
 
     >>> degree_corners(Box(46.9, 8.2, 47.1, 8.3)), degree_corners(Box(-0.1, 179.9, 0.0, 180.1))
     ([(46, 8), (47, 8)], [(-1, 179), (-1, -180), (0, 179), (0, -180)])
@@ -152,11 +160,14 @@ def degree_corners(box: Box) -> list[tuple[int, int]]:
 def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: CutProgress, *, sea: bool) -> CutTerrain:
     """Fetch the part of a server's tiles that covers an area, and write it as one GeoTIFF.
 
-    server: the address of the folder of tiles.  cache: folder for the fetched parts.  progress: progress callback.
+    server: the address of the folder of tiles.
+    cache: folder for the fetched parts.
+    progress: progress callback.
     sea: True if degrees without a tile are sea, at 0 m; otherwise they have no data.
-    Where tiles of different pitch meet (at latitudes of 50, 60, 70, 75, 80 and 85 degrees), the coarser tiles are
-    interpolated to the grid of the finest tile.
-    Raises TerrainError if the server cannot be reached or does not answer as expected.
+
+    Where tiles of different pixel size meet (at latitudes of 50, 60, 70, 75, 80 and 85 degrees), the coarser tiles are
+    interpolated to the grid of the finest tile. Raises TerrainError if the server cannot be reached or does not answer
+    as expected.
     """
     # The edge of a tile is half a pixel off its degree: an area close to that edge needs the neighbouring tile, too.
     fetched_box = Box(box.south - 0.001, box.west - 0.001, box.north + 0.001, box.east + 0.001)
@@ -196,7 +207,7 @@ def cut_from_server(server: str, box: Box, out: Path, cache: Path, progress: Cut
 
 
 def _fetch_tile(remote: RemoteFile, box: Box, count_bytes: Callable[[int], None]) -> RasterFile:
-    """Fetch the blocks of a tile that cover an area, and open the tile's copy.  Raises TerrainError.
+    """Fetch the blocks of a tile that cover an area, and open the tile's copy. Raises TerrainError.
 
     A copy that cannot be read, for example after a power cut or because of a proxy, is fetched a second time.
     """
@@ -222,10 +233,11 @@ class _UnreadableError(Exception):
 
 
 def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Sequence[int]) -> RasterFile:
-    """Fetch the directory of a tile, and open its copy.  Raises TerrainError and _UnreadableError.
+    """Fetch the directory of a tile, and open its copy. Raises TerrainError and _UnreadableError.
 
-    sizes: numbers of bytes to fetch from the start of the file, tried in turn.  The directory may be longer than in a
-    cloud-optimised file, or at the end of the file.
+    sizes: numbers of bytes to fetch from the start of the file, tried in turn.
+
+    The directory may be longer than in a cloud-optimised file, or at the end of the file.
     """
     for size in sizes:
         remote.fetch(0, size, count_bytes)
@@ -246,7 +258,7 @@ def _open_copy(remote: RemoteFile, count_bytes: Callable[[int], None], sizes: Se
 
 def _padded_window(tile: RasterFile, box: Box) -> tuple[int, int, int, int]:
     """Return the window of a tile that covers an area, with a margin for interpolation to another grid."""
-    col, row = tile.to_pixels(*_outline(box))
+    col, row = tile.to_pixels(*_box_outline(box))
     rows, cols = tile.shape
     ends = (
         (row.min() - _MARGIN_PIXELS, row.max() + _MARGIN_PIXELS + 2.0),
@@ -266,7 +278,8 @@ _PIXEL_TOLERANCE = 1e-3
 class _PlacedTile(NamedTuple):
     """Tile with its grid of longitudes and latitudes.
 
-    west, north: outer edges, deg; the longitude is in the same turn as the area.  dx, dy: size of a pixel, deg.
+    west, north: outer edges, deg; the longitude is in the same turn as the area.
+    dx, dy: size of a pixel, deg.
     """
 
     raster: RasterFile
@@ -277,7 +290,12 @@ class _PlacedTile(NamedTuple):
 
 
 def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedTile:
-    """Determine the grid of a degree's tile, with longitudes in the same turn as the area.  Raises TerrainError."""
+    """Determine the grid of a degree's tile, with longitudes in the same turn as the area.
+
+    degree: south-west corner of the tile.
+
+    Raises TerrainError if the tile has another grid.
+    """
     dx, column_skew, west, row_skew, dy, north = tile.grid
     if column_skew or row_skew or not dx > 0.0 > dy:
         raise TerrainError(f"{tile.name}: expected a grid of longitudes and latitudes", file=tile.name)
@@ -295,7 +313,10 @@ def _place_tile(tile: RasterFile, degree: tuple[int, int], box: Box) -> _PlacedT
 
 
 def _merge_tiles(tiles: list[_PlacedTile], box: Box) -> tuple[Heights, tuple[float, ...]]:
-    """Return the heights of an area on the grid of the finest tile, and that grid; NaN where there is no tile."""
+    """Return the heights of an area on the grid of the finest tile, and that grid.
+
+    Heights are NaN where there is no tile.
+    """
     finest = min(tiles, key=lambda tile: tile.dx)
     # First and last pixels whose centres enclose the area, relative to the first pixel of the finest tile.
     left = math.floor((box.west - finest.west) / finest.dx - 0.5 + _PIXEL_TOLERANCE)
@@ -354,7 +375,10 @@ def _interpolate(tile_heights: Heights, row: Floats, col: Floats) -> Heights:
 
 
 def _fill_sea(heights: Heights, grid: Sequence[float], sea_degrees: Sequence[tuple[int, int]]) -> None:
-    """Set missing heights to 0 m in one-degree squares at sea.  sea_degrees: their south-west corners."""
+    """Set missing heights to 0 m in one-degree squares at sea.
+
+    sea_degrees: south-west corners of these squares.
+    """
     dx, _, west, _, dy, north = grid
     lon, lat = west + (np.arange(heights.shape[1]) + 0.5) * dx, north + (np.arange(len(heights)) + 0.5) * dy
     for south_degree, west_degree in sea_degrees:

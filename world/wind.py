@@ -52,7 +52,7 @@ class Wind:
         return self.from_course + math.pi
 
     def velocity_at(self, amsl: float) -> tuple[float, float]:
-        """Return the east and north components of the mean wind at an altitude (m AMSL), m/s.
+        """Return the east and north components of the mean wind (m/s) at an altitude (m AMSL).
 
         >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).velocity_at(700.0)
         (-0.0, -10.0)
@@ -73,11 +73,11 @@ class Wind:
         return np.column_stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)])
 
     def max_speed_at(self, amsl: Floats) -> float:
-        """Return the highest mean wind speed at any of these altitudes (m AMSL), m/s."""
+        """Return the highest mean wind speed (m/s) at any of these altitudes (m AMSL)."""
         return max(math.hypot(*self.velocity_at(float(altitude))) for altitude in amsl)
 
     def components_on_course(self, course: float, amsl: float) -> tuple[float, float]:
-        """Return the tailwind and the crosswind on a course (rad) at an altitude (m AMSL), m/s.
+        """Return the tailwind and the crosswind (m/s) on a course (rad) at an altitude (m AMSL).
 
         A crosswind from the left is positive.
         """

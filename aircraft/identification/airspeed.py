@@ -30,7 +30,7 @@ _THINNING = 25
 
 
 def with_airspeed_scale(signals: Signals, flow: Flow) -> Signals:
-    """Return signals with the airspeed scaled to fit the wind triangle, and with the scale's standard deviation."""
+    """Scale the airspeed to fit the wind triangle; return the signals with the scale and its deviation."""
     factor, sd = airspeed_scale(signals, flow)
     return replace(signals, airspeed=signals.airspeed * factor, airspeed_factor=factor, airspeed_sd=sd)
 
@@ -43,40 +43,42 @@ def airspeed_scale(signals: Signals, flow: Flow) -> tuple[float, float]:
     from scipy.signal import lfilter
 
     north_air, east_air = _air_velocity(signals, flow)
-    thinned = signals.thin(_THINNING, {"ahead": north_air, "right": east_air})
-    north_air, east_air = thinned.extra["ahead"], thinned.extra["right"]
+    thinned = signals.thin(_THINNING, {"north_air": north_air, "east_air": east_air})
+    north_air, east_air = thinned.extra["north_air"], thinned.extra["east_air"]
     north, east, _ = thinned.velocity.T
-    stretches = list(zip(thinned.edges[:-1], thinned.edges[1:], strict=True))
+    row_ranges = list(zip(thinned.edges[:-1], thinned.edges[1:], strict=True))
     # Wind is ground velocity minus air velocity; an error of the heading rotates the air velocity. A gust changes the
     # wind, the airspeed and the direction of the air velocity, and after a while the ground velocity, since the
     # aircraft drifts with the gust: a regressor that contains the gust would bias the scale. The regressor is therefore
     # the mean airspeed along the flown course, smoothed over the time in which gusts change.
     mean_air = np.empty((2, len(north_air)))
-    for first, last in stretches:
+    for first, last in row_ranges:
         rows = slice(first, last)
         ground, air = np.column_stack([north[rows], east[rows]]), np.column_stack([north_air[rows], east_air[rows]])
         course = low_pass(ground - (ground - air).mean(axis=0), 1.0 / _GUST_TIME_S, thinned.hertz)
         length = np.maximum(1.0, np.hypot(*course.T))
         mean_air[:, rows] = (thinned.airspeed[rows].mean() / length)[np.newaxis, :] * course.T
     columns = [(mean_air[0], mean_air[1]), (-mean_air[1], mean_air[0])]
-    for first, last in stretches:
+    for first, last in row_ranges:
         indicator = np.zeros(len(north_air))
         indicator[first:last] = 1.0
         columns += [(indicator, 0.0 * indicator), (0.0 * indicator, indicator)]
     decay = float(np.exp(-1.0 / (_GUST_TIME_S * thinned.hertz)))
 
     def innovations(values: Floats) -> Floats:
-        """Return the innovations of a process with correlation time `_GUST_TIME_S`, each stretch separately."""
+        """Whiten values (n,) with the correlation time `_GUST_TIME_S`, each record separately."""
         filtered = np.empty_like(values)
-        for first, last in stretches:
-            stretch = values[first:last]
-            filtered[first:last] = lfilter([1.0, -decay], [1.0], stretch, zi=np.array([-decay * stretch[0]]))[0]
-            filtered[first] = stretch[0] * np.sqrt(1.0 - decay * decay)
+        for first, last in row_ranges:
+            record_values = values[first:last]
+            filtered[first:last] = lfilter(
+                [1.0, -decay], [1.0], record_values, zi=np.array([-decay * record_values[0]])
+            )[0]
+            filtered[first] = record_values[0] * np.sqrt(1.0 - decay * decay)
         return filtered
 
     regressors = np.column_stack([np.concatenate([innovations(a), innovations(b)]) for a, b in columns])
     targets = np.concatenate([innovations(north - north_air), innovations(east - east_air)])
-    sds = np.concatenate([[SCALE_SD, _HEADING_SD_RAD], np.full(2 * len(stretches), _WIND_SD_MPS)])
+    sds = np.concatenate([[SCALE_SD, _HEADING_SD_RAD], np.full(2 * len(row_ranges), _WIND_SD_MPS)])
     blocks = np.concatenate([thinned.block, thinned.block + thinned.block.max() + 1])
     fit = fit_with_prior(regressors, targets, np.zeros(len(sds)), sds, blocks)
     return 1.0 + float(fit.estimate[0]), float(np.hypot(_MIN_SD, np.sqrt(fit.covariance[0, 0])))

@@ -37,7 +37,7 @@ class Clocks:
 
 @dataclass(frozen=True, slots=True)
 class Signals:
-    """The signals of all stretches of some logs in sequence, delayed like the accelerometers.
+    """Signals of flight records, concatenated and delayed like the accelerometers.
 
     The fields are as in `FlightRecord`, (n,) or (n, k), and in addition:
 
@@ -46,7 +46,7 @@ class Signals:
     surfaces: (n, 3) elevator, aileron, rudder after the servos' lag, rad.
     airspeed_factor: factor that the airspeed was multiplied with.
     airspeed_sd: relative standard deviation of the airspeed.
-    edges: first row of each stretch, and at the end the number of rows.
+    edges: first row of each record, and at the end the number of rows.
     block: (n,) number of the time block of each row.
     hertz: samples per second.
     extra: further columns by name.
@@ -72,7 +72,7 @@ class Signals:
     extra: Mapping[str, Floats] = field(default_factory=dict)
 
     def smooth(self, values: Floats, cutoff: float) -> Floats:
-        """Return low-passed values; each stretch is filtered separately.
+        """Return low-passed values; each record is filtered separately.
 
         values: (n,) or (n, k).
         cutoff: Hz.
@@ -83,7 +83,7 @@ class Signals:
         return smoothed
 
     def thin(self, step: int, extra: Mapping[str, Floats]) -> "Signals":
-        """Low-pass the signals and return every ``step``-th row, in each stretch.
+        """Low-pass the signals, and return every ``step``-th row of each record.
 
         extra: further columns (n,) by name, which are thinned in the same way.
         """
@@ -114,7 +114,7 @@ class Signals:
         )
 
     def delay(self, values: Floats, delay: float) -> Floats:
-        """Return values delayed by ``delay`` (s); each stretch is delayed separately."""
+        """Return values delayed by ``delay`` (s); each record is delayed separately."""
         delayed_values = np.empty_like(values)
         for first, last in zip(self.edges[:-1], self.edges[1:], strict=True):
             delayed_values[first:last] = apply_delay(values[first:last], delay)
@@ -144,9 +144,9 @@ _AIRSPEED_CUTOFF_HZ = 2.0
 
 
 def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: float) -> Signals:
-    """Join the signals of stretches in sequence, each delayed like its accelerometers.
+    """Concatenate flight records, and delay their signals like the accelerometers.
 
-    clocks: lags and delays of each stretch.
+    clocks: lags and delays of each record.
     motor_lag: time constant of the motor, s.
     """
     parts: dict[str, list[Floats]] = {}
@@ -154,6 +154,7 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
     for record, clock in zip(records, clocks, strict=True):
 
         def delay_signal(values: Floats, clock: Clocks = clock) -> Floats:
+            """Apply the lag and the delay of the accelerometers to a signal of the gyros' time."""
             return apply_delay(apply_lag(values, clock.lag), clock.delay)
 
         rates = delay_signal(record.rates)
@@ -185,10 +186,13 @@ def align(records: Sequence[FlightRecord], clocks: Sequence[Clocks], motor_lag: 
 
 
 def invert_first_order_lag(values: Floats, lag: float, hertz: float) -> Floats:
-    """Return the input of a first-order lag from its output: the output plus the lag times its rate of change.
+    """Return the input of a first-order lag from its output.
 
     values: output, (n,) or (n, k).
     lag: time constant, s.
+    hertz: samples per second.
+
+    The input is the output plus the lag times the output's rate of change.
 
     >>> invert_first_order_lag(np.arange(4.0), 0.5, 10.0)
     array([5., 6., 7., 8.])
@@ -209,9 +213,9 @@ _SIMPLEX_STEPS_S = np.diag([0.02, 0.02, 0.03, 0.02])
 
 
 def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
-    """Find the clocks with the smallest misfit, first on a grid and then by a simplex search (Nelder and Mead 1965).
+    """Find the clocks with the smallest misfit, by a grid and a simplex search (Nelder and Mead 1965).
 
-    misfit: function that returns how badly the signals are explained with some clocks.
+    misfit: function that returns the misfit between signals and model for given clocks.
 
     >>> found = find_clocks(lambda clock: abs(clock.lag - 0.05) + abs(clock.delay - 0.03) + clock.servo_lag)
     >>> round(found.lag, 2), round(found.delay, 2), round(found.servo_lag, 2)
@@ -220,6 +224,7 @@ def find_clocks(misfit: Callable[[Clocks], float]) -> Clocks:
     from scipy.optimize import minimize
 
     def cost(values: Floats) -> float:
+        """Return the misfit of the nearest clocks within `_LIMITS_S`, plus a penalty for the distance to them."""
         clipped = np.clip(values, *_LIMITS_S)
         return misfit(Clocks(*clipped.tolist())) + 100.0 * float(np.abs(values - clipped).sum())
 

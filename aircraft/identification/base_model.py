@@ -7,15 +7,16 @@ from aircraft.identification.motor import Motor
 
 @dataclass(frozen=True, slots=True)
 class Coefficients:
-    """Dimensionless coefficients about steady flight, per rad of an angle and per rad of rate x length / (2 V).
-
-    Signs of the controls: trailing edge down, roll to the right, yaw to the left are positive.
+    """Dimensionless coefficients about steady flight, per rad of an angle or of a reduced rate.
 
     drag_zero, drag_induced: CD = drag_zero + drag_induced (CL - lift_least_drag)^2 + drag_elevator elevator, with CL
         from only the angle of attack.
     lift_...: lift.
     side_...: side force.
     roll_..., pitch_..., yaw_...: moments.
+
+    A reduced rate is rate x length / (2 V). Signs of the controls: trailing edge down, roll to the right, yaw to the
+    left are positive.
     """
 
     drag_zero: float

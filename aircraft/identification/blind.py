@@ -18,7 +18,7 @@ from aircraft.identification.alignment import Clocks, Signals, align
 from aircraft.identification.base_model import BaseModel
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import battery_voltage, flow_from_forces, make_motor
-from aircraft.identification.level import level_signals
+from aircraft.identification.level import remove_sensor_biases
 from aircraft.identification.parameters import prior_means
 from aircraft.identification.prediction import GustFilter, Predictor
 from world.arrays import Flags, Floats, Ints
@@ -34,7 +34,7 @@ _MIN_KNOWN_FRACTION = 0.9
 WINDOW_S = 2.0
 # Time between the starts of windows in the earlier part, s; they may overlap.
 _CALIBRATION_STEP_S = 0.5
-# Time from the start of a stretch to its first window, s; the filter settles in this time.
+# Time from the start of a record to its first window, s; the filter settles in this time.
 _SETTLING_TIME_S = 2.0
 # One of this many samples is kept, at `GRID_HZ`.
 _THINNING_FACTOR = 5
@@ -123,17 +123,17 @@ class Band:
 def uninformative_note(bands: Sequence[Band]) -> str:
     """Return a sentence that names the quantities whose bands are not informative; "" if there are none."""
     names = ", ".join(band.name for band in bands if not band.is_informative)
-    return f"the model says nothing of {names}: the band is as wide as without a model, or wider" if names else ""
+    return f"the model does not predict {names}: the band is at least as wide as without a model" if names else ""
 
 
 def band_limits(values: Floats) -> tuple[Floats, Floats]:
-    """Return the lower and the upper end of the band of draws, two arrays (n,).
-
-    A further draw is inside the band with the probability `COVERAGE`: the ends are at the plotting positions
-    k / (d + 1) (Weibull 1939), while percentiles of the draws would be too narrow.  The band is unknown (NaN) where
-    fewer than `_MIN_KNOWN_FRACTION` of the draws have a value.
+    """Return the ends of the band that contains a further draw with the probability `COVERAGE`.
 
     values: draws, (d, n).
+
+    The lower and the upper end are arrays (n,), at the plotting positions k / (d + 1) (Weibull 1939); percentiles of
+    the draws would be too narrow. The band is unknown (NaN) where fewer than `_MIN_KNOWN_FRACTION` of the draws have a
+    value.
 
     >>> low, high = band_limits(np.arange(39.0)[:, np.newaxis])
     >>> low.round(9).tolist(), high.round(9).tolist()
@@ -147,12 +147,13 @@ def band_limits(values: Floats) -> tuple[Floats, Floats]:
 
 
 class BlindPrediction:
-    """Windows of the judged part of a log, predicted by draws of an aircraft.
+    """Prediction of the judged part of a log, window by window, by draws of an aircraft's model.
 
-    earlier: stretches before the judged part, for biases, trims, filters and errors.
-    judged: stretches of the judged part.
+    earlier: records before the judged part, for biases, trims, filters and errors.
+    judged: records of the judged part.
     clocks: clocks of the log, from the earlier part.
     base: the central aircraft.
+    window: length of a window, s.
     """
 
     def __init__(
@@ -164,11 +165,11 @@ class BlindPrediction:
         window: float = WINDOW_S,
     ) -> None:
         raw = align(earlier, [clocks] * len(earlier), base.motor_lag)
-        self._earlier = level_signals(raw)
+        self._earlier = remove_sensor_biases(raw)
         scale, _ = airspeed_scale(self._earlier, flow_from_forces(self._earlier, base, prior_means()))
         self._earlier = _scale_airspeed(self._earlier, scale)
         self._judged = _scale_airspeed(
-            level_signals(align(judged, [clocks] * len(judged), base.motor_lag), reference=raw), scale
+            remove_sensor_biases(align(judged, [clocks] * len(judged), base.motor_lag), reference=raw), scale
         )
         self._times = np.concatenate([record.time for record in judged])
         self._count = round(window * self._earlier.hertz)
@@ -176,7 +177,7 @@ class BlindPrediction:
         self._filters: Sequence[GustFilter] = central.filters
         starts = _window_starts(self._earlier, self._count, round(_CALIBRATION_STEP_S * self._earlier.hertz))
         measured = _measured_quantities(self._earlier, starts, self._count)
-        self._errors = measured - self._fly(self._earlier, base, starts)
+        self._errors = measured - self._simulate_windows(self._earlier, base, starts)
         self._changes = measured - measured[:, :1]
         # For the height, the change beyond the change at a constant height rate.
         seconds = np.arange(measured.shape[1]) * _THINNING_FACTOR / GRID_HZ
@@ -190,12 +191,15 @@ class BlindPrediction:
         return len(self._errors), len(self._starts)
 
     def bands(self, draws: Sequence[BaseModel]) -> tuple[Band, ...]:
-        """Return the band of each of `QUANTITIES` over the judged windows, predicted with draws of the aircraft."""
+        """Return the band of each of `QUANTITIES` over the judged windows.
+
+        draws: draws of the aircraft with which the windows are predicted.
+        """
         generator = np.random.default_rng(_SEED)
         blocks = generator.integers(len(self._errors), size=(len(draws), len(self._starts)))
         flights = np.stack(
             [
-                self._fly(self._judged, base, self._starts) + self._errors[chosen]
+                self._simulate_windows(self._judged, base, self._starts) + self._errors[chosen]
                 for base, chosen in zip(draws, blocks, strict=True)
             ]
         )
@@ -210,15 +214,15 @@ class BlindPrediction:
             bands.append(Band(quantity.name, quantity.unit, times, lower, upper, flown, width))
         return tuple(bands)
 
-    def _fly(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
-        """Simulate windows that start at some rows (w,), with the trims of the earlier part; return (w, k, q).
+    def _simulate_windows(self, signals: Signals, base: BaseModel, starts: Ints) -> Floats:
+        """Simulate one window from each start row (w,), with the trims of the earlier part; return (w, k, q).
 
         The result holds the q `QUANTITIES` at the k kept samples of each window.
         """
         values = prior_means()
         trims = Predictor(self._earlier, base, values, self._filters).trims.mean(axis=0)
         predictor = Predictor(signals, base, values, self._filters, trims=trims)
-        states = np.stack(list(predictor.fly(starts, self._count)), axis=1)
+        states = np.stack(list(predictor.simulate(starts, self._count)), axis=1)
         rows = starts[:, np.newaxis] + np.arange(self._count + 1)
         measured_velocity = signals.velocity[rows[:, 0]]
         motor = make_motor(base, values)
@@ -228,7 +232,7 @@ class BlindPrediction:
         flat = [array.ravel() for array in (airspeed, signals.throttle[rows], signals.density[rows], battery)]
         _, current = motor.thrust_and_current(*flat)
         heading = _headings(states, signals.attitude[rows[:, 0], 2], 1.0 / signals.hertz)
-        air = _to_ground(states, heading)
+        air = _air_velocity_ned(states, heading)
         # The wind stays as at the start of the window.
         velocity = air + (measured_velocity - air[:, 0])[:, np.newaxis]
         return _stack_quantities(
@@ -242,12 +246,15 @@ def _scale_airspeed(signals: Signals, factor: float) -> Signals:
 
 
 def _kept_rows(count: int) -> Ints:
-    """Return the indices of the kept samples of a window with ``count`` samples; the measured start is not kept."""
+    """Return the indices of the kept samples of a window; the measured start is not kept.
+
+    count: number of samples in the window.
+    """
     return np.arange(_THINNING_FACTOR, count + 1, _THINNING_FACTOR)
 
 
 def _window_starts(signals: Signals, count: int, step: int) -> Ints:
-    """Return the rows at which windows start, in all stretches.
+    """Return the rows at which windows start, in all records, (w,).
 
     count: number of samples in a window.
     step: rows between the starts of two windows.
@@ -262,7 +269,7 @@ def _window_starts(signals: Signals, count: int, step: int) -> Ints:
 
 
 def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
-    """Return the measured `QUANTITIES` over windows, (w, k, q); the power is NaN for a log without current."""
+    """Return the measured `QUANTITIES` over windows, (w, k, q); power is NaN for a log without current."""
     rows = starts[:, np.newaxis] + np.arange(count + 1)
     return _stack_quantities(
         signals.attitude[rows, :2],
@@ -274,10 +281,12 @@ def _measured_quantities(signals: Signals, starts: Ints, count: int) -> Floats:
 
 
 def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power: Floats, hertz: float) -> Floats:
-    """Compute `QUANTITIES` over windows, (w, k, q), at the kept ones of n samples.
+    """Return the `QUANTITIES` of windows at their kept samples, (w, k, q).
 
-    angles: bank and pitch, (w, n, 2).
-    velocity: velocity over the ground, north, east, down, (w, n, 3).
+    angles: bank and pitch, rad, (w, n, 2).
+    airspeed: m/s, (w, n).
+    velocity: velocity over the ground, north, east, down, m/s, (w, n, 3).
+    power: W, (w, n).
     """
     north, east, down = np.moveaxis(velocity, 2, 0)
     course = np.arctan2(east[:, :1], north[:, :1])
@@ -289,7 +298,7 @@ def _stack_quantities(angles: Floats, airspeed: Floats, velocity: Floats, power:
 
 
 def _headings(states: Floats, start: Floats, step: float) -> Floats:
-    """Integrate the headings over windows, rad, (w, n).
+    """Integrate the turn rate over windows; return the headings, rad, (w, n).
 
     start: heading at the start of each window, rad, (w,).
     step: time between samples, s.
@@ -300,8 +309,12 @@ def _headings(states: Floats, start: Floats, step: float) -> Floats:
     return start[:, np.newaxis] + np.concatenate([np.zeros((len(states), 1)), turned], axis=1)
 
 
-def _to_ground(states: Floats, heading: Floats) -> Floats:
-    """Return the velocity through the air, north, east and down, m/s, (w, n, 3)."""
+def _air_velocity_ned(states: Floats, heading: Floats) -> Floats:
+    """Return the velocity through the air as north, east and down components, m/s, (w, n, 3).
+
+    states: states of `Predictor.simulate`, (w, n, 8).
+    heading: rad, (w, n).
+    """
     u, v, w, _, _, _, roll, pitch = np.moveaxis(states, 2, 0)
     below = v * np.sin(roll) + w * np.cos(roll)
     across = v * np.cos(roll) - w * np.sin(roll)

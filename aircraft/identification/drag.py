@@ -12,7 +12,7 @@ import numpy as np
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.flow import Flow, battery_voltage, dynamic_force, lift_curve, other_lift
+from aircraft.identification.flow import Flow, battery_voltage, dynamic_force, lift_curve, rate_and_elevator_lift
 from aircraft.identification.parameters import PARAMETERS, prior_means, prior_sds
 from aircraft.identification.regression import Fit, fit_with_prior
 from world.arrays import Floats
@@ -114,7 +114,10 @@ class ForwardForces:
         return force / self.base.mass + bias, current
 
     def slopes(self, unknown: Floats) -> tuple[Floats, Floats]:
-        """Return the derivatives of forward acceleration and current by the p unknowns, two arrays (n, p)."""
+        """Return the derivatives of forward acceleration and current with respect to the unknowns.
+
+        The p unknowns are those of `predict`; the result is two arrays (n, p).
+        """
         steps = _DIFFERENCE_STEP * np.eye(len(unknown))
         # All columns are filtered in one call: a call costs far more than a column.
         forces, currents = zip(
@@ -129,22 +132,23 @@ class ForwardForces:
 def fit_drag(
     signals: Signals, base: BaseModel, values: Floats, flow: Flow, uncertainty: AlphaUncertainty | None = None
 ) -> tuple[Fit, Floats, Floats]:
-    """Fit drag and motor; return the fit, the values of the five parameters (5,), and their covariance (5, 5).
-
-    With the base model's resistance, idle current, voltage and elevator drag, these values give the same forces and
-    currents as the fit gives with the fitted values of these quantities.
+    """Fit the five drag and motor parameters; return the fit, their values (5,) and covariance (5, 5).
 
     values: (n,) values of all parameters, of which the parameters of lift are used.
-    uncertainty: uncertainty of the lift curve.
+    uncertainty: uncertainty of the lift curve; None for a default.
+
+    The fit also has nuisance parameters. Those of the aircraft (resistance, idle current, voltage, drag of the
+    elevator) are folded into the five values: with the base model's nuisance parameters, these give nearly the same
+    forces and currents as the fit.
     """
     forces = forward_forces(signals, base, values, flow, AlphaUncertainty() if uncertainty is None else uncertainty)
     thinned = forces.signals
     with_current = bool(np.isfinite(thinned.current).all())
     means, sds = drag_priors(with_current=with_current)
     # First fit only the forces, then forces and current, because the first steps with the current would diverge.
-    fit = _fit_from(forces, _Measurement(thinned, with_current=False), means, sds)
+    fit = _fit_unknowns(forces, _Measurement(thinned, with_current=False), means, sds)
     if with_current:
-        fit = _fit_from(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)
+        fit = _fit_unknowns(forces, _Measurement(thinned, with_current=True), means, sds, fit.estimate)
     force, _ = forces.predict(fit.estimate)
     measured = thinned.smooth(thinned.acceleration[:, 0], FORCE_CUTOFF_HZ)
     explained = 1.0 - float((measured - force).var() / measured.var())
@@ -157,9 +161,11 @@ def fit_drag(
 
 
 def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
-    """Return the means and the standard deviations of the p parameters of drag and motor, followed by `NUISANCES`.
+    """Return the prior means and standard deviations of the p unknowns of `fit_drag`, two arrays (p,).
 
-    The result is two arrays (p,).
+    with_current: True for a log with the battery's current, which also has its voltage.
+
+    The unknowns are the parameters of drag and motor, followed by `NUISANCES`.
     """
     nuisances = np.array(list(NUISANCES.values()))
     nuisances[list(NUISANCES).index("voltage of the battery")] *= _LOGGED_VOLTAGE_FACTOR if with_current else 1.0
@@ -168,26 +174,27 @@ def drag_priors(*, with_current: bool) -> tuple[Floats, Floats]:
 
 
 def _fold_nuisances(forces: ForwardForces, unknown: Floats) -> tuple[Floats, Floats]:
-    """Fold the aircraft's nuisance parameters into the five parameters, by least squares over the flow and throttle.
-
-    Returns the values of the parameters (5,), and their derivatives by the unknowns (5, p).
+    """Fold the aircraft's nuisance parameters into the five parameters, by least squares.
 
     unknown: (p,) fitted values of the unknowns.
+
+    The squares are those of the differences of force and current over the signals. Returns the values of the parameters
+    (5,), and their derivatives with respect to the unknowns, (5, p).
     """
     own_count = int(_IS_DRAG_PARAMETER.sum())
     folded = own_count + np.flatnonzero(_IS_OF_AIRCRAFT)
     scale = FORCE_FLOOR / _CURRENT_FLOOR_A
 
-    def stack_both(force: Floats, current: Floats) -> Floats:
+    def stack_force_and_current(force: Floats, current: Floats) -> Floats:
         """Return forces and weighted currents in one array."""
         return np.concatenate([force, scale * current])
 
-    target = stack_both(*forces.predict(unknown))
+    target = stack_force_and_current(*forces.predict(unknown))
     folded_unknown = unknown.copy()
     folded_unknown[folded] = 0.0
     for _ in range(_MAX_FOLDING_STEPS):
-        columns = stack_both(*forces.slopes(folded_unknown))
-        residual = target - stack_both(*forces.predict(folded_unknown))
+        columns = stack_force_and_current(*forces.slopes(folded_unknown))
+        residual = target - stack_force_and_current(*forces.predict(folded_unknown))
         folded_unknown[:own_count] += np.linalg.lstsq(columns[:, :own_count], residual, rcond=None)[0]
     jacobian = np.zeros((own_count, len(unknown)))
     jacobian[:, :own_count] = np.eye(own_count)
@@ -204,11 +211,12 @@ class _Measurement:
         self.block, self.floor = signals.block, FORCE_FLOOR**2 * FLOOR_SECONDS * signals.hertz
 
 
-def _fit_from(
+def _fit_unknowns(
     forces: ForwardForces, measurement: _Measurement, means: Floats, sds: Floats, start: Floats | None = None
 ) -> Fit:
     """Fit the unknowns by Gauss-Newton steps, each limited to one standard deviation of the prior.
 
+    means, sds: means and standard deviations of the prior, (p,).
     start: (p,) first estimate; None for the means of the prior.
     """
     estimate = means.copy() if start is None else start.copy()
@@ -248,7 +256,7 @@ def forward_forces(
     return ForwardForces(
         signals=thinned,
         base=base,
-        known=pressure * (lift + other_lift(thinned, base)) * np.sin(alpha),
+        known=pressure * (lift + rate_and_elevator_lift(thinned, base)) * np.sin(alpha),
         tilts=tilt
         * np.vstack([np.full(len(alpha), uncertainty.angle), uncertainty.by_lift * (lift - uncertainty.mean_lift)]),
         drags=forward_pressure

@@ -18,7 +18,10 @@ _DRAWS_PER_AIRCRAFT = 20
 
 
 def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw joint samples of `aircraft.identification.parameters.PARAMETERS` within their bounds, (count, n)."""
+    """Draw joint samples of all parameters within their bounds, (count, n).
+
+    The n columns are `aircraft.identification.parameters.PARAMETERS`.
+    """
     generator = np.random.default_rng(seed)
     lower, upper = np.array([parameter.bounds for parameter in PARAMETERS]).T
     samples = generator.multivariate_normal(
@@ -31,7 +34,7 @@ def draw_aircraft(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> F
 
 
 def draw_drive_power(estimate: Estimate, count: int = COUNT, seed: int = SEED) -> Floats:
-    """Draw samples of the factor on the battery's power, (count,); all are 1 if the battery's current was logged.
+    """Draw factors on the battery's power, (count,); all are 1 if the battery's current was logged.
 
     No other signal shows the propulsive efficiency, which varies by `EFFICIENCY_LOG_SD` among real aircraft.
     """

@@ -39,11 +39,11 @@ class ElectricMotor:
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "ElectricMotor":
-        """Return a copy with scaled thrust, speed per volt, propeller torque, winding resistance and idle current."""
+        """Return a copy of the motor with scaled properties, as `Motor.with_factors` describes."""
         return replace(
             self,
-            thrust=_times(thrust, self.thrust),
-            torque=_times(torque, self.torque),
+            thrust=_scale_coefficients(thrust, self.thrust),
+            torque=_scale_coefficients(torque, self.torque),
             back_voltage=self.back_voltage / speed,
             resistance=self.resistance * resistance,
             idle_current=self.idle_current * idle,
@@ -66,11 +66,11 @@ class ElectricMotor:
         throttle: 0..1.
         voltage: battery voltage, V.
         """
-        q2, q1, q0 = self._torques(airspeed, density)
+        q2, q1, q0 = self._torque_coefficients(airspeed, density)
         kv = self.back_voltage
         driving = kv * voltage * throttle / self.resistance
-        driven = _larger_root(q2, q1 + kv * kv / self.resistance, q0 - driving + kv * self.idle_current)
-        windmill = _larger_root(q2, q1, q0 + kv * self.idle_current)
+        driven = _larger_roots(q2, q1 + kv * kv / self.resistance, q0 - driving + kv * self.idle_current)
+        windmill = _larger_roots(q2, q1, q0 + kv * self.idle_current)
         return np.maximum(0.0, np.maximum(driven, windmill))
 
     def thrust_and_current(
@@ -95,20 +95,20 @@ class ElectricMotor:
     def propeller_torque(self, airspeed: Floats, throttle: Floats, density: Floats) -> Floats:
         """Return the propeller torque, N m, (n,).  Positive: its reaction rolls the aircraft to the left."""
         speed = self.speed(airspeed, throttle, density, self.voltage)
-        q2, q1, q0 = self._torques(airspeed, density)
+        q2, q1, q0 = self._torque_coefficients(airspeed, density)
         return np.asarray(q2 * speed * speed + q1 * speed + q0)
 
-    def _torques(self, airspeed: Floats, density: Floats) -> tuple[Floats, Floats, Floats]:
-        """Return q2, q1 and q0 of the propeller's torque, three arrays (n,)."""
+    def _torque_coefficients(self, airspeed: Floats, density: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return q2, q1 and q0 of the propeller's torque q2 w^2 + q1 w + q0, three arrays (n,)."""
         a, b, c = self.torque
         return density * a, density * b * airspeed, density * c * airspeed * airspeed
 
 
-def _times(factor: float, coefficients: tuple[float, float, float]) -> tuple[float, float, float]:
+def _scale_coefficients(factor: float, coefficients: tuple[float, float, float]) -> tuple[float, float, float]:
     """Return three coefficients multiplied by a factor."""
     return factor * coefficients[0], factor * coefficients[1], factor * coefficients[2]
 
 
-def _larger_root(a: Floats, b: Floats, c: Floats) -> Floats:
-    """Return the larger root of a x^2 + b x + c, or the position of the minimum if there is no root, (n,)."""
+def _larger_roots(a: Floats, b: Floats, c: Floats) -> Floats:
+    """Return the larger root of a x^2 + b x + c, or the position of the minimum without a root, (n,)."""
     return np.asarray((np.sqrt(np.maximum(0.0, b * b - 4.0 * a * c)) - b) / (2.0 * a))

@@ -22,7 +22,7 @@ from aircraft.identification.drag import FORCE_THINNING, AlphaUncertainty, fit_d
 from aircraft.identification.fixed_parameters import ACCELEROMETER_NOISE, FIXED_PARAMETERS
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
 from aircraft.identification.flow import flow_from_forces, make_motor
-from aircraft.identification.level import LEVEL_SD, level_signals
+from aircraft.identification.level import LEVEL_SD, remove_sensor_biases
 from aircraft.identification.lift import fit_lift
 from aircraft.identification.moments import AXES, MOMENT_THINNING, fit_moments
 from aircraft.identification.parameters import PARAMETERS, Group, prior_means, prior_sds
@@ -54,7 +54,7 @@ class Equation:
     name: title in texts.
     unit: unit of measured and predicted values.
     hertz: samples per second.
-    measured, predicted: (n,), low-passed, all stretches in sequence.
+    measured, predicted: (n,), low-passed, all records in sequence.
     explained: R^2.
     correlation: time over which residuals are autocorrelated, s.
     """
@@ -74,7 +74,7 @@ class Estimate:
 
     values: values of `PARAMETERS`, (n,).
     covariance: covariance of the values, (n, n).
-    clocks: lags and delays of each stretch.
+    clocks: lags and delays of each record.
     equations: the fitted equations.
     shifts: change of the values (n,) for one standard deviation of each quantity that is held fixed, by its name.
     with_current: True if the battery's current was used.
@@ -101,9 +101,10 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def uninformed_lines(self) -> tuple[str, ...]:
-        """Return a line for each parameter that the logs hardly determine, with a maneuver that would determine it.
+        """Return a line for each parameter that the logs hardly determine.
 
-        These are the parameters whose `log_fractions` are below `MIN_LOG_FRACTION`.
+        These are the parameters whose `log_fractions` are below `MIN_LOG_FRACTION`. A line names a maneuver that would
+        determine the parameter.
         """
         fractions = self.log_fractions().tolist()
         return tuple(
@@ -118,12 +119,12 @@ class Estimate:
 
 
 def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics: bool = True) -> Estimate:
-    """Estimate all parameters from stretches of flight.
+    """Estimate all parameters from flight records.
 
     dynamics: True to estimate the moments as well; False for logs with too few rows per second to show them.
     """
     default_clocks = Clocks(servo_lag=base.servo_lag)
-    clocks = align_clocks(records, base) if dynamics else tuple(default_clocks for _ in records)
+    clocks = estimate_clocks(records, base) if dynamics else tuple(default_clocks for _ in records)
     signals = aligned_signals(records, clocks, base)
     nominal = fit_parameters(signals, base, dynamics=dynamics)
     shifts = {}
@@ -165,12 +166,13 @@ def estimate_model(records: Sequence[FlightRecord], base: BaseModel, *, dynamics
 
 
 def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floats]:
-    """Combine the estimates of the moments with their priors by Bayes' rule; return values (n,) and covariance (n, n).
-
-    The refinement itself uses a prior that is wider by `PRIOR_SPREAD`, because its weights do not include the shifts.
+    """Combine the estimates of the moments with their priors by Bayes' rule.
 
     values: values of all parameters, (n,); the parameters of lift and drag are returned unchanged.
     covariance: covariance of the values, (n, n).
+
+    Returns values (n,) and covariance (n, n). The refinement itself uses a prior that is wider by `PRIOR_SPREAD`,
+    because its weights do not include the shifts.
     """
     prior = np.square(prior_sds())
     weight = np.where(IS_MOMENT, prior / (prior + np.diag(covariance)), 1.0)
@@ -179,27 +181,27 @@ def combine_with_prior(values: Floats, covariance: Floats) -> tuple[Floats, Floa
 
 
 def aligned_signals(records: Sequence[FlightRecord], clocks: Sequence[Clocks], base: BaseModel) -> Signals:
-    """Return the aligned signals of all stretches, without sensor biases and with the airspeed scaled."""
-    signals = level_signals(align(records, clocks, base.motor_lag))
+    """Return the aligned signals of all records, without sensor biases and with the airspeed scaled."""
+    signals = remove_sensor_biases(align(records, clocks, base.motor_lag))
     return with_airspeed_scale(signals, flow_from_forces(signals, base, prior_means()))
 
 
 def score_predictions(
     estimate: Estimate, records: Sequence[FlightRecord], base: BaseModel, base_name: str
 ) -> PredictedLog:
-    """Predict stretches of flight by constant rates, by the base model and by an estimate.
-
-    The signals are aligned with the lags and delays of the estimate's last log.
+    """Compare how well constant rates, the base model and an estimate predict flight records.
 
     base_name: name of the base model in texts.
+
+    The signals are aligned with the lags and delays of the estimate's last record.
     """
-    signals = level_signals(align(records, [estimate.clocks[-1]] * len(records), base.motor_lag))
+    signals = remove_sensor_biases(align(records, [estimate.clocks[-1]] * len(records), base.motor_lag))
     signals = replace(signals, airspeed=signals.airspeed * estimate.airspeed[0])
     return predict_log(signals, {base_name: (base, prior_means()), "identified": (base, estimate.values)})
 
 
 def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
-    """Return the sum of the covariance of the fits (n, n) and the covariance from the shifts (n,).
+    """Add the covariance from the shifts (n,) to the covariance of the fits (n, n).
 
     For lift and drag no variance exceeds the prior's variance.
 
@@ -215,22 +217,22 @@ def total_covariance(fitted: Floats, shifts: Mapping[str, Floats]) -> Floats:
     return np.asarray(covariance * np.outer(factor, factor))
 
 
-def align_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Clocks, ...]:
-    """Find the lags and delays of each stretch, from `ALIGNED_SECONDS` of the longest stretch of its log.
+def estimate_clocks(records: Sequence[FlightRecord], base: BaseModel) -> tuple[Clocks, ...]:
+    """Estimate the lags and delays of each record, from the longest record of its log.
 
-    All stretches of a log have the same lags and delays.
+    Of this record, the central `ALIGNED_SECONDS` are used. All records of a log have the same lags and delays.
     """
     clocks_by_source: dict[str, Clocks] = {}
     for source in {record.source: None for record in records}:
         longest = max((record for record in records if record.source == source), key=lambda record: record.seconds)
-        part = longest.part(ALIGNED_SECONDS)
+        part = longest.central_part(ALIGNED_SECONDS)
 
         def misfit(clock: Clocks, part: FlightRecord = part) -> float:
             """Return the sum over the axes of the logarithm of the unexplained fraction of the moments."""
             signals = align([part], [clock], base.motor_lag)
             alpha, beta, _ = flow_from_forces(signals, base, prior_means())
             # A wide prior, so that the clocks fit the data and not the prior.
-            fits = fit_moments(signals, base, alpha, beta, spread=10.0)
+            fits = fit_moments(signals, base, alpha, beta, prior_factor=10.0)
             return sum(_log_unexplained(fits[axis], clock.lag) for axis in AXES)
 
         clocks_by_source[source] = find_clocks(misfit)
@@ -259,7 +261,7 @@ def fit_parameters(
     dynamics: bool = True,
     nominal: Refinement | None = None,
 ) -> Estimate:
-    """Estimate all parameters from aligned signals, without the shifts from quantities that are held fixed.
+    """Estimate all parameters from aligned signals, without the shifts from fixed quantities.
 
     lift: (2,) values of slope and offset of the lift curve to hold fixed; None to estimate them.
     level: error of the autopilot's level, rad.
@@ -271,23 +273,23 @@ def fit_parameters(
 
     uncertainty: AlphaUncertainty | None = None
 
-    def store(group: Group, estimate: Floats, spread: Floats) -> None:
+    def store(group: Group, estimate: Floats, group_covariance: Floats) -> None:
         """Store the values and the covariance of a group of parameters."""
         is_in_group = np.array([parameter.group == group for parameter in PARAMETERS])
         values[is_in_group] = estimate
-        covariance[np.ix_(is_in_group, is_in_group)] = spread
+        covariance[np.ix_(is_in_group, is_in_group)] = group_covariance
 
     if lift is not None:
         store("lift", lift, np.zeros((2, 2)))
     for _ in range(_PASSES):
         flow = flow_from_forces(signals, base, values)
         if lift is None:
-            fits["lift"], curve, spread = fit_lift(signals, base, flow.lift, level)
-            store("lift", curve, spread)
+            fits["lift"], curve, curve_covariance = fit_lift(signals, base, flow.lift, level)
+            store("lift", curve, curve_covariance)
             uncertainty = alpha_uncertainty(fits["lift"], flow.lift)
             flow = flow_from_forces(signals, base, values)
-        fits["drag"], drag_values, spread = fit_drag(signals, base, values, flow, uncertainty)
-        store("drag", drag_values, spread)
+        fits["drag"], drag_values, drag_covariance = fit_drag(signals, base, values, flow, uncertainty)
+        store("drag", drag_values, drag_covariance)
     refinement = nominal
     if refinement is not None:
         values[IS_MOMENT] = refinement.values_for(signals, base, values)
@@ -299,7 +301,7 @@ def fit_parameters(
         refinement = refine_moments(signals, base, values)
         values[IS_MOMENT] = refinement.values
         covariance[np.ix_(IS_MOMENT, IS_MOMENT)] = refinement.covariance
-    equations = tuple(_equation(group, fit) for group, fit in fits.items())
+    equations = tuple(_make_equation(group, fit) for group, fit in fits.items())
     has_current = bool(np.isfinite(signals.current).all())
     return Estimate(
         values, covariance, (), equations, with_current=has_current, dynamics=dynamics, refinement=refinement
@@ -312,7 +314,7 @@ def alpha_uncertainty(fit: Fit, lift: Floats) -> AlphaUncertainty:
     return AlphaUncertainty(float(np.hypot(offset_sd, LEVEL_SD)), slope_sd, float(lift.mean()))
 
 
-def _equation(group: Group, fit: Fit) -> Equation:
+def _make_equation(group: Group, fit: Fit) -> Equation:
     """Return the equation of a group of parameters, with its fit."""
     title, unit, hertz = _EQUATIONS[group]
     correlation = correlation_samples(fit.residual) / hertz
@@ -320,9 +322,11 @@ def _equation(group: Group, fit: Fit) -> Equation:
 
 
 def _lift_shifts(signals: Signals, base: BaseModel, nominal: Estimate) -> dict[str, Floats]:
-    """Return the shifts of all parameters with one standard deviation along each principal axis of the lift curve.
+    """Return the changes of all parameters if the lift curve is shifted along its principal axes.
 
-    The lift curve's own part of these shifts is subtracted from the covariance of `nominal`, which already contains it.
+    There is one shift of one standard deviation along each axis of the lift curve's covariance. Its own part is
+    subtracted from `nominal.covariance`, which already contains the uncertainty of the lift curve; the array is changed
+    in place.
     """
     eigenvalues, axes = np.linalg.eigh(nominal.covariance[:2, :2])
     shifts = {}

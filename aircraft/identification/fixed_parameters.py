@@ -52,8 +52,8 @@ def _move_one_sd(value: float, relative_sd: float, min_sd: float) -> float:
     return value + float(np.copysign(max(relative_sd * abs(value), min_sd), value))
 
 
-def _change_coefficient(name: str, relative_sd: float, min_sd: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change of a coefficient by one standard deviation; arguments as in `_move_one_sd`."""
+def _coefficient_change(name: str, relative_sd: float, min_sd: float = 0.0) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that changes a coefficient by one standard deviation, as `_move_one_sd` does."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         value = _move_one_sd(getattr(base.coefficients, name), relative_sd, min_sd)
@@ -62,8 +62,8 @@ def _change_coefficient(name: str, relative_sd: float, min_sd: float = 0.0) -> C
     return change
 
 
-def _change_product_of_inertia(relative_sd: float, min_sd_ratio: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change of the product of inertia.
+def _product_of_inertia_change(relative_sd: float, min_sd_ratio: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that changes the product of inertia by one standard deviation.
 
     relative_sd: standard deviation as a ratio to Ixz.
     min_sd_ratio: smallest standard deviation, as a ratio to the geometric mean of Ixx and Izz.
@@ -82,8 +82,11 @@ def _scale_airspeed(signals: Signals, base: BaseModel) -> Changed:
     return replace(signals, airspeed=signals.airspeed * (1.0 + signals.airspeed_sd)), base
 
 
-def _bias_acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change that adds a bias (m/s^2) to an accelerometer."""
+def _acceleration_bias(axis: int, bias: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that adds a bias (m/s^2) to an accelerometer.
+
+    axis: 0 forward, 1 right, 2 down.
+    """
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         return replace(signals, acceleration=signals.acceleration + bias * np.eye(3)[axis]), base
@@ -91,8 +94,8 @@ def _bias_acceleration(axis: int, bias: float) -> Callable[[Signals, BaseModel],
     return change
 
 
-def _double_noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change that doubles the noise power of the accelerometers.
+def _noise_doubling(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that doubles the noise power of the accelerometers.
 
     It shows the bias of the slopes: the noise that is present has the same effect again (Cook and Stefanski 1994,
     SIMEX). The noise is the signal above the vane's cutoff, taken as white.
@@ -102,6 +105,7 @@ def _double_noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Chang
         noisy, generator = signals.acceleration.copy(), np.random.default_rng(1)
 
         def noise_level(values: Floats) -> float:
+            """Return the standard deviation of values (n,) above the vane's cutoff."""
             return float((values - signals.smooth(values, VANE_CUTOFF_HZ)).std())
 
         for axis in axes:
@@ -112,21 +116,21 @@ def _double_noise(axes: tuple[int, ...]) -> Callable[[Signals, BaseModel], Chang
     return change
 
 
-def _delay_force(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change that delays the accelerometers."""
+def _force_delay(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that delays the accelerometers."""
     return lambda signals, base: (
         replace(signals, acceleration=signals.delay(signals.acceleration, seconds)),
         base,
     )
 
 
-def _delay_surfaces(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change that delays the control surfaces."""
+def _surface_delay(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that delays the control surfaces."""
     return lambda signals, base: (replace(signals, surfaces=signals.delay(signals.surfaces, seconds)), base)
 
 
-def _trade_servo_lag(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change that increases the lag of the servos and reduces their delay by the same time."""
+def _servo_lag_trade(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that increases the lag of the servos and reduces their delay by the same time."""
 
     def change(signals: Signals, base: BaseModel) -> Changed:
         surfaces = np.empty_like(signals.surfaces)
@@ -138,8 +142,8 @@ def _trade_servo_lag(seconds: float) -> Callable[[Signals, BaseModel], Changed]:
     return change
 
 
-def _scale_current(factor: float) -> Callable[[Signals, BaseModel], Changed]:
-    """Return a change that multiplies the battery's current by a factor."""
+def _current_scaling(factor: float) -> Callable[[Signals, BaseModel], Changed]:
+    """Return a function that multiplies the battery's current by a factor."""
     return lambda signals, base: (replace(signals, current=signals.current * factor), base)
 
 
@@ -156,23 +160,23 @@ _LEVEL_SD_RAD = float(np.radians(0.2))
 # models omit small coefficients, and their value of 0 is not certain: the smallest standard deviation is from the
 # Aerosonde's coefficients (Beard and McLain, Small Unmanned Aircraft, second edition, table E.2).
 FIXED_PARAMETERS = (
-    FixedParameter("lift of the elevator (50 %)", _change_coefficient("lift_elevator", 0.5)),
-    FixedParameter("lift of the pitch rate (50 %)", _change_coefficient("lift_rate", 0.5)),
-    FixedParameter("side force of sideslip (30 %)", _change_coefficient("side_beta", 0.3)),
-    FixedParameter("side force of the rudder (50 %)", _change_coefficient("side_rudder", 0.5, 0.095)),
-    FixedParameter("side force of the ailerons (100 %)", _change_coefficient("side_aileron", 1.0, 0.075)),
-    FixedParameter("roll of the rudder (100 %)", _change_coefficient("roll_rudder", 1.0, 0.0024)),
-    FixedParameter("product of inertia (50 %)", _change_product_of_inertia(0.5, 0.05)),
-    FixedParameter("clock of the accelerometers (15 ms)", _delay_force(0.015)),
-    FixedParameter("clock of the servos (15 ms)", _delay_surfaces(0.015)),
-    FixedParameter("lag of the servos (15 ms, at the same total delay)", _trade_servo_lag(0.015)),
+    FixedParameter("lift of the elevator (50 %)", _coefficient_change("lift_elevator", 0.5)),
+    FixedParameter("lift of the pitch rate (50 %)", _coefficient_change("lift_rate", 0.5)),
+    FixedParameter("side force of sideslip (30 %)", _coefficient_change("side_beta", 0.3)),
+    FixedParameter("side force of the rudder (50 %)", _coefficient_change("side_rudder", 0.5, 0.095)),
+    FixedParameter("side force of the ailerons (100 %)", _coefficient_change("side_aileron", 1.0, 0.075)),
+    FixedParameter("roll of the rudder (100 %)", _coefficient_change("roll_rudder", 1.0, 0.0024)),
+    FixedParameter("product of inertia (50 %)", _product_of_inertia_change(0.5, 0.05)),
+    FixedParameter("clock of the accelerometers (15 ms)", _force_delay(0.015)),
+    FixedParameter("clock of the servos (15 ms)", _surface_delay(0.015)),
+    FixedParameter("lag of the servos (15 ms, at the same total delay)", _servo_lag_trade(0.015)),
     FixedParameter("airspeed (as the wind triangle has it)", _scale_airspeed),
     # An error of the level also shows as a bias of the forward accelerometer, which is removed.
     FixedParameter(
-        "level of the autopilot (0.2 deg)", _bias_acceleration(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD
+        "level of the autopilot (0.2 deg)", _acceleration_bias(0, _LEVEL_SD_RAD * 9.80665), level=_LEVEL_SD_RAD
     ),
     FixedParameter("mean vertical air (0.04 m/s)", _unchanged, vertical_air=0.04),
-    FixedParameter("downward accelerometer (0.03 m/s2)", _bias_acceleration(2, 0.03)),
-    FixedParameter(ACCELEROMETER_NOISE, _double_noise((1, 2))),
-    FixedParameter("scale of the current (2 %)", _scale_current(1.02), needs_current=True),
+    FixedParameter("downward accelerometer (0.03 m/s2)", _acceleration_bias(2, 0.03)),
+    FixedParameter(ACCELEROMETER_NOISE, _noise_doubling((1, 2))),
+    FixedParameter("scale of the current (2 %)", _current_scaling(1.02), needs_current=True),
 )

@@ -13,7 +13,7 @@ GRID_HZ = 50.0
 
 @dataclass(frozen=True, slots=True)
 class FlightRecord:
-    """One stretch of flight without a gap, as logged, without any correction of delays. SI and radians.
+    """Part of a flight without a gap, as logged, without any correction of delays. SI and radians.
 
     time: (n,) s, `GRID_HZ` samples per second.
     acceleration: (n, 3) specific force of the accelerometers, body axes forward, right, down, m/s^2.
@@ -46,22 +46,22 @@ class FlightRecord:
 
     @property
     def seconds(self) -> float:
-        """Duration of the stretch, s."""
+        """Duration of the record, s."""
         return len(self.time) / GRID_HZ
 
-    def part(self, seconds: float) -> "FlightRecord":
-        """Return the central part of the stretch, at most ``seconds`` long."""
+    def central_part(self, seconds: float) -> "FlightRecord":
+        """Return the central part of the record, at most ``seconds`` long."""
         rows = round(seconds * GRID_HZ)
         begin = max(0, (len(self.time) - rows) // 2)
         return self.rows(slice(begin, begin + rows))
 
     def between(self, start: float, end: float) -> "FlightRecord":
-        """Return the rows from time ``start`` on and before time ``end``, s."""
+        """Return the part of the record from time ``start`` until before time ``end``, s."""
         begin_row, end_row = np.searchsorted(self.time, [start, end]).tolist()
         return self.rows(slice(begin_row, end_row))
 
     def rows(self, rows: slice) -> "FlightRecord":
-        """Return the stretch with only the rows of a slice."""
+        """Return a copy of the record with only the rows in the slice."""
         columns = {field.name: getattr(self, field.name)[rows] for field in fields(self) if field.name != "source"}
         return replace(self, **columns)
 
@@ -72,7 +72,7 @@ class FlightRecord:
 
 
 @cache
-def _sections(cutoff: float, hertz: float) -> Floats:
+def _filter_sections(cutoff: float, hertz: float) -> Floats:
     """Return the second-order sections of a Butterworth low-pass filter; cutoff and sampling rate in Hz."""
     # Imported here, as in the neighboring modules: scipy is an extra, without which `planfly` still has this module's
     # names.
@@ -94,14 +94,14 @@ def low_pass(values: Floats, cutoff: float, hertz: float = GRID_HZ) -> Floats:
     """
     from scipy.signal import sosfiltfilt
 
-    sections = _sections(cutoff, hertz)
+    sections = _filter_sections(cutoff, hertz)
     # The ends are mirrored over one period of the cutoff, or over the available samples.
     length = min(len(values) - 1, round(hertz / cutoff))
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=length))
 
 
 def apply_delay(values: Floats, delay: float) -> Floats:
-    """Return values delayed by ``delay`` seconds, with linear interpolation; a negative delay advances them.
+    """Return values delayed by ``delay`` (s), by linear interpolation; a negative delay advances them.
 
     values: (n,) or (n, k).
 
@@ -119,9 +119,9 @@ def apply_delay(values: Floats, delay: float) -> Floats:
 def apply_lag(values: Floats, time_constant: float) -> Floats:
     """Return the output of a first-order lag with a time constant, s.
 
-    The output is exact for an input that is constant over each sample.
-
     values: input, (n,) or (n, k).
+
+    The output is exact for an input that, between two samples, is constant at their mean.
 
     >>> apply_lag(np.array([0.0, 1.0, 1.0]), 0.0)
     array([0., 1., 1.])

@@ -20,7 +20,10 @@ VANE_CUTOFF_HZ = 8.0
 
 
 class Flow(NamedTuple):
-    """Angle of attack and sideslip, rad, and lift coefficient due to the angle of attack alone, three arrays (n,)."""
+    """Flow angles, and the lift coefficient due to the angle of attack alone, three arrays (n,).
+
+    alpha, beta: angle of attack and sideslip, rad.
+    """
 
     alpha: Floats
     beta: Floats
@@ -37,13 +40,13 @@ def lift_curve(base: BaseModel, values: Floats) -> tuple[float, float]:
 
 
 def make_motor(base: BaseModel, values: Floats) -> Motor:
-    """Return the base model's motor with the factors of the parameter values (n,)."""
+    """Return the base model's motor, scaled by the motor's factors among the parameter values (n,)."""
     thrust, speed, torque = (float(values[INDEX[name]]) for name in ("thrust", "motor-speed", "propeller-torque"))
     return base.motor.with_factors(thrust, speed, torque)
 
 
 def battery_voltage(signals: Signals, base: BaseModel) -> Floats | float:
-    """Return the battery's voltage, V: the logged voltage, or the base model's voltage."""
+    """Return the battery's voltage, V: the logged voltage (n,), or the base model's if a row has none."""
     return signals.voltage if np.isfinite(signals.voltage).all() else base.motor.voltage
 
 
@@ -52,7 +55,7 @@ def dynamic_force(signals: Signals, base: BaseModel) -> Floats:
     return np.asarray(0.5 * signals.density * np.square(signals.airspeed) * base.area)
 
 
-def other_lift(signals: Signals, base: BaseModel) -> Floats:
+def rate_and_elevator_lift(signals: Signals, base: BaseModel) -> Floats:
     """Return the lift coefficient due to pitch rate and elevator, with the base's derivatives, (n,)."""
     c = base.coefficients
     pitching = signals.rates[:, 1] * base.chord / (2.0 * signals.airspeed)
@@ -66,7 +69,7 @@ def flow_from_forces(signals: Signals, base: BaseModel, values: Floats, *, smoot
     smooth: True to low-pass the angles forwards and backwards; False for angles that depend on no later sample.
     """
     coefficients, (slope, zero) = base.coefficients, lift_curve(base, values)
-    pressure, other_coefficient = dynamic_force(signals, base), other_lift(signals, base)
+    pressure, other_coefficient = dynamic_force(signals, base), rate_and_elevator_lift(signals, base)
     thrust, _ = make_motor(base, values).thrust_and_current(
         signals.airspeed, signals.throttle, signals.density, battery_voltage(signals, base)
     )
@@ -88,7 +91,7 @@ def flow_from_forces(signals: Signals, base: BaseModel, values: Floats, *, smoot
     return Flow(*(signals.smooth(angle, VANE_CUTOFF_HZ) for angle in flow)) if smooth else flow
 
 
-def attitude_alpha(signals: Signals, level: float = 0.0) -> Floats:
+def alpha_from_attitude(signals: Signals, level: float = 0.0) -> Floats:
     """Return the angle of attack from attitude, ground velocity and estimated horizontal wind, rad, (n,).
 
     level: angle of the autopilot's level above the model's level, rad.

@@ -27,7 +27,7 @@ _MAX_STRAIGHT_BANK_RAD = 0.1
 
 
 def forward_excess(signals: Signals) -> list[float]:
-    """Return for each stretch the mean excess of the forward acceleration over the gain in ground speed, m/s^2.
+    """Return the mean forward acceleration minus the gain in ground speed for each record, m/s^2.
 
     The mean is over straight flight, and 0 if there is none. The excess is a level error or a bias of the
     accelerometer; both would be mistaken for drag.
@@ -46,10 +46,10 @@ def forward_excess(signals: Signals) -> list[float]:
     return excesses
 
 
-def lateral_biases(signals: Signals) -> Floats:
-    """Return for each of s stretches the biases of the gyros p, q, r, rad/s, and of the right accelerometer, m/s^2.
+def gyro_and_lateral_biases(signals: Signals) -> Floats:
+    """Return the biases of the gyros and of the right accelerometer for each of s records, (s, 4).
 
-    The result is (s, 4).
+    The columns are p, q and r (rad/s) and the acceleration to the right (m/s^2).
     """
     biases = []
     for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
@@ -72,17 +72,17 @@ def lateral_biases(signals: Signals) -> Floats:
     return np.array(biases)
 
 
-def level_signals(signals: Signals, reference: Signals | None = None) -> Signals:
-    """Return signals without the biases of the sensors; the forward excess is divided between level and accelerometer.
+def remove_sensor_biases(signals: Signals, reference: Signals | None = None) -> Signals:
+    """Return signals without sensor biases; the forward excess is divided between level and accelerometer.
 
-    reference: signals of the same sensors, whose mean biases are used; None to use the biases of each stretch.
+    reference: signals of the same sensors, whose mean biases are used; None to use the biases of each record.
     """
     level_fraction = LEVEL_SD**2 / (LEVEL_SD**2 + (FORWARD_SD / GRAVITY) ** 2)
     attitude, acceleration, rates = signals.attitude.copy(), signals.acceleration.copy(), signals.rates.copy()
     if reference is None:
-        biases = list(zip(forward_excess(signals), lateral_biases(signals), strict=True))
+        biases = list(zip(forward_excess(signals), gyro_and_lateral_biases(signals), strict=True))
     else:
-        means = float(np.mean(forward_excess(reference))), lateral_biases(reference).mean(axis=0)
+        means = float(np.mean(forward_excess(reference))), gyro_and_lateral_biases(reference).mean(axis=0)
         biases = [means] * (len(signals.edges) - 1)
     for (excess, lateral), first, last in zip(biases, signals.edges[:-1], signals.edges[1:], strict=True):
         limit = _MAX_LEVEL_SIGMAS * LEVEL_SD

@@ -8,7 +8,7 @@ import numpy as np
 
 from aircraft.identification.alignment import Signals
 from aircraft.identification.base_model import BaseModel
-from aircraft.identification.flow import attitude_alpha
+from aircraft.identification.flow import alpha_from_attitude
 from aircraft.identification.parameters import prior_sds
 from aircraft.identification.regression import Fit, fit_with_prior
 from world.arrays import Floats
@@ -18,12 +18,12 @@ LIFT_CUTOFF_HZ = 0.15
 
 
 def fit_lift(signals: Signals, base: BaseModel, lift: Floats, level: float = 0.0) -> tuple[Fit, Floats, Floats]:
-    """Fit the lift curve; return the fit, the values of slope and offset (2,), and their covariance (2, 2).
+    """Fit the lift curve; return the fit, slope and offset (2,), and their covariance (2, 2).
 
     lift: (n,) lift coefficient.
     level: angle of the autopilot's level above the model's level, rad.
     """
-    measured = signals.smooth(attitude_alpha(signals, level), LIFT_CUTOFF_HZ)
+    measured = signals.smooth(alpha_from_attitude(signals, level), LIFT_CUTOFF_HZ)
     smoothed = signals.smooth(lift, LIFT_CUTOFF_HZ)
     c = base.coefficients
     slope_sd, offset_sd = prior_sds()[:2]

@@ -21,7 +21,7 @@ AXES: tuple[Group, ...] = ("pitch", "roll", "yaw")
 MOMENT_CUTOFF_HZ = 4.0
 # One of this many samples is used.
 MOMENT_THINNING = 2
-# Standard deviation of the moment coefficient from an aircraft's asymmetry, or a surface's trim, in a stretch.
+# Standard deviation of the moment coefficient from an aircraft's asymmetry, or a surface's trim, in a record.
 _TRIM_SD = 0.01
 
 
@@ -31,16 +31,16 @@ def fit_moments(
     alpha: Floats,
     beta: Floats,
     motor: Motor | None = None,
-    spread: float = 1.0,
+    prior_factor: float = 1.0,
 ) -> dict[Group, Fit]:
     """Fit the moments in pitch, roll and yaw, and return the fits by axis.
 
-    For each axis the fit also has a trim offset for each stretch, after the parameters: the trim of the surfaces and
-    the biases of the sensors may differ between stretches.
-
     alpha, beta: (n,) rad.
     motor: motor whose torque rolls the aircraft; None for the base's motor.
-    spread: factor on the priors' standard deviations.
+    prior_factor: factor on the priors' standard deviations.
+
+    For each axis the fit also has a trim offset for each record, after the parameters: the trim of the surfaces and the
+    biases of the sensors may differ between records.
     """
     thinned = signals.thin(MOMENT_THINNING, {"alpha": alpha, "beta": beta})
     pressure = dynamic_force(thinned, base)
@@ -52,8 +52,8 @@ def fit_moments(
         known_part, *columns = terms[axis]
         parameters = [parameter for parameter in PARAMETERS if parameter.group == axis]
         means, sds = [parameter.prior for parameter in parameters], [parameter.sd for parameter in parameters]
-        # With a single stretch, the parameter "pitch-offset" is the trim offset in pitch.
-        trims = _stretch_indicators(thinned) if axis != "pitch" or len(thinned.edges) > 2 else []
+        # With a single record, the parameter "pitch-offset" is the trim offset in pitch.
+        trims = _record_indicators(thinned) if axis != "pitch" or len(thinned.edges) > 2 else []
         columns, means, sds = [*columns, *trims], [*means, *(0.0 for _ in trims)], [*sds, *(_TRIM_SD for _ in trims)]
         scale = pressure * length / inertia
         equation = np.column_stack(
@@ -61,13 +61,13 @@ def fit_moments(
         )
         equation = thinned.smooth(equation, MOMENT_CUTOFF_HZ)
         fits[axis] = fit_with_prior(
-            equation[:, 1:], equation[:, 0], np.array(means), spread * np.array(sds), thinned.block
+            equation[:, 1:], equation[:, 0], np.array(means), prior_factor * np.array(sds), thinned.block
         )
     return fits
 
 
-def _stretch_indicators(signals: Signals) -> list[Floats]:
-    """Return for each stretch a column (n,) that is 1 in the stretch and 0 elsewhere."""
+def _record_indicators(signals: Signals) -> list[Floats]:
+    """Return for each record a column (n,) that is 1 in the record and 0 elsewhere."""
     rows = np.arange(len(signals.airspeed))
     return [
         ((rows >= first) & (rows < last)).astype(float)
@@ -78,7 +78,7 @@ def _stretch_indicators(signals: Signals) -> list[Floats]:
 def required_moments(signals: Signals, base: BaseModel, motor: Motor) -> dict[Group, Floats]:
     """Return the aerodynamic moments (n,), N m, that the motion requires, by axis.
 
-    The propeller's torque rolls to the left.
+    The roll moment also balances the reaction to the propeller's torque, which rolls the aircraft to the left.
     """
     ixx, iyy, izz, ixz = base.inertia
     p, q, r = signals.rates.T

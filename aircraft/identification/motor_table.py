@@ -92,7 +92,7 @@ class MotorTable:
 
 
 def _find_cells(grid: Floats, values: Floats) -> tuple[Ints, Floats]:
-    """Return for each value the index of the grid point below it, and its fraction of the distance to the next point.
+    """Return the index of the grid point below each value, and the value's fraction of the next step.
 
     A value beyond an end of the grid is clipped to the end.
     """

@@ -47,12 +47,12 @@ def performance(base: BaseModel, values: Floats, airspeed: float, density: float
     level = np.zeros(count)
     throttle, low, high = np.full(count, 0.5), np.zeros(count), np.ones(count)
     for _ in range(40):
-        thrust, _ = _thrust(base, values, airspeed, throttle, density)
-        alpha, drag = _flow(base, values, airspeed, density, thrust, level)
+        thrust, _ = _thrusts_and_currents(base, values, airspeed, throttle, density)
+        alpha, drag = _alpha_and_drag(base, values, airspeed, density, thrust, level)
         is_short = thrust * np.cos(alpha) < drag
         low, high = np.where(is_short, throttle, low), np.where(is_short, high, throttle)
         throttle = 0.5 * (low + high)
-    _, current = _thrust(base, values, airspeed, throttle, density)
+    _, current = _thrusts_and_currents(base, values, airspeed, throttle, density)
     return Performance(
         climb=_path_angle(base, values, airspeed, density, np.ones(count)),
         sink=-_path_angle(base, values, airspeed, density, np.full(count, idle)),
@@ -66,8 +66,8 @@ def performance(base: BaseModel, values: Floats, airspeed: float, density: float
 _SPEED_RANGE_MPS = (3.0, 150.0)
 
 
-def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
-    """Return the airspeed of level flight at full throttle of each of m draws, m/s, (m,).
+def max_level_speeds(base: BaseModel, values: Floats, density: float) -> Floats:
+    """Return the maximum airspeed of level flight of each of m draws, m/s, (m,).
 
     values: values of the n parameters in each draw, (m, n).
     density: kg/m^3.
@@ -77,8 +77,9 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
     full_throttle, level = np.ones(count), np.zeros(count)
 
     def excess_thrust(speed: Floats) -> Floats:
-        thrust, _ = _thrust(base, values, speed, full_throttle, density)
-        alpha, drag = _flow(base, values, speed, density, thrust, level)
+        """Return the thrust minus the drag at full throttle and at a speed (m,), N, (m,)."""
+        thrust, _ = _thrusts_and_currents(base, values, speed, full_throttle, density)
+        alpha, drag = _alpha_and_drag(base, values, speed, density, thrust, level)
         return np.asarray(thrust * np.cos(alpha) - drag)
 
     # Search downwards: at a lower speed, on the back side of the power curve, thrust equals drag again.
@@ -101,17 +102,20 @@ def fastest_level(base: BaseModel, values: Floats, density: float) -> Floats:
 
 
 def level_controls(base: BaseModel, values: Floats, airspeed: float, density: float) -> tuple[float, float]:
-    """Return the elevator, rad, and the throttle, 0..1, in level flight for parameter values (n,)."""
+    """Return the elevator (rad) and the throttle (0..1) in level flight for parameter values (n,)."""
     rows = np.atleast_2d(values)
     throttle = performance(base, rows, airspeed, density).throttle
-    thrust, _ = _thrust(base, rows, airspeed, throttle, density)
-    alpha, _ = _flow(base, rows, airspeed, density, thrust, np.zeros(1))
-    at_zero, per_alpha = _elevator(base, rows)
+    thrust, _ = _thrusts_and_currents(base, rows, airspeed, throttle, density)
+    alpha, _ = _alpha_and_drag(base, rows, airspeed, density, thrust, np.zeros(1))
+    at_zero, per_alpha = _trimmed_elevator(base, rows)
     return float(at_zero[0] + per_alpha[0] * alpha[0]), float(throttle[0])
 
 
-def _elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
-    """Return the trimmed elevator at zero angle of attack, rad, and its change per angle of attack, two arrays (m,)."""
+def _trimmed_elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
+    """Return the trimmed elevator at zero angle of attack (rad), and its change per angle of attack.
+
+    The result is two arrays (m,).
+    """
     c = base.coefficients
     power = c.pitch_elevator * values[:, INDEX["elevator-power"]]
     return (
@@ -121,25 +125,29 @@ def _elevator(base: BaseModel, values: Floats) -> tuple[Floats, Floats]:
 
 
 def _path_angle(base: BaseModel, values: Floats, airspeed: float, density: float, throttle: Floats) -> Floats:
-    """Return the flight path angle of each draw at a throttle (m,), rad, (m,)."""
-    thrust, _ = _thrust(base, values, airspeed, throttle, density)
+    """Return the flight-path angle of each draw at a throttle (m,), rad, (m,)."""
+    thrust, _ = _thrusts_and_currents(base, values, airspeed, throttle, density)
     angle = np.zeros(len(values))
     for _ in range(12):
-        alpha, drag = _flow(base, values, airspeed, density, thrust, angle)
+        alpha, drag = _alpha_and_drag(base, values, airspeed, density, thrust, angle)
         angle = np.arcsin(np.clip((thrust * np.cos(alpha) - drag) / (base.mass * GRAVITY), -0.9, 0.9))
     return angle
 
 
-def _flow(
+def _alpha_and_drag(
     base: BaseModel, values: Floats, airspeed: Floats | float, density: float, thrust: Floats, angle: Floats
 ) -> tuple[Floats, Floats]:
-    """Return the angle of attack, rad, and the drag, N, with a trimmed elevator at a path angle, rad, all (m,)."""
+    """Return the angle of attack (rad) and the drag (N) with a trimmed elevator, two arrays (m,).
+
+    thrust: N, (m,).
+    angle: flight-path angle, rad, (m,).
+    """
     c = base.coefficients
     pressure = 0.5 * density * airspeed * airspeed * base.area
     column = {name: values[:, k] for name, k in INDEX.items()}
     slope = c.lift_alpha * column["lift-slope"]
     lift_at_zero = c.lift_zero + column["lift-offset"]
-    elevator_at_zero, elevator_per_alpha = _elevator(base, values)
+    elevator_at_zero, elevator_per_alpha = _trimmed_elevator(base, values)
     alpha = np.zeros(len(values))
     weight = base.mass * GRAVITY
     for _ in range(6):
@@ -154,10 +162,10 @@ def _flow(
     return alpha, pressure * (drag + c.drag_elevator * elevator)
 
 
-def _thrust(
+def _thrusts_and_currents(
     base: BaseModel, values: Floats, airspeed: Floats | float, throttle: Floats, density: float
 ) -> tuple[Floats, Floats]:
-    """Return the thrust, N, and the battery current, A, of each draw, two arrays (m,)."""
+    """Return the thrust (N) and the battery current (A) of each draw, two arrays (m,)."""
     # Arrays over the draws replace the motor's constants: its formulas accept them unchanged.
     thrust, speed, torque = (values[:, INDEX[name]] for name in ("thrust", "motor-speed", "propeller-torque"))
     motors = base.motor.with_factors(thrust, speed, torque)  # type: ignore[arg-type]

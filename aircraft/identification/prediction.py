@@ -8,7 +8,7 @@ time constant and the gain of the filter minimize the innovations. The errors ar
 rates, which shows how much a model explains. The innovations of a complete model are white (Klein and Morelli, Aircraft
 System Identification, section 6.2).
 
-Trim offsets (constant moments, one for each stretch) are estimated for each model before it predicts.
+Trim offsets (constant moments, one for each record) are estimated for each model before it predicts.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -32,7 +32,7 @@ UNITS = ("deg/s", "deg/s", "deg/s", "deg", "deg", "m/s")
 HORIZONS_S = (0.2, 0.5, 1.0)
 # Largest number of predictions.
 MAX_PREDICTIONS = 1500
-# Time in a stretch before its first prediction, s; the filter has settled then.
+# Time in a record before its first prediction, s; the filter has settled then.
 _SETTLING_TIME_S = 2.0
 # Time constants of the unmodelled moments that are tried, s.
 _GUST_TIMES_S = (0.05, 0.1, 0.2, 0.4, 0.8)
@@ -76,17 +76,19 @@ class PredictedLog:
 
 @dataclass(frozen=True, slots=True)
 class GustFilter:
-    """Steady-state Kalman filter of the unmodelled moments about one axis: a first-order Gauss-Markov process.
+    """Steady-state Kalman filter of the unmodelled moments about one axis.
 
     decay: factor by which the process decays over a sample.
     gain: fraction of an innovation that is attributed to the process; the rest is white noise.
+
+    The moments are taken as a first-order Gauss-Markov process.
     """
 
     decay: float
     gain: float
 
     def estimate(self, residual: Floats, signals: Signals) -> Floats:
-        """Return the estimate of each sample of a residual from the earlier samples, (n,)."""
+        """Estimate the process at each sample from the earlier samples of a residual (n,), (n,)."""
         from scipy.signal import lfilter
 
         estimate = np.zeros_like(residual)
@@ -100,7 +102,7 @@ class Predictor:
     """A model with the trim offsets and the filtered unmodelled moments of one log.
 
     filters: filters of roll, pitch and yaw; None for the filters with the smallest innovations.
-    trims: (3,) trim offsets as angular accelerations, rad/s^2; None for the means over each stretch of the log.
+    trims: (3,) trim offsets as angular accelerations, rad/s^2; None for the means over each record of the log.
     with_flow: True to use the measured flow angles and airspeed at all times, for an estimate; False to predict them.
     """
 
@@ -120,7 +122,9 @@ class Predictor:
         self._flow = flow_from_forces(signals, base, values, smooth=with_flow)
         self._motor = make_motor(base, values)
         required = self._required_accelerations()
-        modelled = self._accelerations(self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed)))
+        modelled = self._modelled_accelerations(
+            self._flow, signals.rates, signals.airspeed, np.arange(len(signals.airspeed))
+        )
         self.trims = np.empty_like(modelled)
         for first, last in zip(signals.edges[:-1], signals.edges[1:], strict=True):
             offsets = (required[first:last] - modelled[first:last]).mean(axis=0) if trims is None else trims
@@ -130,7 +134,7 @@ class Predictor:
             [_best_filter(residual[:, axis], signals) for axis in range(3)] if filters is None else list(filters)
         )
         self._unmodelled = np.column_stack(
-            [one.estimate(residual[:, axis], signals) for axis, one in enumerate(self.filters)]
+            [gust_filter.estimate(residual[:, axis], signals) for axis, gust_filter in enumerate(self.filters)]
         )
         self._innovations = residual - self._unmodelled
 
@@ -141,35 +145,36 @@ class Predictor:
         return tuple(whiteness(self._innovations[:, axis], count) for axis in range(3))
 
     def predict(self, starts: Ints, horizons: Sequence[float] = HORIZONS_S) -> dict[float, Floats]:
-        """Predict `QUANTITIES` from some rows; return arrays (n, 6), in rad, rad/s and m/s, by the time ahead, s.
+        """Predict `QUANTITIES` at some times ahead, arrays (n, 6) in rad, rad/s and m/s.
 
         starts: (n,) rows at which the predictions start.
+        horizons: times ahead, s, which are the keys of the result.
         """
         horizon_by_sample = {round(horizon * self._signals.hertz): horizon for horizon in horizons}
         predictions = {}
-        for sample, state in enumerate(self.fly(starts, max(horizon_by_sample))):
+        for sample, state in enumerate(self.simulate(starts, max(horizon_by_sample))):
             if sample in horizon_by_sample:
                 speed = np.linalg.norm(state[:, :3], axis=1)
                 predictions[horizon_by_sample[sample]] = np.column_stack([state[:, 3:8], speed])
         return predictions
 
-    def fly(self, starts: Ints, count: int) -> Iterator[Floats]:
-        """Simulate flights with the logged controls; yield the states (n, 8) at their starts and after each sample.
-
-        A state holds velocity through the air, m/s, angular rates, rad/s, bank and pitch, rad.
+    def simulate(self, starts: Ints, count: int) -> Iterator[Floats]:
+        """Simulate flights with the logged controls; yield the states (n, 8) at the start and each sample.
 
         starts: (n,) rows at which the flights start.
         count: number of samples.
+
+        A state holds the velocity through the air (body axes, m/s), the angular rates (rad/s), bank and pitch (rad).
         """
         signals, step = self._signals, 1.0 / self._signals.hertz
         state = np.column_stack([self._air_velocity(starts), signals.rates[starts], signals.attitude[starts, :2]])
-        disturbances, decays = self._unmodelled[starts], np.array([one.decay for one in self.filters])
+        disturbances, decays = self._unmodelled[starts], np.array([gust_filter.decay for gust_filter in self.filters])
         yield state
         for k in range(count):
             rows = starts + k
             # Heun's method, with disturbances held over a step.
-            first = self._state_rates(state, disturbances, rows)
-            second = self._state_rates(state + step * first, disturbances, rows + 1)
+            first = self._state_derivatives(state, disturbances, rows)
+            second = self._state_derivatives(state + step * first, disturbances, rows + 1)
             state = state + 0.5 * step * (first + second)
             if self._with_flow:
                 state[:, :3] = self._air_velocity(rows + 1)
@@ -183,13 +188,20 @@ class Predictor:
         return np.column_stack([ahead * np.cos(alpha), speed * np.sin(beta), ahead * np.sin(alpha)])
 
     def _required_accelerations(self) -> Floats:
-        """Return the aerodynamic moments that the measured motion requires, over the moments of inertia, (n, 3)."""
+        """Return the required aerodynamic moments over the moments of inertia, rad/s^2, (n, 3).
+
+        These are the moments about roll, pitch and yaw that the measured motion requires.
+        """
         ixx, iyy, izz, _ = self._base.inertia
         required = required_moments(self._signals, self._base, self._motor)
         return np.column_stack([required["roll"] / ixx, required["pitch"] / iyy, required["yaw"] / izz])
 
-    def _accelerations(self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints) -> Floats:
-        """Return the model's aerodynamic moments over the moments of inertia, rad/s^2, (n, 3)."""
+    def _modelled_accelerations(self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints) -> Floats:
+        """Return the model's aerodynamic moments over the moments of inertia, rad/s^2, (n, 3).
+
+        rates: angular rates, rad/s, (n, 3).
+        rows: (n,) rows of the control surfaces and the density.
+        """
         base, c = self._base, self._base.coefficients
         factor = {name: float(self._values[k]) for name, k in INDEX.items()}
         elevator, aileron, rudder = self._signals.surfaces[rows].T
@@ -217,19 +229,25 @@ class Predictor:
             + c.yaw_rudder * factor["rudder-power"] * rudder
         )
         ixx, iyy, izz, _ = base.inertia
-        moments = np.column_stack(
+        accelerations_per_force = np.column_stack(
             [base.span / ixx * roll_moment, base.chord / iyy * pitch_moment, base.span / izz * yaw_moment]
         )
-        return np.asarray(pressure[:, np.newaxis] * moments)
+        return np.asarray(pressure[:, np.newaxis] * accelerations_per_force)
 
-    def _state_rates(self, state: Floats, disturbances: Floats, rows: Ints) -> Floats:
-        """Return the rates of change of the states (n, 8), in air with constant gusts."""
+    def _state_derivatives(self, state: Floats, disturbances: Floats, rows: Ints) -> Floats:
+        """Return the state derivatives (n, 8), with the gusts held constant.
+
+        disturbances: unmodelled angular accelerations, rad/s^2, (n, 3).
+        rows: (n,) rows of the controls and the density.
+        """
         signals, base = self._signals, self._base
         u, v, w, p, q, r, roll, pitch = state.T
         airspeed = np.sqrt(u * u + v * v + w * w)
         flow = Flow(np.arctan2(w, u), np.arcsin(v / airspeed), np.zeros_like(u))
-        moments = self._accelerations(flow, state[:, 3:6], airspeed, rows) + self.trims[rows] + disturbances
-        forces = self._specific_forces(flow, state[:, 3:6], airspeed, rows)
+        angular_accelerations = (
+            self._modelled_accelerations(flow, state[:, 3:6], airspeed, rows) + self.trims[rows] + disturbances
+        )
+        specific_forces = self._specific_forces(flow, state[:, 3:6], airspeed, rows)
         ixx, iyy, izz, ixz = base.inertia
         torque = (
             self._motor.propeller_torque(airspeed, signals.throttle[rows], signals.density[rows])
@@ -237,16 +255,16 @@ class Predictor:
             else 0.0
         )
         # Euler's equations with a product of inertia, solved for the accelerations.
-        roll_moment = ixx * moments[:, 0] - torque + ixz * p * q - (izz - iyy) * q * r
-        yaw_moment = izz * moments[:, 2] - ixz * q * r - (iyy - ixx) * p * q
+        roll_moment = ixx * angular_accelerations[:, 0] - torque + ixz * p * q - (izz - iyy) * q * r
+        yaw_moment = izz * angular_accelerations[:, 2] - ixz * q * r - (iyy - ixx) * p * q
         determinant = ixx * izz - ixz * ixz
         return np.column_stack(
             [
-                r * v - q * w - GRAVITY * np.sin(pitch) + forces[0],
-                p * w - r * u + GRAVITY * np.cos(pitch) * np.sin(roll) + forces[1],
-                q * u - p * v + GRAVITY * np.cos(pitch) * np.cos(roll) + forces[2],
+                r * v - q * w - GRAVITY * np.sin(pitch) + specific_forces[0],
+                p * w - r * u + GRAVITY * np.cos(pitch) * np.sin(roll) + specific_forces[1],
+                q * u - p * v + GRAVITY * np.cos(pitch) * np.cos(roll) + specific_forces[2],
                 (izz * roll_moment + ixz * yaw_moment) / determinant,
-                moments[:, 1] - ((ixx - izz) * p * r + ixz * (p * p - r * r)) / iyy,
+                angular_accelerations[:, 1] - ((ixx - izz) * p * r + ixz * (p * p - r * r)) / iyy,
                 (ixz * roll_moment + ixx * yaw_moment) / determinant,
                 p + np.tan(pitch) * (q * np.sin(roll) + r * np.cos(roll)),
                 q * np.cos(roll) - r * np.sin(roll),
@@ -256,7 +274,11 @@ class Predictor:
     def _specific_forces(
         self, flow: Flow, rates: Floats, airspeed: Floats, rows: Ints
     ) -> tuple[Floats, Floats, Floats]:
-        """Return the specific forces forward, right and down, m/s^2, three arrays (n,)."""
+        """Return the specific forces forward, right and down, m/s^2, three arrays (n,).
+
+        rates: angular rates, rad/s, (n, 3).
+        rows: (n,) rows of the controls and the density.
+        """
         signals, base, c = self._signals, self._base, self._base.coefficients
         elevator, aileron, rudder = signals.surfaces[rows].T
         roll, pitch, yaw = (rates * np.array([base.span, base.chord, base.span])).T / (2.0 * airspeed)
@@ -284,18 +306,22 @@ class Predictor:
 
 
 def _best_filter(residual: Floats, signals: Signals) -> GustFilter:
-    """Return the filter with the smallest innovations, for the unexplained accelerations (n,) about an axis."""
+    """Return the filter of an axis with the smallest innovations.
+
+    residual: unexplained angular accelerations about the axis, (n,).
+    """
     filters = [
         GustFilter(float(np.exp(-1.0 / (signals.hertz * gust_time))), gain)
         for gust_time in _GUST_TIMES_S
         for gain in _FILTER_GAINS
     ]
-    return min(filters, key=lambda one: float((residual - one.estimate(residual, signals)).var()))
+    return min(filters, key=lambda gust_filter: float((residual - gust_filter.estimate(residual, signals)).var()))
 
 
 def whiteness(innovations: Floats, lags: int) -> float:
-    """Return the fraction of the autocorrelations of a series (n,) within +-1.96 / sqrt(n), as for white noise.
+    """Return the fraction of a series' autocorrelations within +-1.96 / sqrt(n), as for white noise.
 
+    innovations: series, (n,).
     lags: the autocorrelations are those at lags of 1 to this number of samples.
 
     >>> whiteness(np.random.default_rng(1).normal(size=5000), 100) > 0.9
@@ -309,8 +335,9 @@ def whiteness(innovations: Floats, lags: int) -> float:
 
 
 def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: float = max(HORIZONS_S)) -> Ints:
-    """Return at most ``count`` rows from which predictions start, (n,), evenly distributed over all stretches.
+    """Return the rows from which predictions start, (n,), evenly distributed over all records.
 
+    count: maximum number of rows.
     horizon: longest time ahead, s.
     """
     longest = round(horizon * signals.hertz)
@@ -325,7 +352,7 @@ def prediction_starts(signals: Signals, count: int = MAX_PREDICTIONS, horizon: f
 
 
 def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]) -> PredictedLog:
-    """Predict a log by constant rates and by several models.
+    """Compare the predictions of a log by constant rates and by several models with the measured values.
 
     models: base model and parameter values by name; the predictions of the last model are returned to be shown.
     """
@@ -334,7 +361,7 @@ def predict_log(signals: Signals, models: Mapping[str, tuple[BaseModel, Floats]]
         horizon: _measured_quantities(signals, starts + round(horizon * signals.hertz)) for horizon in HORIZONS_S
     }
     now = _measured_quantities(signals, starts)
-    constant = {horizon: _constant_rates(now, horizon) for horizon in HORIZONS_S}
+    constant = {horizon: _predict_constant_rates(now, horizon) for horizon in HORIZONS_S}
     predictions = [Prediction("constant rates", _rms_errors(constant, measured))]
     shown = constant[HORIZONS_S[1]]
     for name, (base, values) in models.items():
@@ -356,7 +383,7 @@ def _measured_quantities(signals: Signals, rows: Ints) -> Floats:
     return np.column_stack([signals.rates[rows], signals.attitude[rows, :2], signals.airspeed[rows]])
 
 
-def _constant_rates(quantities: Floats, horizon: float) -> Floats:
+def _predict_constant_rates(quantities: Floats, horizon: float) -> Floats:
     """Return the quantities (n, 6) after a time, s, at constant angular rates and airspeed."""
     p, q, r, roll, pitch, _ = quantities.T
     predicted = quantities.copy()

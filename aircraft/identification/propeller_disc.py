@@ -38,7 +38,7 @@ class PropellerDisc:
     def with_factors(
         self, thrust: float = 1.0, speed: float = 1.0, torque: float = 1.0, resistance: float = 1.0, idle: float = 1.0
     ) -> "PropellerDisc":
-        """Return a copy with scaled thrust, exit speed, power at a given thrust (`torque`) and losses (`resistance`).
+        """Return a copy of the disc with scaled properties, as `Motor.with_factors` describes.
 
         idle: has no effect, because a disc has no idle current.
         """

@@ -67,9 +67,11 @@ class Refinement:
     gains: Floats
 
     def values_for(self, signals: Signals, base: BaseModel, values: Floats) -> Floats:
-        """Return the refined values (m,) for other signals, base model, and lift and drag parameters, to first order.
+        """Return the refined values (m,) for other signals, another base, or other lift and drag parameters.
 
         values: (n,) all parameters, of which the parameters of the moments are ignored.
+
+        The change of the prediction errors is taken to first order.
         """
         tried_values = values.copy()
         tried_values[IS_MOMENT] = self.values
@@ -80,11 +82,11 @@ class Refinement:
 def refine_moments(
     signals: Signals, base: BaseModel, values: Floats, horizons: Sequence[float] = HORIZONS_S, steps: int = MAX_STEPS
 ) -> Refinement:
-    """Refine the parameters of the moments by Gauss-Newton steps, each limited to one standard deviation of the prior.
+    """Refine the parameters of the moments such that the angular rates are predicted best.
 
     values: values of all parameters, (n,), from which the refinement starts.
     horizons: times ahead of the compared predictions, s.
-    steps: number of steps.
+    steps: number of Gauss-Newton steps, each limited to one standard deviation of the prior.
     """
     starts = prediction_starts(signals, _COUNT, max(horizons))
     filters = Predictor(signals, base, values, with_flow=True).filters
@@ -92,6 +94,7 @@ def refine_moments(
     values = values.copy()
 
     def errors_of(tried_values: Floats) -> Floats:
+        """Return the prediction errors of parameter values (n,)."""
         return prediction_errors(signals, base, tried_values, starts, filters, horizons)
 
     errors = errors_of(values)
@@ -116,9 +119,9 @@ def refine_moments(
 
 
 def without_collinear_directions(slopes: Floats) -> Floats:
-    """Return slopes (n, m) with the components removed along directions that the log does not determine.
+    """Return slopes (n, m) without their components along directions that the log does not determine.
 
-    These are directions in the space of the m parameters, with all columns scaled to the same length.  Along them an
+    These are directions in the space of the m parameters, with all columns scaled to the same length. Along them an
     estimate keeps its prior.
 
     >>> aileron = np.array([1.0, -1.0, 2.0, 0.5])
@@ -140,7 +143,10 @@ def prediction_errors(
     filters: Sequence[GustFilter],
     horizons: Sequence[float] = HORIZONS_S,
 ) -> Floats:
-    """Return the measured minus the predicted angular rates, rad/s, by axis, start and time ahead, (3, n, h)."""
+    """Return the measured minus the predicted angular rates, rad/s, (3, n, h).
+
+    The axes of the result are roll, pitch and yaw; the n starts; the h times ahead.
+    """
     predicted = Predictor(signals, base, values, filters, with_flow=True).predict(starts, horizons)
     measured = [signals.rates[starts + round(horizon * signals.hertz)] for horizon in horizons]
     return np.stack(

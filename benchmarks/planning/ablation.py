@@ -1,4 +1,4 @@
-"""Measure the value of each part of the default planner, without seeds, generations or tightening."""
+"""Measure the value of each part of the default planner, without seeds, generations or final shortening."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,9 +34,9 @@ def variants() -> list[Variant]:
         Variant(f"{DEFAULT}, the default", whole),
         Variant("no generations", whole, generations=False),
         Variant("UMDA's generations (umda-seeded)", ALGORITHMS["umda-seeded"]),
-        Variant("no tightening", replace(whole, tightened=False)),
+        Variant("no final shortening", replace(whole, final_shortening=False)),
         Variant("no seeds (fda)", seedless),
-        Variant("no seeds, no tightening", replace(seedless, tightened=False)),
+        Variant("no seeds, no final shortening", replace(seedless, final_shortening=False)),
         Variant("no seeds, UMDA's generations (umda-smooth)", ALGORITHMS["umda-smooth"]),
     ]
 

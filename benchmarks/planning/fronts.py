@@ -158,10 +158,10 @@ def theirs(
         def _evaluate(self, x: Floats, out: dict[str, Floats], *_args: object, **_more: object) -> None:
             nonlocal spent
             spent += len(x)
-            objectives, violations = task.scores(task.paths(x))
+            objectives, violations = task.scores(task.to_paths(x))
             if penalised:
                 # MOEA/D compares infeasible paths, too.
-                objectives = task.objectives(task.values(task.paths(x)))
+                objectives = task.objectives(task.values(task.to_paths(x)))
             scaled = (objectives - contest.ideal) / (contest.reference - contest.ideal)
             scaled = np.nan_to_num(scaled, nan=1e6, posinf=1e6, neginf=-1.0)
             met = (violations <= 0.0).all(axis=1)
@@ -187,7 +187,7 @@ def theirs(
 
 def _thinned(contest: Contest, vectors: Floats) -> Floats:
     """Return the paths of vectors (n, d) that cover most, five times the required number."""
-    paths = contest.task.paths(vectors[-20_000:])
+    paths = contest.task.to_paths(vectors[-20_000:])
     objectives = contest.task.objectives(contest.task.values(paths))
     chosen: list[int] = []
     # In parts, so that the tables fit in memory.
@@ -235,8 +235,8 @@ def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, 
     front, contest, mine = ours(name, seed)
     if not front.plans:
         return {"planfly": mine}, front
-    own = contest.task.vectors(np.array(list(seed_paths(contest.task, np.array(front.default.plan.waypoints)))))
-    start = contest.certified(contest.task.paths(own))
+    own = contest.task.to_vectors(np.array(list(seed_paths(contest.task, np.array(front.default.plan.waypoints)))))
+    start = contest.certified(contest.task.to_paths(own))
     rows = {"planfly": mine, "our seeds alone": Row(contest.share(start), len(start), len(own), 0.0)}
     none = own[:0]
     for algorithm in ("NSGA-II", "MOEA/D"):
@@ -250,7 +250,7 @@ def _rows(name: str, seed: int, *, whole: bool, alone: bool) -> tuple[dict[str, 
 
 def _covering_first(contest: Contest, vectors: Floats) -> Floats:
     """Return vectors (n, d) in the order of their coverage, infeasible ones last."""
-    objectives, violations = contest.task.scores(contest.task.paths(vectors))
+    objectives, violations = contest.task.scores(contest.task.to_paths(vectors))
     met = np.flatnonzero((violations <= 0.0).all(axis=1))
     first = met[covering_order(objectives[met], contest.reference, len(met))]
     return np.concatenate([vectors[first], np.delete(vectors, first, axis=0)])

@@ -19,7 +19,7 @@ from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem import ProblemArrays
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_chains import free_points
-from planner.seeding.waypoint_fitting import fit_waypoints, tighten
+from planner.seeding.waypoint_fitting import fit_waypoints, move_all_waypoints
 from world.arrays import Flags, Floats, Ints
 
 # Spacing of the lattice's places, m.
@@ -228,7 +228,7 @@ def lattice_search(task: Task) -> tuple[float, Floats | None]:
         path = fit_waypoints(data, frame, points, encoding.waypoints)
         vector = rotated_vectors(task.problem.space, encoding, path[None])[0]
         for scale in SCALES:
-            vector, _ = tighten(data, encoding, vector, 4, scale)
+            vector, _ = move_all_waypoints(data, encoding, vector, 4, scale)
             found, _ = search_patterns(data, encoding, vector, PATTERNS)
             vector = found[int(np.argmin(scalar(*task.scores(found))))]
             made = encoding.decode(vector[None])[0]

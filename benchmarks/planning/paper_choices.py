@@ -13,7 +13,15 @@ import numpy as np
 
 from benchmarks.task import exact_airframe
 from planfly.planning.paper import PROBLEMS, STRIP_HALF_WIDTHS_M, problem_name
-from planner.evaluation.encoding import Encoding, Space, bearing, cartesian, polar, polar_45, rotated
+from planner.evaluation.encoding import (
+    Encoding,
+    Space,
+    bearing_encoding,
+    cartesian_encoding,
+    polar_45_encoding,
+    polar_encoding,
+    rotated_encoding,
+)
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.optimisers.preference import NO_GOAL, Level, ranks
@@ -47,7 +55,7 @@ class Choice:
     """Choice of encoding, strip, optimiser, preference, and reported path."""
 
     name: str
-    encode: Callable[[Space, int], Encoding] = rotated
+    encode: Callable[[Space, int], Encoding] = rotated_encoding
     strip: bool = False
     optimiser: type[Umda] = Umda
     levels: tuple[Level, ...] = PAPER_LEVELS
@@ -58,7 +66,7 @@ def _longer(share: float) -> Callable[[Space, int], Encoding]:
     """Return a polar encoding with steps of up to this multiple of the mean leg."""
 
     def encode(space: Space, waypoints: int) -> Encoding:
-        encoding, upper = polar(space, waypoints), polar(space, waypoints).upper.copy()
+        encoding, upper = polar_encoding(space, waypoints), polar_encoding(space, waypoints).upper.copy()
         upper[0::3] *= 0.5 * share
         return replace(encoding, upper=upper)
 
@@ -69,7 +77,7 @@ def _widest(degrees: float) -> Callable[[Space, int], Encoding]:
     """Return a polar encoding with turning angles up to a limit in degrees."""
 
     def encode(space: Space, waypoints: int) -> Encoding:
-        encoding = polar(space, waypoints)
+        encoding = polar_encoding(space, waypoints)
         lower, upper = encoding.lower.copy(), encoding.upper.copy()
         lower[1::3], upper[1::3] = -math.radians(degrees), math.radians(degrees)
         return replace(encoding, lower=lower, upper=upper)
@@ -79,7 +87,7 @@ def _widest(degrees: float) -> Callable[[Space, int], Encoding]:
 
 def _from_east(space: Space, waypoints: int) -> Encoding:
     """Return a polar encoding within 45 degrees, with a free first angle from east, as no leg is before it."""
-    encoding = polar_45(space, waypoints)
+    encoding = polar_45_encoding(space, waypoints)
     lower, upper = encoding.lower.copy(), encoding.upper.copy()
     lower[1], upper[1] = -math.pi, math.pi
     return replace(encoding, lower=lower, upper=upper)
@@ -92,14 +100,14 @@ CHOICES = (
     Choice("samples outside: left free", optimiser=FreeUmda),
     Choice("path reported: best of the last generation", archive=False),
     Choice("kill exposure ahead of length", levels=KILL_FIRST),
-    Choice("Cartesian", cartesian),
-    Choice("polar, theta within 180 deg", polar),
+    Choice("Cartesian", cartesian_encoding),
+    Choice("polar, theta within 180 deg", polar_encoding),
     Choice("polar, theta within 90 deg", _widest(90.0)),
-    Choice("polar, theta within 45 deg", polar_45),
+    Choice("polar, theta within 45 deg", polar_45_encoding),
     Choice("polar, 45 deg, first angle free", _from_east),
     Choice("polar, 180 deg, r up to 1.2 mean legs", _longer(1.2)),
     Choice("polar, 180 deg, r up to 4 mean legs", _longer(4.0)),
-    Choice("polar, theta from the straight line", bearing),
+    Choice("polar, theta from the straight line", bearing_encoding),
 )
 
 

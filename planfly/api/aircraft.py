@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypedDict, Unpack, cast, overload
 
-from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft, make_own_folder, model_hash
+from aircraft.catalog import Aircraft, aircraft_names, copy_aircraft_folder, find_aircraft, load_aircraft, model_hash
 from aircraft.envelope import Envelope
 from aircraft.model_writer import Layout
 from flight.autopilots.catalog import autopilot_classes, program_classes
@@ -134,7 +134,7 @@ def new_aircraft(
     if not sheet_values:
         source_aircraft = _load_aircraft("aerosonde" if source is None else source)
         model = shipped_model(source_aircraft) if source_aircraft.model.shipped else None
-        make_own_folder(Path(folder), source_aircraft, model, overwrite=overwrite)
+        copy_aircraft_folder(Path(folder), source_aircraft, model, overwrite=overwrite)
         return find_aircraft(str(Path(folder).absolute()))
     if source is not None:
         raise PlanflyError.of_argument(

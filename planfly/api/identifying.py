@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft, write_own_folder
+from aircraft.catalog import Aircraft, check_new_folder, find_aircraft, read_aircraft, write_aircraft_folder
 from aircraft.identification.estimate import Estimate, estimate_model, score_predictions
 from aircraft.identification.flight_record import FlightRecord
 from aircraft.identification.prediction import PredictedLog
@@ -151,7 +151,7 @@ def identify_aircraft(
         predicted = score_predictions(estimate, checked or records, base_numbers, prior.name)
     with stage("drawing", "drawing an identification"):
         files["identify.html"] = _report_page(identified, predicted, check, target.name)
-    write_own_folder(target, {name: text.encode() for name, text in files.items()})
+    write_aircraft_folder(target, {name: text.encode() for name, text in files.items()})
     return _make_result(read_aircraft(target), identified, predicted, records)
 
 

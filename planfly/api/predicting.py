@@ -10,7 +10,7 @@ import numpy as np
 
 from aircraft.catalog import Aircraft, find_aircraft
 from aircraft.identification.blind import DRAWS, Band, BlindPrediction, band_limits, uninformative_note
-from aircraft.identification.estimate import align_clocks
+from aircraft.identification.estimate import estimate_clocks
 from aircraft.identification.flight_record import FlightRecord
 from flight.dynamics.fdm import Variation
 from logs.importers.motion import MotionLog
@@ -187,7 +187,7 @@ def _predict_by_controls(motion: MotionLog, aircraft: Aircraft, start: float | N
             raise LogError(message, file=motion.source, field="start", value=start, allowed=allowed)
     with stage("predicting") as advance:
         central = varied_model(aircraft, Variation())
-        clocks = align_clocks(earlier, central)[-1]
+        clocks = estimate_clocks(earlier, central)[-1]
         prediction = BlindPrediction(earlier, judged, clocks, central)
         models = []
         for number, draw in enumerate(drawn_flights(aircraft), 1):

@@ -13,7 +13,7 @@ from aircraft.identification.drag import NUISANCES
 from aircraft.identification.draws import DRIVE_POWER, draw_aircraft, draw_drive_power
 from aircraft.identification.estimate import Estimate
 from aircraft.identification.parameters import PARAMETERS
-from aircraft.identification.performance import GRAVITY, Performance, fastest_level, level_controls, performance
+from aircraft.identification.performance import GRAVITY, Performance, level_controls, max_level_speeds, performance
 from aircraft.power_prior import EFFICIENCY_LOG_SD
 from aircraft.uncertainty import Draws, draws_text
 from flight.autopilots.arduplane.parameters import DEFINITIONS, ArduPilotParameters
@@ -302,7 +302,7 @@ def posterior_text(identified: Identified) -> str:
     if (conflict := identified.power_conflict()) is not None:
         power = min(1.0, max(power, math.log(conflict.largest_power / conflict.power) / 1.96))
     climb, sink = (float(np.degrees(np.std(angles))) for angles in (samples.climb, samples.sink))
-    fastest = fastest_level(identified.numbers, identified.draws, DENSITY)
+    fastest = max_level_speeds(identified.numbers, identified.draws, DENSITY)
     log_fractions = estimate.log_fractions()
     lines = [
         "# What flight logs say of this aircraft.  Each property is one of the model's: a factor on the base's",

@@ -6,7 +6,7 @@ actual calls.
 
 # Kernels of terrain and map projection.
 _FIELD = (
-    "world.least_squares._least_squares",
+    "world.least_squares._solve_gram_schmidt",
     "world.frames._evaluate_polymap",
     "world.terrain._ground_heights",
 )
@@ -15,7 +15,7 @@ _TRACKING_KERNELS = ("flight.autopilots.arduplane.tracking_error._measure_corner
 # Kernels of a scenario.
 _WORLD_KERNELS = (*_FIELD, *_TRACKING_KERNELS)
 # Kernel of the ranking of candidates.
-_RANK_KERNELS = ("planner.optimisers.preference._rank_rows",)
+_RANK_KERNELS = ("planner.optimisers.preference._rank_candidates",)
 # Kernels of the arrays of a planning problem.
 _ARRAY_KERNELS = (
     "world.terrain.steepest_slopes",
@@ -51,7 +51,7 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         _CERTIFY_MODULE + "leg_slope_limits",
         _CERTIFY_MODULE + "missile_distance",
         _CERTIFY_MODULE + "turn_and_roll_lengths",
-        _CERTIFY_MODULE + "with_courses",
+        _CERTIFY_MODULE + "with_end_course_points",
         "planner.evaluation.corners.fly_by_radii",
         "planner.evaluation.corners.settling_length",
     ),

@@ -130,8 +130,10 @@ def expected_orbits(plan: Plan, autopilot: Autopilot, limits: Limits) -> float:
     On a leg that climbs or sinks, less of the aircraft's climb or sink rate remains to counteract gusts.
     """
     turbulence, orbits = plan.scenario.wind.turbulence, 0.0
-    for rate, waypoint in zip(limits.climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True):
-        climb, sink = limits.rates(float(waypoint[2]))
+    for rate, waypoint in zip(
+        limits.leg_climb_rates(plan.waypoints)[:-1, 1].tolist(), plan.waypoints[1:-1], strict=True
+    ):
+        climb, sink = limits.max_rates(float(waypoint[2]))
         orbits += autopilot.deviations.altitude_miss_probability(
             climb - max(0.0, rate), sink - max(0.0, -rate), turbulence
         )
@@ -150,7 +152,7 @@ def max_waypoints_in_gusts(plan: Plan, airframe: Airframe) -> int:
     22
     """
     scenario, count = plan.scenario, len(plan.waypoints)
-    climb, sink = airframe.limits.with_margin().rates(float(plan.waypoints[:, 2].max()))
+    climb, sink = airframe.limits.with_margin().max_rates(float(plan.waypoints[:, 2].max()))
     probability = airframe.autopilot.deviations.altitude_miss_probability(climb, sink, scenario.wind.turbulence)
     if probability == 0.0:
         return count

@@ -14,7 +14,7 @@ from flight.autopilots.catalog import load_autopilot
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.setup import FlightSetup, make_limits
 from planner.plan import Plan
-from planner.search.lay_ground_ways import FinalModel, with_ground_ways
+from planner.search.lay_ground_ways import FinalModel, add_departure_and_approach
 from world.errors import FlightError, ScenarioError
 from world.scenario import Scenario
 
@@ -68,7 +68,7 @@ def with_departure_and_approach(plan: Plan, airframe: Airframe, flown_plan: Plan
         slope=lambda height, distance, tailwind, amsl: autopilot.ground.glide(height, distance, tailwind, amsl).slope,
     )
     flown_departure = None if flown_plan is None or flown_plan.ways is None else flown_plan.ways.climb
-    return with_ground_ways(plan, airframe.limits.with_margin(), final_law, flown_departure)
+    return add_departure_and_approach(plan, airframe.limits.with_margin(), final_law, flown_departure)
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aircraft.catalog import Aircraft, check_new_folder, read_aircraft, write_own_folder
+from aircraft.catalog import Aircraft, check_new_folder, read_aircraft, write_aircraft_folder
 from aircraft.data_sheet import (
     FUEL_HEAT,
     RANGES,
@@ -416,7 +416,7 @@ def make_data_sheet_folder(
         sized = size_aircraft(check_sheet(sheet))
     with temporary_folder("planfly-sheet-") as draft_folder:
         files = _make_files(sized, target.name, draft_folder, file_parameters)
-    write_own_folder(target, {name: text.encode() for name, text in files.items()})
+    write_aircraft_folder(target, {name: text.encode() for name, text in files.items()})
     return read_aircraft(target)
 
 

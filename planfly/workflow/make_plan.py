@@ -83,7 +83,7 @@ def make_plan(
         return plan_path(world, search_limits, seed=seed, algorithm=algorithm, progress=advance, stop=stop)
 
     searches = SharedBudget(search)
-    plan = searches.total(complete_plan(searches(scenario, limits), searches))
+    plan = searches.with_total_evaluations(complete_plan(searches(scenario, limits), searches))
     return _add_ground_phases(plan, airframe, continues=continues)
 
 

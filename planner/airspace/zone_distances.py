@@ -42,21 +42,21 @@ class AltitudeBand(NamedTuple):
 
 
 @inner
-def zone_excess(
+def zone_penetration(
     zones: ZonesWithMargins,
     heights: Heights,
     to_pixel: PolyMapRecord,
-    pitch: float,
+    sample_spacing: float,
     a: Floats,
     b: Floats,
     lateral_error: float,
     error_below: float,
     error_above: float,
 ) -> float:
-    """Return the depth of the leg a-b in zones enlarged by their margins, integrated over its length, m x km.
+    """Return the depth of the leg a-b in zones with their margins, integrated over its length, m x km.
 
-    pitch: spacing of terrain samples (m), for levels above ground. lateral_error, error_below, error_above: tracking
-    error, m.
+    sample_spacing: spacing of terrain samples (m), for levels above ground.
+    lateral_error, error_below, error_above: tracking error, m.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
     total, required, records = 0.0, zones.required, zones.records
@@ -66,7 +66,7 @@ def zone_excess(
         zone = records.zones[z]
         band = altitude_band(a[2], b[2], error_below, error_above)
         if zone.floor_above_ground or zone.ceiling_above_ground:
-            band = _sampled_altitude_band(heights, to_pixel, pitch, a, b, 0.0, 1.0, error_below, error_above)
+            band = _sampled_altitude_band(heights, to_pixel, sample_spacing, a, b, 0.0, 1.0, error_below, error_above)
         vertical_excess = vertical_distance(zone, band) + required[z].vertical
         total += max(0.0, vertical_excess) * max(line.length, MIN_CHARGED_LENGTH) / 1000.0
     max_margin = zones.max_horizontal + lateral_error
@@ -89,7 +89,7 @@ def zone_excess(
         )
         if zone.floor_above_ground or zone.ceiling_above_ground:
             band = _sampled_altitude_band(
-                heights, to_pixel, pitch, a, b, first_fraction, last_fraction, error_below, error_above
+                heights, to_pixel, sample_spacing, a, b, first_fraction, last_fraction, error_below, error_above
             )
         vertical_excess = required[z].vertical - vertical_distance(zone, band)
         total += (
@@ -104,10 +104,12 @@ def zone_excess(
 def penetration_depth(
     records: ZoneRecords, z: int, line: MapSegment, required_distance: float
 ) -> tuple[float, float, float]:
-    """Return the depth of a line in exclusion z, enlarged by `required_distance`, m, and two fractions of the line.
+    """Return the depth of a line in exclusion z with its margin, and the part of the line abreast of it.
 
-    The depth is the shift of the line that would move it to `required_distance` (m) from the zone; 0 if the line is far
-    enough away.  The part of the line that is abreast of the zone is between the two fractions.
+    required_distance: required distance from the zone, m.
+
+    The depth is the shift of the line (m) that would move it to `required_distance` from the zone; 0 if the line is far
+    enough away. The part of the line is given by two fractions of the line's length.
     """
     view = view_shape(records, z, line, required_distance)
     if not view.inside and view.distance >= required_distance:
@@ -126,7 +128,10 @@ def penetration_depth(
 
 @inner
 def _inclusion_excess(records: ZoneRecords, z: int, line: MapSegment, required_distance: float) -> float:
-    """Return how far a line is from being `required_distance` (m) inside inclusion z, integrated along it, m x km."""
+    """Return how far a line is outside inclusion z or near its edge, integrated along the line, m x km.
+
+    required_distance: required distance inside the edge, m.
+    """
     view = view_shape(records, z, line, required_distance)
     if view.inside and view.distance >= required_distance:
         return 0.0
@@ -159,7 +164,7 @@ def altitude_band(start_altitude: float, end_altitude: float, error_below: float
 def _sampled_altitude_band(
     heights: Heights,
     to_pixel: PolyMapRecord,
-    pitch: float,
+    sample_spacing: float,
     a: Floats,
     b: Floats,
     first_fraction: float,
@@ -169,14 +174,16 @@ def _sampled_altitude_band(
 ) -> AltitudeBand:
     """Return the vertical range of a part of the line a-b, with heights above ground at samples.
 
+    sample_spacing: m.
     first_fraction, last_fraction: limits of the part, as fractions of the line.
+
     If the ground is unknown at a sample, the heights above ground are not limited.
     """
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     band = altitude_band(a[2] + first_fraction * dz, a[2] + last_fraction * dz, error_below, error_above)
     first_column, first_row = polymap(to_pixel, a[0] + first_fraction * dx, a[1] + first_fraction * dy)
     last_column, last_row = polymap(to_pixel, a[0] + last_fraction * dx, a[1] + last_fraction * dy)
-    sample_count = 2 + int((last_fraction - first_fraction) * math.sqrt(dx * dx + dy * dy) / pitch)
+    sample_count = 2 + int((last_fraction - first_fraction) * math.sqrt(dx * dx + dy * dy) / sample_spacing)
     min_height, max_height = math.inf, -math.inf
     for k in range(sample_count):
         fraction = k / (sample_count - 1)
@@ -196,7 +203,7 @@ def _sampled_altitude_band(
 def vertical_distance(zone: Record, band: AltitudeBand) -> float:
     """Return the distance of a vertical range below a zone's floor or above its ceiling, m.
 
-    The distance is negative between floor and ceiling.  It is the smallest distance of any height of the range for an
+    The distance is negative between floor and ceiling. It is the smallest distance of any height of the range for an
     exclusion, and the largest for an inclusion.
     """
     floor_min, floor_max = band.min_altitude, band.max_altitude
@@ -234,10 +241,11 @@ def measure_zone_margin(
     error_above: float,
     margin: Record,
 ) -> None:
-    """Fill the `ZONE_MARGIN` record of the piece a-b.
+    """Fill the `ZONE_MARGIN` record of the straight piece a-b of a path.
 
-    depths: negated heights of the ground. lateral_error: (2,) lateral tracking error at a and b; error_below,
-    error_above: vertical tracking error, m.
+    depths: negated heights of the ground.
+    lateral_error: (2,) lateral tracking error at a and b, m.
+    error_below, error_above: vertical tracking error, m.
     """
     margin.nearest, margin.satisfied, margin.zone = math.inf, True, -1
     records, max_lateral_error = zones.records, max(lateral_error[0], lateral_error[1])
@@ -284,7 +292,7 @@ def measure_zone_margin(
 
 @inner
 def _update_margin(zone: Record, required: Record, z: int, horizontal: float, vertical: float, margin: Record) -> None:
-    """Update the record with the distances of a piece from a zone."""
+    """Update the record with the distances of a piece of the path from zone z."""
     is_satisfied = horizontal >= required.horizontal or vertical >= required.vertical
     if not zone.exclusion:
         is_satisfied = horizontal >= required.horizontal and -vertical >= required.vertical
@@ -303,16 +311,17 @@ def _update_margin(zone: Record, required: Record, z: int, horizontal: float, ve
 def _distance_to_violation(zone: Record, horizontal: float, vertical: float) -> float:
     """Return the distance that is left before a zone is violated, m; negative if it is violated.
 
-    horizontal: distance outside an exclusion or inside an inclusion, m.  vertical: distance outside its band, m.
+    horizontal: distance outside an exclusion or inside an inclusion, m.
+    vertical: distance below the zone's floor or above its ceiling, m.
     """
     return max(horizontal, vertical) if zone.exclusion else min(horizontal, -vertical)
 
 
 @inner
 def _horizontal_distance(records: ZoneRecords, z: int, a: Floats, b: Floats, max_distance: float) -> float:
-    """Return the smallest horizontal distance of the line a-b outside an exclusion or inside an inclusion, m.
+    """Return the smallest horizontal distance of the line a-b outside an exclusion or inside an inclusion.
 
-    The distance is negative for a line that enters the exclusion or leaves the inclusion.  Distances above
+    The distance (m) is negative for a line that enters the exclusion or leaves the inclusion. Distances above
     `max_distance` may be inf.
     """
     line = segment_between(a[0], a[1], b[0], b[1])
@@ -337,7 +346,7 @@ def _exact_altitude_band(
     error_below: float,
     error_above: float,
 ) -> AltitudeBand:
-    """Return the vertical range of the line a-b, with exact heights above the ground below it and on both sides of it.
+    """Return the vertical range of the line a-b, with exact heights above the ground around it.
 
     lateral_error: (2,) distance of the ground on both sides that is included, at a and at b, m.
     """

@@ -55,7 +55,9 @@ class ZoneMargins(NamedTuple):
 def add_margins(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> ZonesWithMargins:
     """Return zones with margins; the margin of a zone is reduced if a fixed end violates it.
 
-    ends: (k, 3) m. The margin is 0 for an exclusion that contains an end, and for an inclusion that does not.
+    ends: (k, 3) m.
+
+    The margin is 0 for an exclusion that contains an end, and for an inclusion that does not.
 
     >>> from world.airspace.zones import Cylinder
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
@@ -86,7 +88,8 @@ def _reduce_margins(
 ) -> None:
     """Reduce the margins that a fixed end violates to a fraction of the end's distance from the zone.
 
-    ends: (k, 3) m.  ground_heights: (k,) ground heights at the ends, m.
+    ends: (k, 3) m.
+    ground_heights: (k,) ground heights at the ends, m.
     """
     for z in range(required.shape[0]):
         zone, margin = records.zones[z], required[z]
@@ -108,7 +111,10 @@ def _reduce_margins(
 
 @inner
 def first_exclusion_near(zones: ZonesWithMargins, west: float) -> int:
-    """Return the index of the first exclusion that may reach a position `west` (m), the western edge of a search."""
+    """Return the index of the first exclusion that may reach east of a position `west`, m.
+
+    `west` is the western edge of the area that is searched for exclusions.
+    """
     low, high = zones.inclusions, zones.required.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -222,7 +228,7 @@ def segment_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:
 
 @inner
 def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: float) -> ShapeView:
-    """Return the shape of zone z as seen from a line; distances above `max_distance` (m) may be inf."""
+    """Measure the shape of zone z along and across a line; distances above `max_distance` (m) may be inf."""
     zone = records.zones[z]
     if zone.round:
         east_offset, north_offset = zone.centre_east - line.east, zone.centre_north - line.north
@@ -262,7 +268,7 @@ def view_shape(records: ZoneRecords, z: int, line: MapSegment, max_distance: flo
 
 @inlined
 def _view_circle(along: float, across: float, radius: float, horizontal_length: float) -> ShapeView:
-    """Return a circle as seen from a line, given its centre in the line's axes."""
+    """Measure a circle along and across a line, given its centre in the line's axes."""
     distance_beyond_end = along - min(horizontal_length, max(0.0, along))
     min_distance = math.sqrt(distance_beyond_end * distance_beyond_end + across * across) - radius
     max_inside_distance = math.sqrt(max(abs(along), abs(along - horizontal_length)) ** 2 + across * across) - radius
@@ -274,7 +280,10 @@ def _view_circle(along: float, across: float, radius: float, horizontal_length: 
 
 @inlined
 def _edge_distance2(along: float, across: float, to_along: float, to_across: float, horizontal_length: float) -> float:
-    """Return the squared distance between the line and an edge that does not cross it."""
+    """Return the squared distance between a line and an edge that does not cross it, m^2.
+
+    along, across, to_along, to_across: ends of the edge in the line's axes, m.
+    """
     # Two pieces that do not cross are nearest at an end of one of them.
     distance_beyond_end = along - min(horizontal_length, max(0.0, along))
     min_distance2 = distance_beyond_end * distance_beyond_end + across * across

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_excess
+from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_penetration
 from planner.evaluation.certify_kernels import END_DISTANCE_M, TRACKED_PIECE, required_buffer, tracked_pieces
 from planner.evaluation.corners import ARC_STEP, blended_vertices, fly_by_radii, half_blend_length
 from planner.evaluation.paper_scores import POINTS_PER_LEG
@@ -43,7 +43,7 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `AIRSPACE_PIECE` records of a path (w, 3): first those of its legs, then those of its corners."""
+    """Return `AIRSPACE_PIECE` records of a path (w, 3): those of its legs, then those of its corners."""
     pieces = (
         tracked_pieces(data, waypoints) if data.tracking.has_error else _pieces_without_tracking_error(data, waypoints)
     )
@@ -74,7 +74,7 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records for a path without tracking error, first its legs, then the chords of its arcs."""
+    """Return `TRACKED_PIECE` records of a path without tracking error: its legs, then chords of its arcs."""
     leg_count, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     pieces = np.zeros(leg_count + leg_count * _MAX_PIECES, dtype=TRACKED_PIECE)
     for i in range(leg_count):
@@ -107,7 +107,7 @@ def _pieces_without_tracking_error(data: ProblemArrays, waypoints: Floats) -> Re
 
 @inner
 def _max_height_above_ground(data: ProblemArrays, piece: Record) -> float:
-    """Return the maximum height above ground along a piece and on both sides of it, m, or NaN off the terrain."""
+    """Return the maximum height above ground along a piece and on both its sides, m; NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     horizontal_length, max_height = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
@@ -141,14 +141,15 @@ def add_airspace_violations(
     lags: Records,
     violations: Record,
 ) -> None:
-    """Add the violations of zones and of the maximum height by a path (w, 3) to a `VIOLATIONS` record, m x km.
+    """Add a path's violations of zones and of the maximum height to a `VIOLATIONS` record, m x km.
 
-    Zone penetration is added to the field `bounds`, and height above the maximum height to the field `terrain`.
-
+    path: (w, 3) m.
     legs: measurements of the path's legs.
     corners: its corners as planned.
     flown_corners: its corners as flown.
     lags: altitude lags on its legs.
+
+    Zone penetration is added to the field `bounds`, and height above the maximum height to the field `terrain`.
     """
     has_zones, has_max_height = data.airspace.zones.required.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_headroom(data)
@@ -159,7 +160,7 @@ def add_airspace_violations(
         offset_before, offset_after = float(flown_corners[i].fly_by_offset), float(flown_corners[i + 1].fly_by_offset)
         below, above = float(lags[i].max_below), -float(lags[i].min_below)
         if has_max_height:
-            violations.terrain += _leg_excess_area(data, required, path[i], path[i + 1], legs[i], lags[i], across)
+            violations.terrain += _leg_excess_height(data, required, path[i], path[i + 1], legs[i], lags[i], across)
         max_offset = max(offset_before, offset_after)
         if has_zones and _leg_zone_penetration(data, path[i], path[i + 1], across + max_offset, below, above) > 0.0:
             first_fraction = min(1.0, END_DISTANCE_M / max(legs[i].run, 1e-6)) if i == 0 else 0.0
@@ -197,7 +198,7 @@ def add_airspace_violations(
 def airspace_excess(
     data: ProblemArrays, start: Floats, end: Floats, below: float, above: float, max_excess: float
 ) -> float:
-    """Return the zone penetration and the excess height above ground of a leg, each integrated along the leg, m x km.
+    """Return the zone penetration plus the excess height of a leg, integrated along the leg, m x km.
 
     below, above: vertical tracking error, m.
     max_excess: value beyond which the integration stops.
@@ -214,13 +215,13 @@ def airspace_excess(
 def _leg_zone_penetration(
     data: ProblemArrays, start: Floats, end: Floats, lateral: float, below: float, above: float
 ) -> float:
-    """Return the depth of a leg in zones enlarged by the tracking error (m), integrated over its length, m x km."""
+    """Return the depth of a leg in zones enlarged by the tracking error (m), integrated, m x km."""
     zones = data.airspace.zones
-    return zone_excess(zones, data.heights, data.to_pixel, data.sample_pitch, start, end, lateral, below, above)
+    return zone_penetration(zones, data.heights, data.to_pixel, data.sample_spacing, start, end, lateral, below, above)
 
 
 @inner
-def _leg_excess_area(
+def _leg_excess_height(
     data: ProblemArrays,
     required: RequiredClearance,
     leg_start: Floats,
@@ -229,7 +230,7 @@ def _leg_excess_area(
     lag: Record,
     across: float,
 ) -> float:
-    """Return how far a leg rises above the maximum height above ground, integrated over its length, m x km.
+    """Return the excess of a leg over the maximum height above ground, integrated over the leg, m x km.
 
     lag: height lag of the autopilot on the leg, which is added to the leg's altitude.
     across: half width of the ground strip below the leg that is examined, m.
@@ -290,11 +291,12 @@ def _cut_segment(
 
 
 def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
-    """Return the number of leg pieces, six per leg, that violate a zone or the maximum height in each path, (n,).
+    """Return the number of pieces of each path that violate a zone or the maximum height, (n,).
 
     paths: (n, w, 3) m.
-    The paper counts points, six per leg, and has no zones; a path could pass through a zone between two points, so
-    pieces are tested along their full length.
+
+    There are six pieces per leg. The paper counts points, six per leg, and has no zones; a path could pass through a
+    zone between two points, so pieces are tested along their full length.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -19,7 +19,7 @@ from planner.evaluation.certify_kernels import (
     leg_slope_limits,
     missile_distance,
     turn_and_roll_lengths,
-    with_courses,
+    with_end_course_points,
 )
 from planner.evaluation.corners import fly_by_radii, settling_length
 from planner.evaluation.leg_constraints import MIN_CERTIFIED_LEG_M, slope_limits
@@ -64,12 +64,17 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
 
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
-    """Return the distance from the path to the nearest missile sphere, m; negative inside, or inf without missiles."""
+    """Return the distance from a path (w, 3) to the nearest missile sphere, m; negative inside.
+
+    The distance is inf without missiles.
+    """
     return float(missile_distance(data, np.array(waypoints, dtype=np.float64)))
 
 
 def least_height(data: ProblemArrays, waypoints: Floats) -> float:
-    """Return the least height above ground of the legs and fly-by arcs of a path (w, 3), m; NaN off the terrain.
+    """Return the least height above ground of a path's legs and fly-by arcs, m; NaN off the terrain.
+
+    waypoints: (w, 3) m.
 
     No tracking error is subtracted.
     """
@@ -84,7 +89,7 @@ _MAX_NAMED_PLACES = 6
 
 
 def _summarise_faults(faults: list[_Fault]) -> list[str]:
-    """Return one line about faults of one kind, with the worst fault and the other places; no line if there is none."""
+    """Return a line about the faults of one kind: the worst, and the other places; [] without faults."""
     if not faults:
         return []
     (_, place, problem), *others = sorted(faults, key=lambda fault: fault[0])
@@ -94,10 +99,10 @@ def _summarise_faults(faults: list[_Fault]) -> list[str]:
 
 
 def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest margin of a turn to its limit, rad, and append turns that are too sharp to `problems`."""
+    """Return the smallest margin of a turn to its limit, rad; append too sharp turns to `problems`."""
     max_turn = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN_RAD
     required_margin = 0.0 if data.legs_hold_turns else ANGLE_MARGIN_RAD
-    margins = max_turn - turning_angles(with_courses(data, waypoints))
+    margins = max_turn - turning_angles(with_end_course_points(data, waypoints))
     max_turn_deg = math.degrees(max_turn - required_margin)
     problems += _summarise_faults(
         [
@@ -114,9 +119,9 @@ def _turn_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) ->
 
 
 def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest length of any leg between its two turns, m, and append legs that are too short to `problems`.
+    """Return the smallest length that a leg has between its turns, m; append too short legs to `problems`.
 
-    Return inf if legs need not be as long as their turns.
+    The length is inf if legs need not be as long as their turns.
     """
     problems += _summarise_faults(
         [
@@ -146,10 +151,10 @@ def _leg_length_margin(data: ProblemArrays, waypoints: Floats, problems: list[st
 
 
 def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin on the turn arcs, rad, and append arcs that are too steep to `problems`.
+    """Return the smallest slope margin on the turn arcs, rad; append too steep arcs to `problems`.
 
-    An arc is shorter than the two pieces of leg that it replaces, so the same height change makes it steeper. Return
-    inf if the arcs need no check.
+    An arc is shorter than the two parts of the legs that it replaces, so the same height change makes it steeper. The
+    margin is inf if the arcs need no check.
     """
     min_margin = math.inf
     limits_are_fixed = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
@@ -178,7 +183,7 @@ def _arc_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
 
 def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest slope margin of the legs, rad, and add to `problems` a description of the too steep legs."""
+    """Return the smallest slope margin of the legs, rad; append too steep legs to `problems`."""
     min_margin = math.inf
     limits = leg_slope_limits(data, waypoints)
     faults: list[_Fault] = []
@@ -192,7 +197,10 @@ def _leg_slope_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 
 
 def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: float, place_text: str = "") -> str:
-    """Describe a slope (rad, positive up) beyond the climb or dive limit (rad), and the margin of a plan's limit."""
+    """Describe a slope (rad, positive up) beyond the climb or dive limit (rad).
+
+    place_text: place on the path, such as `` along its arc``.
+    """
     verb, limit, stated, rate = (
         ("climbs", climb, data.max_climb, "climb") if slope > 0 else ("sinks", dive, data.max_dive, "sink")
     )
@@ -201,9 +209,9 @@ def _slope_fault_text(data: ProblemArrays, slope: float, climb: float, dive: flo
 
 
 def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Return the smallest height above the required clearance, m, and append violations to `problems`.
+    """Return the smallest height above the required clearance, m; append violations to `problems`.
 
-    Return NaN if the path leaves the terrain.
+    The height is NaN if the path leaves the terrain.
     """
     min_margin = math.inf
     min_margins: dict[str, float] = {}
@@ -229,7 +237,7 @@ def _clearance_margin(data: ProblemArrays, waypoints: Floats, problems: list[str
 def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Return the smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m.
 
-    Append violations to `problems`.
+    Violations are appended to `problems`.
     """
     min_corner = np.array([data.west, data.south, data.floor])
     max_corner = np.array([data.east, data.north, data.ceiling])
@@ -244,9 +252,9 @@ def _bounds_margin(data: ProblemArrays, waypoints: Floats, problems: list[str]) 
 
 
 def _airspace_margins(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Return the smallest distance to a zone and the smallest headroom below the maximum height, m; inf without limits.
+    """Return the smallest distance to a zone, and the smallest headroom below the maximum height, m.
 
-    Append violations to `problems`.
+    Both are inf if the scenario has neither zones nor a maximum height. Violations are appended to `problems`.
     """
     data, space = problem.certified, problem.certified.airspace
     if not is_limited(space):

@@ -16,7 +16,7 @@ from planner.evaluation.corners import (
     LEG,
     fly_by_radii,
     fly_by_vertices,
-    legs_about,
+    leg_parts_at_corner,
     measure_corners,
     measure_legs,
     roll_length,
@@ -56,7 +56,7 @@ END_DISTANCE_M = 100.0
 
 @inner
 def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `TRACKED_PIECE` records of a path (w, 3): first those of its legs, then those of its corners."""
+    """Return `TRACKED_PIECE` records of a path (w, 3): those of its legs, then those of its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind_vector(data.aircraft), data.tracking.across
@@ -84,7 +84,9 @@ def tracked_pieces(data: ProblemArrays, waypoints: Floats) -> Records:
     for i in range(1, count - 1):
         if corners[i].excursion <= 0.0:
             continue
-        corner_legs = legs_about(waypoints[i - 1], waypoints[i], waypoints[i + 1], corners[i].before, corners[i].after)
+        corner_legs = leg_parts_at_corner(
+            waypoints[i - 1], waypoints[i], waypoints[i + 1], corners[i].before, corners[i].after
+        )
         max_lateral = across + corners[i].excursion
         for k in range(2):
             piece = pieces[piece_count]
@@ -132,7 +134,10 @@ def _set_deviations(lag: Record, begin_fraction: float, end_fraction: float, pie
 
 @inner
 def _lateral_deviation(data: ProblemArrays, position: Floats, across: float) -> float:
-    """Return the lateral deviation of the flight at a point of the path, which is smaller near the fixed ends, m."""
+    """Return the lateral deviation of the flight at a position on the path, m.
+
+    It is smaller near the fixed ends.
+    """
     end_distance = min(
         math.hypot(position[0] - data.start[0], position[1] - data.start[1]),
         math.hypot(position[0] - data.destination[0], position[1] - data.destination[1]),
@@ -153,9 +158,10 @@ _MAX_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
-    """Return the distance between the flight of a path (w, 3) and the nearest missile sphere, m; inf without missiles.
+    """Return the distance between the flight of a path (w, 3) and the nearest missile sphere, m.
 
-    The flight is on the legs and arcs, or deviates from them by up to the tracking error.
+    The flight is on the legs and arcs, or deviates from them by up to the tracking error. The distance is inf without
+    missiles.
     """
     min_distance = math.inf
     if data.tracking.has_error:
@@ -178,7 +184,10 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 @inner
 def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance: float) -> float:
-    """Return the distance from a segment to the nearest missile sphere, or `min_distance` if that is smaller."""
+    """Return the distance from a segment to the nearest missile sphere, m, if it is below `min_distance`.
+
+    Otherwise return `min_distance`.
+    """
     dx, dy, dz = end[0] - start[0], end[1] - start[1], end[2] - start[2]
     length2 = dx * dx + dy * dy + dz * dz
     for k in range(threats.shape[0]):
@@ -195,12 +204,11 @@ def _segment_distance(threats: Records, start: Floats, end: Floats, min_distance
 
 
 @compiled
-def with_courses(data: ProblemArrays, path: Floats) -> Floats:
-    """Return a path with a distant point added before its start, and another after its destination.
+def with_end_course_points(data: ProblemArrays, path: Floats) -> Floats:
+    """Return a path with a point added at each end, so that turns from and to end courses can be measured.
 
-    Both points are on the prescribed courses there.
-
-    Without a prescribed course the point is on the extension of the leg, so that no turn results.
+    One distant point is before the start, the other after the destination, both on the prescribed courses. Without a
+    prescribed course the point is on the extension of the leg, so that no turn results.
     """
     count = path.shape[0]
     out = np.empty((count + 2, 3))
@@ -222,7 +230,7 @@ def with_courses(data: ProblemArrays, path: Floats) -> Floats:
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Return two lengths that each leg needs, m, (w - 1,) each: for its turns, and for the roll between the turns."""
+    """Return the lengths that each leg needs for its turns and for the roll between them, m, (w - 1,)."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
@@ -249,7 +257,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
-    """Return `CERTIFIED_PIECE` records of a path (w, 3): first those of its legs, then those of its arcs or corners."""
+    """Return `CERTIFIED_PIECE` records of a path (w, 3): of its legs, then of its arcs or corners."""
     if data.tracking.has_error:
         return _tracked_heights(data, tracked_pieces(data, waypoints))
     leg_count = waypoints.shape[0] - 1
@@ -268,7 +276,10 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:
 
 @inner
 def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
-    """Return `CERTIFIED_PIECE` records with the minimum heights along `TRACKED_PIECE` records and to both sides."""
+    """Return `CERTIFIED_PIECE` records with the minimum heights along pieces and on both sides of them.
+
+    pieces: `TRACKED_PIECE` records.
+    """
     out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
     for k in range(pieces.size):
         piece = pieces[k]
@@ -291,7 +302,10 @@ def _tracked_heights(data: ProblemArrays, pieces: Records) -> Records:
 
 @inner
 def _measure_piece(data: ProblemArrays, start: Floats, end: Floats, of_arc: bool, number: int, out: Record) -> None:
-    """Fill the `CERTIFIED_PIECE` record of the straight piece from `start` to `end`, on leg or arc `number`."""
+    """Fill the `CERTIFIED_PIECE` record of the straight piece from `start` to `end`.
+
+    of_arc, number: True for a piece of an arc, and the number of the leg or arc.
+    """
     height, _ = segment_clearance(data.heights, data.to_pixel, start, end)
     out.of_arc, out.number, out.height = of_arc, number, height
     out.buffer = required_buffer(data, data.buffer, (data.start_buffer, data.destination_buffer), start, end)
@@ -303,9 +317,10 @@ def required_buffer(
 ) -> float:
     """Return the buffer required on a piece, m, which grows with the distance from a fixed end.
 
-    The buffer grows half as fast as in a search, which allows for the ground between the search's samples.
     buffer: buffer away from the ends, m.
     end_buffers: buffers at the start and the destination, m.
+
+    The buffer grows half as fast as in a search, which allows for the ground between the search's samples.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:

@@ -66,7 +66,7 @@ def measure_corners(data: ProblemArrays, wind: Wind, path: Floats, legs: Records
         is_turning = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
         measure_corner(aircraft, tracking, wind, is_turning, ux, uy, vx, vy, path[i, 2], corners[i])
     for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
-        ux, uy, vx, vy = courses_at(data, legs, i)
+        ux, uy, vx, vy = courses_at_waypoint(data, legs, i)
         is_turning = not math.isnan(end_course) and legs[min(i, leg_count - 1)].run > 0.0
         measure_corner(aircraft, tracking, wind, is_turning, ux, uy, vx, vy, path[i, 2], corners[i])
 
@@ -103,8 +103,11 @@ def measure_corner(
 
 
 @inlined
-def courses_at(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float, float, float]:
-    """Return the unit courses of the legs before and after waypoint i, or at an end the prescribed course."""
+def courses_at_waypoint(data: ProblemArrays, legs: Records, i: int) -> tuple[float, float, float, float]:
+    """Return the unit courses of the legs before and after waypoint i; at an end, the prescribed course.
+
+    The result is the east and north components of both courses.
+    """
     leg_count = legs.shape[0]
     leg_after, leg_before = min(i, leg_count - 1), max(i - 1, 0)
     ux, uy, vx, vy = legs[leg_before].east, legs[leg_before].north, legs[leg_after].east, legs[leg_after].north
@@ -142,7 +145,10 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:
 
 @inner
 def roll_length(aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind) -> float:
-    """Return the length of leg i used for rolling between its two turns, m; 0 if both turns have the same direction."""
+    """Return the length of leg i that the aircraft needs to roll between opposite turns at its ends, m.
+
+    The length is 0 if both turns have the same direction.
+    """
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north
@@ -160,7 +166,10 @@ ARC_STEP = math.radians(15.0)
 
 @inlined
 def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
-    """Return half the length of the parabola that blends two slopes, m per unit of slope, with a full tailwind."""
+    """Return half the length of the parabola that blends two slopes, m per unit of slope change.
+
+    A full tailwind is assumed.
+    """
     speed = true_airspeed(aircraft, amsl) + wind_speed_at(aircraft, amsl)
     return speed * speed / (2.0 * BLEND_ACCELERATION)
 
@@ -169,9 +178,9 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:
 def fly_by_vertices(
     aircraft: PerformanceTable, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float
 ) -> Floats:
-    """Return vertices (k, 3) of the flown path past `waypoint`, at the blend length of its altitude.
+    """Return vertices (k, 3) of the flown path past `waypoint`; see `blended_vertices`.
 
-    See `blended_vertices`.
+    The blend has the length for the waypoint's altitude.
     """
     return blended_vertices(half_blend_length(aircraft, waypoint[2]), previous, waypoint, next_waypoint, radius)
 
@@ -180,12 +189,13 @@ def fly_by_vertices(
 def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float) -> Floats:
     """Return vertices (k, 3) of a path past `waypoint` that is nowhere higher than the flight.
 
-    The vertices are a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent
-    point to tangent point, and a point on the next leg where the blend ends. Height is linear along the arc; where the
-    slope decreases, a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
-    Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
-
     blend: half length of a blend (`half_blend_length`).
+    radius: radius of the fly-by arc, m; 0 for none.
+
+    The vertices are a point on the leg where the blend of slopes begins, the arc from tangent point to tangent point,
+    and a point on the next leg where the blend ends. Height is linear along the arc; where the slope decreases, a
+    parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that. Without a radius, or
+    where a leg is shorter than the tangent, the arc is the waypoint itself.
     """
     length_before = math.hypot(waypoint[0] - previous[0], waypoint[1] - previous[1])
     length_after = math.hypot(next_waypoint[0] - waypoint[0], next_waypoint[1] - waypoint[1])
@@ -239,12 +249,14 @@ def blended_vertices(blend: float, previous: Floats, waypoint: Floats, next_wayp
 
 
 @inner
-def legs_about(
+def leg_parts_at_corner(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, length_before: float, length_after: float
 ) -> Floats:
-    """Return the parts of both legs next to `waypoint` as vertices, (3, 3) m, with the waypoint in the middle.
+    """Return the parts of both legs next to `waypoint` as three vertices, (3, 3) m.
 
     length_before, length_after: lengths of both parts, m, at most the whole leg.
+
+    The waypoint is the second vertex.
     """
     vertices = np.empty((3, 3))
     for row, neighbour, length in ((0, previous, length_before), (2, next_waypoint, length_after)):
@@ -266,11 +278,11 @@ def _set_vertex(out: Floats, row: int, east: float, north: float, up: float) -> 
 
 @compiled
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:
-    """Return the radius of the fly-by arc at each waypoint, m, (w,); 0 at the ends and where there is no turn.
+    """Return the radius of the fly-by arc at each waypoint, m, (w,); 0 at the ends and without a turn.
 
-    Where only a number limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have
-    radius 0: the corners are evaluated as drawn, and the simulated flight shows how the aircraft flies them. A
-    fly-over turn passes outside its corner and has radius 0 too.
+    Where only a number limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have radius
+    0: the corners are evaluated as drawn, and the simulated flight shows how the aircraft flies them. A fly-over turn
+    passes outside its corner and has radius 0 too.
     """
     if data.fly_over:
         return np.zeros(path.shape[0])

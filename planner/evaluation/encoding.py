@@ -46,7 +46,7 @@ class WaypointFrames(NamedTuple):
     def to_world(self, points: ArrayLike) -> Floats:
         """Convert points (along, across, up) in the waypoints' frames, (..., n, 3), to world positions.
 
-        >>> frames = frames_along(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]]))
+        >>> frames = route_frames(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]]))
         >>> frames.to_world([[60.0, 5.0, 9.0], [120.0, 5.0, 9.0]]).round(6).tolist()
         [[60.0, 5.0, 9.0], [95.0, 20.0, 9.0]]
         """
@@ -59,7 +59,10 @@ class WaypointFrames(NamedTuple):
         return out
 
     def to_frame(self, points: ArrayLike) -> Floats:
-        """Convert world positions (..., n, 3) to (along, across, up) in the waypoints' frames; inverts `to_world`."""
+        """Convert world positions (..., n, 3) to (along, across, up) in the waypoints' frames.
+
+        This inverts `to_world`.
+        """
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         return np.stack(
@@ -67,8 +70,8 @@ class WaypointFrames(NamedTuple):
         )
 
 
-def frames_along(route: Floats) -> WaypointFrames:
-    """Make frames along a route (n + 1, 2) on the map, one for each of its straight pieces.
+def route_frames(route: Floats) -> WaypointFrames:
+    """Make the frames of waypoints along a route (n + 1, 2) on the map, one for each straight piece of it.
 
     A piece that is too short for a course takes the course of the piece before it, or of the first piece with a course.
     """
@@ -90,7 +93,9 @@ def frames_along(route: Floats) -> WaypointFrames:
 def straight_frames(east: float, north: float, cosine: float, sine: float, edges: Floats) -> WaypointFrames:
     """Return frames of n waypoints that all have the same origin and axes.
 
-    east, north: origin, m.  cosine, sine: of the angle from east to the axis.  edges: (n + 1,) along the axis, m.
+    east, north: origin, m.
+    cosine, sine: cosine and sine of the angle from east to the axis.
+    edges: (n + 1,) limits of the waypoints' intervals along the axis, m.
     """
     count = edges.size - 1
     ones = np.ones(count)
@@ -98,7 +103,7 @@ def straight_frames(east: float, north: float, cosine: float, sine: float, edges
 
 
 def sample_route(route: Floats, count: int) -> tuple[Floats, Floats]:
-    """Return points (count, 3) at equal distances along a route (k, 3), and their distances on the map, m.
+    """Return points (count, 3) at equal distances along a route (k, 3), and their distances along it, m.
 
     >>> points, along = sample_route(np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 10.0, 10.0]]), 5)
     >>> along.tolist(), points[:, 0].tolist(), points[:, 1].tolist()
@@ -120,7 +125,7 @@ HALF_WIDTH = 2.0
 
 @by_reference
 class RotatedFrame(NamedTuple):
-    """The rotated frame: `along` from start to destination on the map, `across` to its left, `up` unchanged (eq. 12).
+    """Frame with `along` from start to destination, `across` to the left and `up` unchanged (eq. 12).
 
     east, north: origin, at the start, m.
     cosine, sine: cosine and sine of the angle from east to the destination, counter-clockwise.
@@ -141,7 +146,10 @@ class RotatedFrame(NamedTuple):
         return np.stack([c * east + s * north, c * north - s * east, points[..., 2]], axis=-1)
 
     def to_world(self, points: ArrayLike) -> Floats:
-        """Convert points (along, across, up) in this frame, (..., 3), to world positions; inverts `to_frame`."""
+        """Convert points (along, across, up) in this frame, (..., 3), to world positions.
+
+        This inverts `to_frame`.
+        """
         points = np.asarray(points, dtype=np.float64)
         along, across = points[..., 0], points[..., 1]
         c, s = self.cosine, self.sine
@@ -153,7 +161,7 @@ class RotatedFrame(NamedTuple):
 
 
 def rotated_frame(start: Floats, destination: Floats) -> RotatedFrame:
-    """Return the frame along the line from start to destination, (3,) m each.
+    """Return the frame along the line from start to destination, both (3,) m.
 
     Raises ValueError if start and destination coincide on the map.
     """
@@ -176,7 +184,7 @@ class Encoding:
     frames: frames in which vectors are along, across and up of each inner waypoint; None for other encodings.
 
     >>> space = Space(np.zeros(3), np.array([3000.0, 4000.0, 0.0]), np.array([[0, 3000], [0, 4000]]), (0.0, 500.0))
-    >>> encoding = rotated(space, 4)
+    >>> encoding = rotated_encoding(space, 4)
     >>> encoding.lower[0::3].tolist(), encoding.upper[0::3].tolist()  # along, of each waypoint its own interval
     ([0.0, 2500.0], [2500.0, 5000.0])
     >>> encoding.decode(np.array([[1000.0, 0.0, 100.0, 4000.0, 0.0, 100.0]])).round(6).tolist()
@@ -216,14 +224,19 @@ class Space:
 
 
 def _add_ends(space: Space, inner_waypoints: Floats) -> Floats:
-    """Return the paths (n, w, 3) of inner waypoints (n, w - 2, 3), with start and destination added."""
+    """Return paths (n, w, 3) of inner waypoints (n, w - 2, 3), with start and destination added."""
     out = np.empty((len(inner_waypoints), inner_waypoints.shape[1] + 2, 3))
     out[:, 0], out[:, 1:-1], out[:, -1] = space.start, inner_waypoints, space.destination
     return out
 
 
-def rotated(space: Space, waypoints: int) -> Encoding:
-    """Make the rotated encoding, with inner waypoint i in the i-th of w - 2 intervals of the axis (section III)."""
+def rotated_encoding(space: Space, waypoints: int) -> Encoding:
+    """Make the rotated encoding, with inner waypoint i in the i-th interval of the axis (section III).
+
+    waypoints: number w of waypoints, including both ends.
+
+    The axis is divided into w - 2 intervals.
+    """
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     min_across, max_across = _across_limits(frame, space, edges)
@@ -231,6 +244,7 @@ def rotated(space: Space, waypoints: int) -> Encoding:
     upper = np.column_stack([edges[1:], max_across, np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
+        """Convert vectors (n, d) to paths (n, w, 3)."""
         return _add_ends(space, frame.to_world(vectors.reshape(len(vectors), waypoints - 2, 3)))
 
     frames = straight_frames(*frame[:4], edges)
@@ -238,11 +252,11 @@ def rotated(space: Space, waypoints: int) -> Encoding:
 
 
 def route_encoding(space: Space, route: Floats) -> Encoding:
-    """Make an encoding like `rotated`, with a route (w - 1, 2) on the map as its axis, which may turn back.
+    """Make an encoding like `rotated_encoding`, with a route (w - 1, 2) as its axis, which may turn back.
 
     Inner waypoint i lies along the i-th piece of the route, and across within `HALF_WIDTH` lengths of a piece.
     """
-    frames = frames_along(route)
+    frames = route_frames(route)
     waypoints = len(route) + 1
     half_width = HALF_WIDTH * float(frames.edges[-1]) / (waypoints - 2)
     lower = np.column_stack(
@@ -251,6 +265,7 @@ def route_encoding(space: Space, route: Floats) -> Encoding:
     upper = np.column_stack([frames.edges[1:], np.full(waypoints - 2, half_width), np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
+        """Convert vectors (n, d) to paths (n, w, 3)."""
         return _add_ends(space, frames.to_world(vectors.reshape(len(vectors), waypoints - 2, 3)))
 
     return Encoding("route", waypoints, lower.ravel(), upper.ravel(), decode, frames)
@@ -264,15 +279,17 @@ def require_frames(encoding: Encoding) -> WaypointFrames:
 
 
 def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
-    """Return vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
+    """Return the vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
     inner_points = rotated_frame(space.start, space.destination).to_frame(paths[:, 1:-1])
     return np.clip(inner_points.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
 def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
-    """Return the lower and upper limits of `across` in each interval between two consecutive edges, m, (k,) each.
+    """Return the lower and upper limits of `across` in each of k intervals along the axis, m, (k,) each.
 
-    edges: (k + 1,) along the axis, m.  The limits are the map's edges, or the half-width that the space states.
+    edges: (k + 1,) limits of the intervals along the axis, m.
+
+    The limits are the map's edges, or the half-width that the space states.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
@@ -289,42 +306,46 @@ def _across_limits(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Fl
     return np.where(is_narrow, -1.0, min_across), np.where(is_narrow, 1.0, max_across)
 
 
-def cartesian(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding of each inner waypoint as absolute east, north, up, anywhere on the map."""
+def cartesian_encoding(space: Space, waypoints: int) -> Encoding:
+    """Make an encoding of each inner waypoint as absolute east, north and up, anywhere on the map."""
     lower = np.array([space.bounds[0, 0], space.bounds[1, 0], space.up[0]])
     upper = np.array([space.bounds[0, 1], space.bounds[1, 1], space.up[1]])
 
     def decode(vectors: Floats) -> Floats:
+        """Convert vectors (n, d) to paths (n, w, 3)."""
         return _add_ends(space, vectors.reshape(len(vectors), waypoints - 2, 3))
 
     return Encoding("cartesian", waypoints, np.tile(lower, waypoints - 2), np.tile(upper, waypoints - 2), decode)
 
 
-def polar(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding of each inner waypoint as a step r, theta, up from the previous one (section III.A).
+def polar_encoding(space: Space, waypoints: int) -> Encoding:
+    """Make an encoding of each inner waypoint as a step (r, theta, up) from the previous (section III.A).
 
-    theta: "the turning angle at each waypoint", relative to the previous leg, of the first to the direction
-    start-destination; within +-180 degrees, positive to the left. r: from 5 % to 200 % of the straight distance over
-    the number of legs. The paper states neither range; `polar-45` allows no turn beyond the paper's limit.
+    theta: "the turning angle at each waypoint", relative to the previous leg, at the first waypoint to the direction
+        from start to destination; within +-180 degrees, positive to the left.
+    r: from 5 % to 200 % of the straight distance over the number of legs.
+
+    The paper states neither range; `polar_45_encoding` allows no turn beyond the paper's limit.
     """
     return _step_encoding("polar", space, waypoints, math.pi, turning=True)
 
 
-def polar_45(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding like `polar`, with theta within +-45 degrees, the sharpest turn that the paper allows."""
+def polar_45_encoding(space: Space, waypoints: int) -> Encoding:
+    """Make an encoding like `polar_encoding`, with theta within the paper's turn limit of +-45 degrees."""
     return _step_encoding("polar-45", space, waypoints, math.pi / 4.0, turning=True)
 
 
-def bearing(space: Space, waypoints: int) -> Encoding:
-    """Make an encoding like `polar`, with theta from the direct line, so that errors do not accumulate.
+def bearing_encoding(space: Space, waypoints: int) -> Encoding:
+    """Make an encoding like `polar_encoding`, with theta relative to the direct line.
 
-    Not in the paper: changing one waypoint shifts the following ones but does not turn them.
+    Errors then do not accumulate. Not in the paper: changing one waypoint shifts the following waypoints but does not
+    turn them.
     """
     return _step_encoding("bearing", space, waypoints, math.pi, turning=False)
 
 
 def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *, turning: bool) -> Encoding:
-    """Make an encoding by steps r, theta, up.
+    """Make an encoding of each inner waypoint as a step (r, theta, up) from the previous one.
 
     max_angle: limit of theta to either side, rad.
     turning: True if theta is relative to the previous step, False if relative to the direct line.
@@ -337,6 +358,7 @@ def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *,
     )
 
     def decode(vectors: Floats) -> Floats:
+        """Convert vectors (n, d) to paths (n, w, 3)."""
         steps = vectors.reshape(len(vectors), waypoints - 2, 3)
         course = np.cumsum(steps[..., 1], axis=1) if turning else steps[..., 1]
         along = np.cumsum(steps[..., 0] * np.cos(course), axis=1)
@@ -347,9 +369,9 @@ def _step_encoding(name: str, space: Space, waypoints: int, max_angle: float, *,
 
 
 ENCODINGS: dict[str, Callable[[Space, int], Encoding]] = {
-    "rotated": rotated,
-    "cartesian": cartesian,
-    "polar": polar,
-    "polar-45": polar_45,
-    "bearing": bearing,
+    "rotated": rotated_encoding,
+    "cartesian": cartesian_encoding,
+    "polar": polar_encoding,
+    "polar-45": polar_45_encoding,
+    "bearing": bearing_encoding,
 }

@@ -39,7 +39,7 @@ class Value(IntEnum):
 def front_values(data: ProblemArrays, energy: TravelCost | None, paths: Floats) -> Floats:
     """Return the values of each path in the order of `Value`, (n, 5), in m, s, m, s and J.
 
-    energy: the cost of energy, with any weight (`make_travel_cost`); if None, energy is NaN.
+    energy: cost of energy, with any weight (`make_travel_cost`); if None, energy is NaN.
     paths: (n, w, 3) m.
     """
     out = np.zeros((len(paths), len(Value)))
@@ -96,13 +96,16 @@ def _mean_detection(data: ProblemArrays, start: Floats, dx: float, dy: float, dz
 
 @inner
 def _min_height(data: ProblemArrays, start: Floats, dx: float, dy: float, dz: float, min_height: float) -> float:
-    """Return the minimum height above ground at samples of a leg and of earlier legs, m; -inf off the terrain.
+    """Return the minimum height above ground at samples of a leg and of earlier legs, m.
 
-    start, dx, dy, dz: start of the leg, and the leg, m.  min_height: minimum height of the earlier legs, m.
-    Samples are skipped where the steepest slope nearby shows that the ground cannot be closer.
+    start, dx, dy, dz: start of the leg, and the leg, m.
+    min_height: minimum height of the earlier legs, m.
+
+    The result is -inf off the terrain. Samples are skipped where the steepest slope nearby shows that the ground cannot
+    be closer.
     """
     horizontal_length = math.sqrt(dx * dx + dy * dy)
-    count = 1 + int(horizontal_length / data.sample_pitch)
+    count = 1 + int(horizontal_length / data.sample_spacing)
     tiles, k = data.slope_bounds.tiles, 0
     while True:
         fraction = k / count

@@ -18,7 +18,7 @@ from planner.evaluation.corners import (
     LEG,
     fly_by_vertices,
     half_blend_length,
-    legs_about,
+    leg_parts_at_corner,
     measure_corners,
     measure_legs,
 )
@@ -81,7 +81,7 @@ class PathScratch(NamedTuple):
 
 @inner
 def make_scratch(count: int) -> PathScratch:
-    """Return scratch for paths of `count` waypoints."""
+    """Return scratch memory for evaluating paths of `count` waypoints."""
     return PathScratch(
         np.zeros(count - 1, dtype=LEG),
         np.zeros(count, dtype=CORNER),
@@ -119,9 +119,11 @@ def score_legs(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Score the legs and turns, the first part, and add their violations; ground, missiles and zones follow.
+    """Add the violations of legs and turns, and fill the length ratio: the first part of `score_path`.
 
-    objectives: the length ratio is filled; the kill exposure is 0 until `score_missiles`.
+    objectives: the kill exposure is set to 0 until `score_missiles`.
+
+    The other parts read the measurements that this part stores in `scratch`.
     """
     legs, corners, flown_corners, extents, lags = (
         scratch.legs,
@@ -149,7 +151,7 @@ def score_legs(
 def score_ground(
     data: ProblemArrays, limits: PrecomputedLimits, scratch: PathScratch, path: Floats, violations: Record
 ) -> None:
-    """Score the ground below the legs, the second part."""
+    """Add the violations of the clearance below the legs: the second part of `score_path`."""
     legs, terrain_legs = scratch.legs, scratch.terrain_legs
     sample_terrain(
         data.heights,
@@ -176,7 +178,7 @@ def score_missiles(
     violations: Record,
     objectives: Record,
 ) -> None:
-    """Score missiles, and the ground below corners as flown, the third part."""
+    """Add the exposure to missiles, and clearance violations of corners: the third part of `score_path`."""
     # Take arrays out of the data once, because passing the data on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     slope_bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
@@ -218,7 +220,7 @@ def score_missiles(
         if vertical_drop + lateral_offset < 0.01 or not (is_near_ground or is_near_missile):
             continue
         if has_error:
-            vertices = legs_about(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
+            vertices = leg_parts_at_corner(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
             below, above = _max_lag_near(lags[i], legs[i], corners[i])
             extra_height, missile_margin = below + slope_bounds.steepest * lateral_offset, margin + lateral_offset
         else:
@@ -233,18 +235,18 @@ def score_missiles(
 
 @inner
 def score_airspace(data: ProblemArrays, scratch: PathScratch, path: Floats, violations: Record) -> None:
-    """Score zones and the maximum height above ground, the last part."""
+    """Add the violations of zones and of the maximum height above ground: the last part of `score_path`."""
     if data.airspace.zones.required.shape[0] > 0 or data.airspace.max_height < math.inf:
         add_airspace_violations(data, path, scratch.legs, scratch.corners, scratch.flown, scratch.lags, violations)
 
 
 def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
-    """Return graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and flown corners.
+    """Return the graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3).
 
-    Violations by `planner.plan.Violation`: rad and 100 m of leg; m per m; m x km; m. Objectives by
-    `planner.plan.Objective`: length ratio, and kill exposure as the mean density along the path times the paper's
-    number of points, which is comparable with the paper's sum. Detection and height stay 0: they would only decide
-    between paths of exactly equal length.
+    The legs and the flown corners are scored along their whole length. Violations by `planner.plan.Violation`: rad and
+    100 m of leg; m per m; m x km; m. Objectives by `planner.plan.Objective`: length ratio, and kill exposure as the
+    mean density along the path times the paper's number of points, which is comparable with the paper's sum. Detection
+    and height stay 0: they would only decide between paths of exactly equal length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     # A plan's own path is read-only, which would compile another kernel.
@@ -291,9 +293,9 @@ def _measure_arcs(
     flown: Records,
     extents: Floats,
 ) -> None:
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path without tracking error.
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of a path's corners without tracking error.
 
-    The flown corner departs from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) -
+    The flown corner deviates from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) -
     1) plus the sagitta of a chord; it does so within the tangent and half the arc, or within the blend.
     """
     start, second = path[0], path[1]
@@ -329,7 +331,7 @@ def _max_lag_near(lag: Record, leg: Record, corner: Record) -> tuple[float, floa
 
 @inlined
 def _measure_tracked_corners(corners: Records, flown: Records, extents: Floats) -> None:
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path with tracking error."""
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of a path's corners with tracking error."""
     for i in range(1, corners.shape[0] - 1):
         excursion = corners[i].excursion
         flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, excursion
@@ -361,7 +363,7 @@ def _corner_depth(
 
 @inner
 def _corner_exposure(missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float) -> float:
-    """Return the kill density x length along a flown corner (k, 3).
+    """Return the kill density times length along a flown corner (k, 3).
 
     below, above: vertical tracking error, m.
     """

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from aircraft.path_limits import arc_slope, downwind_vector, slopes_along, wind_speed_at
-from planner.evaluation.corners import Wind, courses_at, roll_length, settling_length, turn_length
+from planner.evaluation.corners import Wind, courses_at_waypoint, roll_length, settling_length, turn_length
 from planner.evaluation.problem import ProblemArrays, RequiredClearance, required_clearance
 from world.arrays import Floats
 from world.frames import PolyMapRecord
@@ -24,16 +24,21 @@ from world.kernels import Record, Records, compiled, inlined, inner
 PATHS_PER_BLOCK = 128
 
 
-def _block_rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
-    """Return the definitions of record fields with these names, each with one value for each path of a block."""
+def _block_fields(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generic], tuple[int]]]:
+    """Return the definitions of record fields that have one value for each path of a block.
+
+    kind: type of the values.
+    names: names of the fields.
+    """
     return [(name, kind, (PATHS_PER_BLOCK,)) for name in names]
 
 
 # One point of each path: position (m) and pixel.
-_POINT = np.dtype(_block_rows(np.float64, "east", "north", "up", "column", "row"), align=True)
+_POINT = np.dtype(_block_fields(np.float64, "east", "north", "up", "column", "row"), align=True)
 # Sums along each path.
 _SUMS = np.dtype(
-    _block_rows(np.float64, "below", "height", "kill", "detection", "turns", "slopes", "outside", "length"), align=True
+    _block_fields(np.float64, "below", "height", "kill", "detection", "turns", "slopes", "outside", "length"),
+    align=True,
 )
 BLOCK_SCRATCH = np.dtype(
     [
@@ -43,16 +48,16 @@ BLOCK_SCRATCH = np.dtype(
         ("step", _POINT),
         ("point", _POINT),
         # Horizontal length of a leg, and the east, north and horizontal length of the previous leg, m.
-        *_block_rows(np.float64, "run", "east_before", "north_before", "run_before"),
+        *_block_fields(np.float64, "run", "east_before", "north_before", "run_before"),
         ("sums", _SUMS),
         # Ground height at a point and the clearance required there, m.
-        *_block_rows(np.float64, "ground", "need"),
+        *_block_fields(np.float64, "ground", "need"),
         # Position within a pixel; position within the map, from -1 to 1; and one row of a polynomial.
-        *_block_rows(np.float64, "u", "v", "x", "y", "inner"),
+        *_block_fields(np.float64, "u", "v", "x", "y", "inner"),
         # Heights of the four pixels around a point.
-        *_block_rows(np.float32, "top_left", "top_right", "low_left", "low_right"),
+        *_block_fields(np.float32, "top_left", "top_right", "low_left", "low_right"),
         # Index of a pixel or cell; first entry and number of entries of a cell's units; paths still to be processed.
-        *_block_rows(np.int64, "index", "first", "count", "active"),
+        *_block_fields(np.int64, "index", "first", "count", "active"),
     ],
     align=True,
 )
@@ -68,7 +73,7 @@ def clear_sums(sums: Record) -> None:
 
 @inlined
 def copy_point(source: Record, target: Record, size: int) -> None:
-    """Copy one point of each path into another record."""
+    """Copy one point of each path of a block into another record."""
     for b in range(size):
         target.east[b], target.north[b], target.up[b] = source.east[b], source.north[b], source.up[b]
         target.column[b], target.row[b] = source.column[b], source.row[b]
@@ -76,7 +81,7 @@ def copy_point(source: Record, target: Record, size: int) -> None:
 
 @inlined
 def subtract_points(end: Record, start: Record, size: int, out: Record) -> None:
-    """Fill `out` with the step from one point of each path to another."""
+    """Fill `out` with the step from one point of each path of a block to another."""
     for b in range(size):
         out.east[b] = end.east[b] - start.east[b]
         out.north[b] = end.north[b] - start.north[b]
@@ -98,7 +103,10 @@ def interpolate_legs(start: Record, step: Record, fraction: float, size: int, ou
 
 @inlined
 def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: int, size: int, block: Record) -> None:
-    """Fill waypoint i of each path, and its pixel as `polymap` computes it, for all paths at once."""
+    """Fill waypoint i of each path of a block, and its pixel as `polymap` computes it.
+
+    first_path, size: first path of the block, and number of its paths.
+    """
     end, x, y, inner = block.end, block.x, block.y, block.inner
     east, north, up = end.east, end.north, end.up
     for b in range(size):
@@ -109,13 +117,19 @@ def load_waypoints(to_pixel: PolyMapRecord, paths: Floats, first_path: int, i: i
     for b in range(size):
         x[b] = (east[b] - centre_x) / half_x
         y[b] = (north[b] - centre_y) / half_y
-    _horner(to_pixel.u, to_pixel.size, size, x, y, inner, end.column)
-    _horner(to_pixel.v, to_pixel.size, size, x, y, inner, end.row)
+    _evaluate_polynomials(to_pixel.u, to_pixel.size, size, x, y, inner, end.column)
+    _evaluate_polynomials(to_pixel.v, to_pixel.size, size, x, y, inner, end.row)
 
 
 @inlined
-def _horner(coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, inner: Floats, out: Floats) -> None:
-    """Fill out with the sum of coefficients[i, j] x^i y^j, i + j < terms, for each path; inner is scratch."""
+def _evaluate_polynomials(
+    coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, inner: Floats, out: Floats
+) -> None:
+    """Fill `out` with the sum of coefficients[i, j] x^i y^j for each path, by Horner's method.
+
+    terms: number of terms; i + j is below it.
+    inner: scratch.
+    """
     for b in range(size):
         out[b] = 0.0
     for i in range(terms - 1, -1, -1):
@@ -186,10 +200,11 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:
 
 @inlined
 def _min_slope_limit(data: ProblemArrays, air_angles: Floats) -> float:
-    """Return the slope that the aircraft can fly on every course between floor and ceiling, rad; -1 if there is none.
+    """Return the slope that the aircraft can fly on every course between floor and ceiling, rad.
 
-    air_angles: (h,) flight-path angles relative to the air at the table's heights. The slope over the ground is
-    smallest with the strongest tailwind.
+    air_angles: (h,) flight-path angles relative to the air at the table's heights.
+
+    The slope over the ground is smallest with the strongest tailwind. The result is -1 if there is no such slope.
     """
     wind = max(wind_speed_at(data.aircraft, data.floor), wind_speed_at(data.aircraft, data.ceiling))
     speed, air_angle = data.aircraft.airspeed, math.inf
@@ -235,7 +250,10 @@ def _course_slope_limits(
 
 @compiled
 def slope_limits(data: ProblemArrays, start: Floats, end: Floats) -> tuple[float, float]:
-    """Return the climb and dive limits of a leg, the smallest at three of its altitudes minus the margin, rad."""
+    """Return the climb and dive limits of a leg, rad.
+
+    They are the smallest limits at three altitudes of the leg, minus the margin `angle_margin`.
+    """
     dx, dy = end[0] - start[0], end[1] - start[1]
     horizontal_length = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / horizontal_length, dy / horizontal_length) if horizontal_length > 0.0 else (0.0, 1.0)
@@ -252,11 +270,13 @@ def slope_excess(
     start_altitude: float,
     end_altitude: float,
 ) -> float:
-    """Return the excess of a leg's slope over its limit, m per m of horizontal length; 0 within the limit (eq. 3-4).
+    """Return the excess of a leg's slope over its limit, m per m of horizontal length (eq. 3-4).
 
     ux, uy: unit vector along the leg's course.
     horizontal_length: m.
     start_altitude, end_altitude: altitudes of its start and end, m.
+
+    The excess is 0 within the limit.
     """
     altitude_change = end_altitude - start_altitude
     excess = max(
@@ -277,7 +297,7 @@ def slope_excess(
 
 @inlined
 def _turn_excess(cos_max_turn: float, max_turn: float, ux: float, uy: float, vx: float, vy: float) -> float:
-    """Return the excess of the turn between two unit courses over the limit, rad; 0 within the limit (eq. 1-2)."""
+    """Return the excess of the turn between two unit courses over the limit, rad; 0 within it (eq. 1-2)."""
     dot = ux * vx + uy * vy
     if dot >= cos_max_turn or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
         return 0.0
@@ -295,10 +315,12 @@ def add_leg_violations(
     by_amount: bool,
     violations: Record,
 ) -> None:
-    """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record.
+    """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record (eq. 1-4, 7).
 
-    Where legs must hold their turns, each leg shorter than its two turns adds to turn (eq. 1-4, 7).
-    legs, corners: measurements of the path. by_amount: add the excess of each violation, not 1.
+    legs, corners: measurements of the path.
+    by_amount: True to add the excess of each violation, False to add 1.
+
+    Where legs must hold their turns, each leg shorter than its two turns adds to turn.
     """
     # The order of these lines fixes the order of summation, and so the last digit.
     _add_turn_violations(data, limits, legs, by_amount, violations)
@@ -330,7 +352,7 @@ def _add_turn_violations(
 ) -> None:
     """Add turns that are too sharp, including those from and to prescribed end courses.
 
-    by_amount: add the excess, not 1.
+    by_amount: True to add the excess, False to add 1.
     """
     max_turn, leg_count = data.max_turn, legs.shape[0]
     for i in range(1, leg_count):
@@ -338,7 +360,7 @@ def _add_turn_violations(
         violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
     for i, end_course in ((0, data.start_course), (leg_count, data.destination_course)):
         if not math.isnan(end_course):
-            ux, uy, vx, vy = courses_at(data, legs, i)
+            ux, uy, vx, vy = courses_at_waypoint(data, legs, i)
             violations.turn += _violation(_turn_excess(limits.cos_max_turn, max_turn, ux, uy, vx, vy), by_amount)
 
 
@@ -367,7 +389,10 @@ def _add_leg_length_violations(
     by_amount: bool,
     violations: Record,
 ) -> None:
-    """Add legs that are too short for their turns, the roll between the turns, and settling, in units of 100 m."""
+    """Add the missing lengths of legs that are too short for their turns, in units of 100 m.
+
+    A leg must be long enough for its turns, the roll between them, and settling.
+    """
     for i in range(legs.shape[0]):
         required_length, horizontal_length = turn_length(data.fly_over, corners, i), legs[i].run
         missing_length = (
@@ -385,7 +410,10 @@ def _add_leg_length_violations(
 def _arc_slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:
-    """Return the excess of the slope of the arc at waypoint i over the aircraft's limits on both courses, m per m."""
+    """Return the excess of the slope of the arc at waypoint i over the aircraft's limits, m per m.
+
+    The limits are those on both courses of the corner.
+    """
     slope_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     slope_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
     slope = arc_slope(slope_in, slope_out, corners[i].tangent, corners[i].radius)
@@ -400,7 +428,10 @@ def _arc_slope_excess(
 
 @inlined
 def _violation(excess: float, by_amount: bool) -> float:
-    """Return the score of an excess over a limit: the excess itself if `by_amount`, otherwise 1; 0 for no excess."""
+    """Return the score of an excess over a limit; 0 for no excess.
+
+    by_amount: True for the excess itself, False for 1.
+    """
     if by_amount:
         return excess
     return 1.0 if excess > 0.0 else 0.0

@@ -47,7 +47,7 @@ POINTS_PER_LEG = 6
 def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
     """Score paths (n, w, 3) at six points per leg and the destination (eq. 1-11).
 
-    Returns violations (n, 4) by `planner.plan.Violation` and objectives (n, 4) by `planner.plan.Objective`.
+    Returns violations (n, 4) by `planner.plan.Violation`, and objectives (n, 4) by `planner.plan.Objective`.
     """
     path_count, waypoint_count, _ = paths.shape
     violations, objectives = np.zeros(path_count, dtype=VIOLATIONS), np.zeros(path_count, dtype=OBJECTIVES)
@@ -69,7 +69,8 @@ def _score_paths(
 ) -> None:
     """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
 
-    scratch: a `BLOCK_SCRATCH` record (1,). legs, corners: scratch records of one path.
+    scratch: a `BLOCK_SCRATCH` record (1,).
+    legs, corners: scratch records of one path.
     """
     path_count, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
@@ -189,7 +190,7 @@ def _add_terrain(required: RequiredClearance, size: int, adds_height: bool, bloc
 
 @inlined
 def _find_nearby_units(threat_cells: ThreatCells, size: int, block: Record) -> None:
-    """Fill the first entry and the length of each point's list of nearby units."""
+    """Find the list of units that may reach each point: fill its first entry and its length."""
     # A cell is not bounded in height; it stores the heights that its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
@@ -248,7 +249,7 @@ def _add_exposures(spheres: Records, units: Int32s, size: int, block: Record) ->
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, is_first: bool, block: Record) -> None:
-    """Add a leg's length, and count its slope and the turn into the leg if they exceed their limits (eq. 1-4, 8)."""
+    """Add a leg's length, and count its slope and the turn into it if beyond their limits (eq. 1-4, 8)."""
     climb, dive, cos_max_turn = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east, north, up, runs = block.step.east, block.step.north, block.step.up, block.run
     east_before, north_before, run_before = block.east_before, block.north_before, block.run_before

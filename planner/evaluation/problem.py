@@ -83,7 +83,7 @@ class ProblemArrays(NamedTuple):
     clearance: required height above ground. buffer: additional height; start_buffer and destination_buffer at the ends.
     buffer_growth: growth of the buffer away from an end that has less, m per m.
     kill_margin: required distance between the path and missile spheres.
-    sample_pitch: spacing of terrain samples along a leg, in the graded scores.
+    sample_spacing: spacing of terrain samples along a leg, in the graded scores.
     start_course, destination_course: NaN if none is prescribed.
     threat_cells: the threats by the points that they may reach.
     missiles: the missiles by position.
@@ -115,7 +115,7 @@ class ProblemArrays(NamedTuple):
     clearance: float
     buffer: float
     kill_margin: float
-    sample_pitch: float
+    sample_spacing: float
     start_course: float
     destination_course: float
     start_buffer: float
@@ -155,7 +155,7 @@ def sphere_records(threats: Records) -> Records:
 
 
 def as_columns(records: Records) -> Floats:
-    """Return records (n,) whose fields are all float64 as a table (n, fields)."""
+    """Return records (n,), whose fields are all float64, as a table (n, fields)."""
     return records.view(np.float64).reshape(len(records), -1)
 
 
@@ -176,7 +176,7 @@ class RequiredClearance(NamedTuple):
     same_everywhere: True if the ends have the full buffer.
     growth: slope of the required height due to the buffer, m per m.
     steepest_loss: fastest possible loss of height above the required height, m per m.
-    sample_pitch: spacing of terrain samples.
+    sample_spacing: spacing of terrain samples.
     """
 
     clearance: float
@@ -190,7 +190,7 @@ class RequiredClearance(NamedTuple):
     same_everywhere: bool
     growth: float
     steepest_loss: float
-    sample_pitch: float
+    sample_spacing: float
 
 
 @inner
@@ -201,7 +201,10 @@ def required_clearance(data: ProblemArrays) -> RequiredClearance:
 
 @inner
 def required_headroom(data: ProblemArrays) -> RequiredClearance:
-    """Return the maximum height above ground as a required clearance, for negated heights of path and ground."""
+    """Return the maximum height above ground as a required clearance.
+
+    It applies to the negated heights of path and ground.
+    """
     space = data.airspace
     return _make_required_clearance(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
 
@@ -210,7 +213,11 @@ def required_headroom(data: ProblemArrays) -> RequiredClearance:
 def _make_required_clearance(
     data: ProblemArrays, clearance: float, buffer: float, start_buffer: float, destination_buffer: float
 ) -> RequiredClearance:
-    """Make the required clearance: a height above ground (m), with buffers (m) at both ends and away from them."""
+    """Make a required clearance with buffers at both ends and away from them.
+
+    clearance: height above ground, m.
+    buffer, start_buffer, destination_buffer: additional heights away from the ends and at them, m.
+    """
     same_everywhere = min(start_buffer, destination_buffer) >= buffer
     growth = 0.0 if same_everywhere else data.buffer_growth
     return RequiredClearance(
@@ -225,7 +232,7 @@ def _make_required_clearance(
         same_everywhere,
         growth,
         data.slope_bounds.steepest + growth,
-        data.sample_pitch,
+        data.sample_spacing,
     )
 
 
@@ -298,9 +305,11 @@ class Problem:
 
 
 def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Problem:
-    """Make the planning problem of a scenario. Raises ScenarioError if no path can be planned in the scenario.
+    """Make the planning problem of a scenario.
 
     attempt: number of searches that have failed; each increases the clearance of the next.
+
+    Raises ScenarioError if no path can be planned in the scenario.
     """
     terrain = scenario.terrain
     if terrain is None:
@@ -362,15 +371,15 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         max_turn=MAX_AIRCRAFT_TURN_RAD if limits.max_turn is None else limits.max_turn - ANGLE_MARGIN_RAD,
         legs_hold_turns=limits.max_turn is None,
         fly_over=scenario.flight.fly_over,
-        max_climb=_or_nan(limits.max_climb),
-        max_dive=_or_nan(limits.max_dive),
+        max_climb=_none_to_nan(limits.max_climb),
+        max_dive=_none_to_nan(limits.max_dive),
         angle_margin=ANGLE_MARGIN_RAD,
         clearance=float(limits.min_clearance),
         buffer=buffer,
         kill_margin=CERTIFIED_KILL_MARGIN_M + limits.reserve_threats,
-        sample_pitch=min(50.0, max(15.0, 0.4 * terrain.spacing)),
-        start_course=_or_nan(scenario.start_course),
-        destination_course=_or_nan(scenario.destination_course),
+        sample_spacing=min(50.0, max(15.0, 0.4 * terrain.spacing)),
+        start_course=_none_to_nan(scenario.start_course),
+        destination_course=_none_to_nan(scenario.destination_course),
         start_buffer=_end_buffer(terrain, limits, scenario.start, buffer, end_fraction),
         destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer, end_fraction),
         buffer_growth=_buffer_growth(scenario, limits, aircraft),
@@ -400,16 +409,21 @@ def _search_airspace(
 
 
 def _zone_margins(scenario: Scenario, horizontal: float, vertical: float, end_fraction: float) -> ZoneMargins:
-    """Return the zone margins, m, changed by the scenario's `zone_margin_m`, which never reduces vertical margins."""
+    """Return the zone margins (m), changed by the scenario's `zone_margin_m`.
+
+    It changes horizontal margins, and may increase vertical margins, but never reduces them.
+    """
     requested_margin = scenario.planner.zone_margin_m
     extra_margin = 0.0 if requested_margin is None else requested_margin - CERTIFIED_ZONE_MARGIN_M
     return ZoneMargins(horizontal + extra_margin, vertical + max(0.0, extra_margin), end_fraction)
 
 
 def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
-    """Return a search's largest margin to an edge of a band of heights above ground, m; inf without a maximum height.
+    """Return the largest margin of a search to a limit of the height above ground, m.
 
-    certified_margin: margin of the certificate, m.
+    certified_margin: margin of the certificate to this limit, m.
+
+    The margin is inf without a maximum height.
     """
     space = certified.airspace
     band_height = space.max_height - certified.clearance - certified.buffer - space.buffer
@@ -417,7 +431,7 @@ def _max_buffer(certified: ProblemArrays, certified_margin: float) -> float:
 
 
 def _reduced_performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """Return the aircraft's performance, reduced for turbulence and within the rates that the autopilot demands."""
+    """Return the aircraft's performance, reduced for turbulence and to the autopilot's vertical rates."""
     slope_fraction, tracking = SLOPE_FRACTION_BY_TURBULENCE[scenario.wind.turbulence], limits.tracking
     if tracking is None:
         return derate(limits.performance(), slope_fraction, slope_fraction, limits.reserve_climb, limits.reserve_sink)
@@ -441,25 +455,28 @@ def _buffer_growth(scenario: Scenario, limits: Limits, aircraft: PerformanceTabl
 
 
 def _map_edges(bounds: Floats) -> dict[str, float]:
-    """Return the edges of a map with these bounds (2, 2), keyed by name."""
+    """Return the edges of a map with these bounds (2, 2), by name."""
     (west, east), (south, north) = bounds.tolist()
     return {"west": west, "east": east, "south": south, "north": north}
 
 
-def _or_nan(value: float | None) -> float:
+def _none_to_nan(value: float | None) -> float:
     """Return a number, or NaN for None."""
     return math.nan if value is None else float(value)
 
 
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, fraction: float = 1.0) -> float:
-    """Return the clearance buffer at a fixed end, m: the full buffer, or a fraction of the height available there."""
+    """Return the clearance buffer at a fixed end, m.
+
+    It is the full buffer, or a fraction of the height available there if that is too little.
+    """
     height_above_ground = float(point[2] - terrain.height(point[0], point[1]))
     available_height = height_above_ground - limits.min_clearance - 0.01
     return buffer if available_height >= buffer else fraction * max(0.0, available_height)
 
 
 def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
-    """Return upper bounds on the slope of the terrain: for the whole terrain, and for each tile with its neighbours."""
+    """Return upper bounds on the slope of the whole terrain, and of each tile with its neighbours."""
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
     max_slope = float(slopes.max())
     # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.
@@ -471,7 +488,11 @@ def _make_slope_bounds(terrain: Terrain) -> SlopeBounds:
 
 
 def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemArrays:
-    """Return the arrays with map and heights shrunk by these margins (m), but with both fixed ends still inside."""
+    """Return the arrays with a smaller area and height range, which still include both fixed ends.
+
+    lateral: margin to the edges of the map, m.
+    height: margin to floor and ceiling, m.
+    """
     ends = np.stack([data.start, data.destination])
     min_end, max_end = ends.min(axis=0), ends.max(axis=0)
     return data._replace(
@@ -485,7 +506,7 @@ def _shrink_area(data: ProblemArrays, lateral: float, height: float) -> ProblemA
 
 
 def _make_space(scenario: Scenario, data: ProblemArrays) -> Space:
-    """Return the search space; its heights begin at the minimum height that the ground allows."""
+    """Return the search space; its altitudes begin at the minimum altitude that the ground allows."""
     lowest_end = min(scenario.start[2], scenario.destination[2])
     min_height = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), lowest_end)
     max_height = max(data.ceiling, min_height + 1.0)

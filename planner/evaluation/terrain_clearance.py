@@ -1,7 +1,7 @@
 """Measure the clearance of legs: depth below the required clearance, and smallest heights near waypoints.
 
 Height is sampled along a leg. The steps grow with the height above the required clearance, because the ground cannot
-rise faster than its steepest slope nearby; near the ground they are the sample pitch. An autopilot that follows the
+rise faster than its steepest slope nearby; near the ground they are the sample spacing. An autopilot that follows the
 height demand with a lag flies below or above its legs, and that deviation is added to the required height.
 """
 
@@ -32,7 +32,7 @@ HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest"
 
 @inlined
 def _remaining_fraction(lengths: float) -> float:
-    """Return the fraction of a difference that remains after this many lag lengths, an upper bound on exp(-x)."""
+    """Return an upper bound on exp(-lengths), the fraction of a lag that remains after some lag lengths."""
     # Four terms of exp(x), because a library's exponential rounds differently on different machines.
     return 1.0 / (1.0 + lengths * (1.0 + lengths * (0.5 + lengths / 6.0)))
 
@@ -41,7 +41,10 @@ def _remaining_fraction(lengths: float) -> float:
 def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:
-    """Return the distance (m) that the aircraft covers over the ground during the lag, on a unit course."""
+    """Return the distance (m) that the aircraft covers over the ground during the altitude lag.
+
+    east, north: unit course.
+    """
     (wx, wy), wind_speed, airspeed = wind, wind_speed_at(aircraft, amsl), true_airspeed(aircraft, amsl)
     speed_over_ground = ground_speed(
         airspeed, wind_speed * (east * wx + north * wy), wind_speed * (east * wy - north * wx)
@@ -58,7 +61,7 @@ def set_lag(
     """Fill the `HEIGHT_LAG` record of a leg, and return the distance of the aircraft below its end, m.
 
     length: lag length (`lag_length`), m.
-    horizontal_length, altitude_change: of the leg, m.
+    horizontal_length, altitude_change: horizontal length and altitude change of the leg, m.
     below: distance of the aircraft below the start of the leg, m.
     """
     lag.steady, lag.slant = length * altitude_change / max(horizontal_length, 1e-6), 0.0
@@ -94,7 +97,7 @@ def lag_at(lag: Record, fraction: float) -> float:
 # Columns and rows of both ends of a segment.
 Pixels = tuple[float, float, float, float]
 
-# Below this height above the required clearance (m) samples are spaced by the pitch; corners rely on it.
+# Below this height above the required clearance (m) samples are at their closest spacing; corners rely on it.
 NEAR_GROUND_HEIGHT_M = 10.0
 # Violation of a sample where the ground is unknown, m.
 UNKNOWN_GROUND_DEPTH_M = 1000.0
@@ -108,7 +111,7 @@ TERRAIN_LEG = np.dtype(
         ("row_step", np.float64),
         # Fractions of the leg: spacing of samples near the ground; the next sample; the limits up to which and from
         # which a sample counts as near the beginning and near the end.
-        ("pitch", np.float64),
+        ("min_step", np.float64),
         ("share", np.float64),
         ("beginning", np.float64),
         ("ending", np.float64),
@@ -133,16 +136,18 @@ def _take_sample(
     max_further_height: float,
     horizontal_length: float,
     altitude_change: float,
-    pitch: float,
+    min_step: float,
 ) -> tuple[float, float]:
-    """Return the height above the required clearance at a point of a line, m, and the step to the next sample.
+    """Return the height above the required clearance at a point of a line, m, and the next step.
 
-    The step is a fraction of the line.
-
-    tiles, tile_side: see `SlopeBounds`. growth: see `RequiredClearance`. required_height: required clearance.
+    tiles, tile_side: see `SlopeBounds`.
+    growth: see `RequiredClearance`.
+    required_height: required clearance, m.
     max_further_height: largest further requirement elsewhere on the line, m.
-    horizontal_length, altitude_change: of the whole line, m.
-    pitch: minimum spacing of samples, as a fraction of the line.
+    horizontal_length, altitude_change: horizontal length and altitude change of the whole line, m.
+    min_step: minimum spacing of samples, as a fraction of the line.
+
+    The step leads to the next sample that is needed, as a fraction of the line.
     """
     ground = pixel_height(heights, column, row)
     excess_height = up - ground - required_height if ground == ground else -UNKNOWN_GROUND_DEPTH_M
@@ -157,7 +162,7 @@ def _take_sample(
         tile_side / (horizontal_length + 1e-9),
     )
     next_step = next_step if next_step < tile_step else tile_step
-    return excess_height, next_step if next_step > pitch else pitch
+    return excess_height, next_step if next_step > min_step else min_step
 
 
 @inlined
@@ -175,19 +180,20 @@ def terrain_excess(
     bz: float,
     max_excess: float,
 ) -> float:
-    """Return the depth below the required clearance along a-b, summed over samples (m x km).
+    """Return the depth below the required clearance along a-b, summed over samples, m x km.
 
-    The sum ends where it exceeds `max_excess`.
-    extra_height: additional height required here, m. ends: columns and rows of a and b.
+    extra_height: additional height required here, m.
+    ends: columns and rows of a and b.
+    max_excess: value beyond which the sum ends.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
     altitude_change = bz - az
     horizontal_length = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
-    pitch = 1.0 / max(1.0, math.ceil(horizontal_length / required.sample_pitch))
+    min_step = 1.0 / max(1.0, math.ceil(horizontal_length / required.sample_spacing))
     tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
     required_height = required.clearance + required.buffer + extra_height
-    scale = max(horizontal_length, 1.0) * pitch / 1000.0
+    scale = max(horizontal_length, 1.0) * min_step / 1000.0
     depth, fraction, max_depth = 0.0, 0.0, max_excess / scale
     while True:
         if not required.same_everywhere:
@@ -196,18 +202,29 @@ def terrain_excess(
             )
         x, y, up = column + fraction * column_step, row + fraction * row_step, az + fraction * altitude_change
         excess_height, next_step = _take_sample(
-            heights, tiles, tile_side, growth, x, y, up, required_height, 0.0, horizontal_length, altitude_change, pitch
+            heights,
+            tiles,
+            tile_side,
+            growth,
+            x,
+            y,
+            up,
+            required_height,
+            0.0,
+            horizontal_length,
+            altitude_change,
+            min_step,
         )
         depth -= excess_height if excess_height < 0.0 else 0.0
         if fraction >= 1.0 or depth > max_depth:
             break
         fraction = min(1.0, fraction + next_step)
-    return float(depth * max(horizontal_length, 1.0) * pitch / 1000.0)
+    return float(depth * max(horizontal_length, 1.0) * min_step / 1000.0)
 
 
 @inlined
 def _start_sampling(
-    to_pixel: PolyMapRecord, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
+    to_pixel: PolyMapRecord, sample_spacing: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:
     """Fill `TERRAIN_LEG` records (w - 1,) with their state before the first sample."""
     start = path[0]
@@ -215,15 +232,15 @@ def _start_sampling(
     for i in range(legs.shape[0]):
         end_column, end_row = polymap(to_pixel, path[i + 1, 0], path[i + 1, 1])
         horizontal_length = legs[i].run
-        pitch = 1.0 / max(1.0, math.ceil(horizontal_length / sample_pitch))
+        min_step = 1.0 / max(1.0, math.ceil(horizontal_length / sample_spacing))
         leg = terrain_legs[i]
         leg.column, leg.row = column, row
         leg.column_step, leg.row_step = end_column - column, end_row - row
-        leg.pitch, leg.share = pitch, 0.0
+        leg.min_step, leg.share = min_step, 0.0
         # A sample represents the steps before and after it.
         per_metre = 1.0 / max(horizontal_length, 1e-9)
-        leg.beginning = extents[i] * per_metre + pitch
-        leg.ending = 1.0 - extents[i + 1] * per_metre - pitch
+        leg.beginning = extents[i] * per_metre + min_step
+        leg.ending = 1.0 - extents[i + 1] * per_metre - min_step
         leg.depth, leg.height_at_beginning, leg.height_at_end = 0.0, math.inf, math.inf
         column, row = end_column, end_row
 
@@ -241,16 +258,18 @@ def sample_terrain(
     terrain_legs: Records,
     unfinished: Ints,
 ) -> None:
-    """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance and smallest heights.
+    """Fill the `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths and smallest heights of its legs.
 
-    extents: (w,) distance within which a point is near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).
+    extents: (w,) distance within which a point is near a waypoint, m.
+    lags: `HEIGHT_LAG` records (w - 1,).
     unfinished: (w - 1,) scratch.
 
-    Smallest heights are exact up to `NEAR_GROUND_HEIGHT_M`; above that they are lower bounds. Legs take turns, one
-    sample each: the next sample of a leg depends on the result of its last one.
+    Depths and heights are relative to the required clearance. Smallest heights are exact up to `NEAR_GROUND_HEIGHT_M`;
+    above that they are lower bounds. Legs take turns, one sample each: the next sample of a leg depends on the result
+    of its last one.
     """
     count = legs.shape[0]
-    _start_sampling(to_pixel, required.sample_pitch, path, legs, extents, terrain_legs)
+    _start_sampling(to_pixel, required.sample_spacing, path, legs, extents, terrain_legs)
     for i in range(count):
         unfinished[i] = i
     tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
@@ -260,7 +279,7 @@ def sample_terrain(
         for entry in range(count):
             k = np.uintp(unfinished[entry])
             leg = terrain_legs[k]
-            fraction, pitch = leg.share, leg.pitch
+            fraction, min_step = leg.share, leg.min_step
             up, altitude_change = path[k, 2], path[k + np.uintp(1), 2] - path[k, 2]
             if not required.same_everywhere:
                 dx, dy = path[k + np.uintp(1), 0] - path[k, 0], path[k + np.uintp(1), 1] - path[k, 1]
@@ -282,7 +301,7 @@ def sample_terrain(
                 further_height,
                 legs[k].run,
                 altitude_change,
-                pitch,
+                min_step,
             )
             leg.depth -= excess_height if excess_height < 0.0 else 0.0
             gap_at_beginning, gap_at_end = (
@@ -298,12 +317,12 @@ def sample_terrain(
             leg.share = fraction + next_step if fraction + next_step < 1.0 else 1.0
         count = remaining_count
     for i in range(legs.shape[0]):
-        terrain_legs[i].depth *= max(legs[i].run, 1.0) * terrain_legs[i].pitch / 1000.0
+        terrain_legs[i].depth *= max(legs[i].run, 1.0) * terrain_legs[i].min_step / 1000.0
 
 
 @inlined
 def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
-    """Return columns and rows of both ends of a segment."""
+    """Return the raster columns and rows of both ends of a segment."""
     column_a, row_a = polymap(to_pixel, ax, ay)
     column_b, row_b = polymap(to_pixel, bx, by)
     return column_a, row_a, column_b, row_b

@@ -57,9 +57,11 @@ class ThreatCells(NamedTuple):
 
 
 def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> ThreatCells:
-    """Make for each cell of a grid the list of units whose sphere, seen from above, meets the cell.
+    """List, for each cell of a grid, the units whose sphere meets the cell, seen from above.
 
-    position: (m, 3) units. radius: (m,) radii of the spheres, m; 0 for none. bounds: (2, 2) map.
+    position: (m, 3) positions of the units.
+    radius: (m,) radii of the spheres, m; 0 for none.
+    bounds: (2, 2) map.
     """
     min_corner, max_corner = bounds[:, 0], bounds[:, 1]
     min_corner, max_corner = (
@@ -87,7 +89,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
 
 @compiled
 def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitudes: Int32s, cells: Records) -> None:
-    """Fill the records of cells: start and length of their list of units, and the altitude range of these units."""
+    """Fill the records of cells: their part of the list of units, and the altitude range of these units."""
     for k in range(cells.shape[0]):
         cell = cells[k]
         cell.first, cell.count = first[k], first[k + 1] - first[k]
@@ -102,7 +104,10 @@ def _fill_cells(first: Int32s, units: Int32s, min_altitudes: Int32s, max_altitud
 def _list_units(
     position: Floats, radius: Floats, west: float, south: float, cell_size: float, columns: int, rows: int
 ) -> tuple[Int32s, Int32s]:
-    """Return the units of each cell as one list of all cells, and the index of each cell's first entry in the list."""
+    """Return the index of each cell's first entry in a list of units, and the list.
+
+    The list contains the units of one cell after another.
+    """
     count = columns * rows
     first = np.zeros(count + 2, dtype=np.int32)
     units = np.empty(0, dtype=np.int32)
@@ -178,8 +183,10 @@ class MissileIndex(NamedTuple):
 
 
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
-    """Return the index of the missiles of records with fields east, north, up, kill_radius and kill_scale (m).
+    """Return the index of missiles.
 
+    threats: records with the fields east, north, up, kill_radius and kill_scale, m; threats without a kill radius are
+        ignored.
     side: side of a cell, m; None for `MISSILES_PER_CELL` missiles per cell.
     """
     armed_threats = threats[threats["kill_radius"] > 0.0]
@@ -229,10 +236,12 @@ def kill_density(
     below: float,
     above: float,
 ) -> tuple[float, float, float]:
-    """Return the mean kill density over a-b with enlarged radii, and the distances to the nearest spheres, m.
+    """Return the mean kill density over the segment a-b, and the distances to spheres near both ends, m.
 
-    length_a, length_b: lengths (m) at a and at b from which the two distances are measured; a distance is exact if
-    below `max_distance`. below, above: vertical tracking error, m.
+    margin: distance added to the radii, m.
+    max_distance: a returned distance is exact if it is below this, m.
+    length_a, length_b: lengths at a and at b from which the two distances are measured, m.
+    below, above: vertical tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
@@ -303,7 +312,7 @@ def _clip_fractions(start_fraction: float, end_fraction: float) -> tuple[float, 
 
 @inlined
 def _shift_towards_missile(z: float, altitude_change: float, below: float, above: float) -> float:
-    """Return the height of a segment's start above a missile (m), shifted towards it by the tracking error.
+    """Return the height of a segment's start above a missile, shifted towards it by the tracking error, m.
 
     altitude_change: altitude change of the segment up to its closest point, m.
     """
@@ -314,7 +323,10 @@ def _shift_towards_missile(z: float, altitude_change: float, below: float, above
 
 @inlined
 def _cell_index(position: float, count: int) -> int:
-    """Return the index of the cell of a position along one axis; -1 below the first cell, `count` above the last."""
+    """Return the index of the cell of a position along one axis.
+
+    The index is -1 below the first cell, and `count` above the last.
+    """
     clipped = position if position > -1.0 else -1.0
     return math.floor(clipped if clipped < count else count)
 
@@ -325,8 +337,8 @@ def _closest2(
 ) -> float:
     """Return the squared distance from a point to the part of a segment between two fractions.
 
-    closest_fraction: fraction of the infinite line that is closest to the point. along, start2, length2: see
-    `window_exposure`.
+    closest_fraction: fraction of the infinite line that is closest to the point.
+    along, start2, length2: see `window_exposure`.
     """
     fraction = closest_fraction if closest_fraction < end_fraction else end_fraction
     fraction = fraction if fraction > begin_fraction else begin_fraction

@@ -36,11 +36,13 @@ _SIMPSON_WEIGHTS = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
 
 @by_reference
 class TravelCost(NamedTuple):
-    """Weights of length, time and energy in a path's cost, and the power at each height, for compiled functions.
+    """Weights of length, time and energy in a path's cost, and the power at each height.
 
-    length: cost per metre of path. time: per second. energy: per joule.
+    length: cost per metre of path.
+    time: cost per second.
+    energy: cost per joule.
     level, linear, square: (h,) coefficients of the power (W) at the heights of the performance table and at its
-    airspeed: level + linear x + square x^2, where x is the sine of the climb angle to the air.
+        airspeed: level + linear x + square x^2, where x is the sine of the climb angle to the air.
     min_sine, max_sine: (h,) bounds of x, beyond which power is constant: idle and full throttle.
     """
 
@@ -84,11 +86,10 @@ def make_time_cost(table: PerformanceTable) -> TravelCost:
 
 
 def make_energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost | None:
-    """Return the cost of a path's energy, in m of level flight in still air.
+    """Return the cost of a path's energy, in m of level flight in still air; None if power is unknown.
 
-    Return None if the aircraft's power is unknown.
-    Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full
-    throttle. At heights without level flight, it is the power at the nearest height with level flight.
+    Power is as in `Envelope.power`: the parabola through idle at the steepest descent, level flight and full throttle.
+    At heights without level flight, it is the power at the nearest height with level flight.
     """
     rows = np.array([_power_parabola(envelope, true_airspeed(table, float(amsl)), float(amsl)) for amsl in table.amsl])
     is_known = np.isfinite(rows).all(axis=1)
@@ -101,9 +102,9 @@ def make_energy_cost(envelope: Envelope, table: PerformanceTable) -> TravelCost 
 
 
 def _power_parabola(envelope: Envelope, airspeed: float, amsl: float) -> tuple[float, float, float, float, float]:
-    """Return the coefficients of a parabola of power over the sine of the climb angle, and the bounds of this sine.
+    """Return the parabola of power over the sine of the climb angle, and the bounds of this sine.
 
-    All are NaN if power is unknown.
+    The result is level, linear, square, min_sine and max_sine of `TravelCost`. All are NaN if power is unknown.
     """
     climb, descent = envelope.air_angles(airspeed, amsl)
     min_sine, max_sine = -math.sin(descent), math.sin(climb)
@@ -132,7 +133,10 @@ class LegTime(NamedTuple):
 
 @inner
 def leg_time(dx: float, dy: float, dz: float, wind_east: float, wind_north: float, airspeed: float) -> LegTime:
-    """Return the time of a leg (m) at an airspeed in a wind (m/s): the smaller positive T with |d - w T| = V T.
+    """Return the time of a leg in wind: the smaller positive T with |d - w T| = V T.
+
+    dx, dy, dz: the leg d, m.
+    wind_east, wind_north, airspeed: wind w and airspeed V, m/s.
 
     T solves |d|^2 - 2 T w.d - (V^2 - w^2) T^2 = 0: T = |d|^2 / (w.d + D), D^2 = (w.d)^2 + (V^2 - w^2) |d|^2. Its
     derivative with respect to d is (d - w T) / D.
@@ -168,7 +172,7 @@ class _FlightConditions(NamedTuple):
 
 @inner
 def _conditions_at_altitude(travel: TravelCost, table: PerformanceTable, amsl: float) -> _FlightConditions:
-    """Return the airspeed, the wind and the power coefficients at an altitude, m AMSL."""
+    """Return the airspeed, the wind speed and the power coefficients at an altitude, m AMSL."""
     airspeed, wind = true_airspeed(table, amsl), wind_speed_at(table, amsl)
     if travel.energy == 0.0:
         return _FlightConditions(airspeed, wind, 0.0, 0.0, 0.0, -1.0, 1.0)
@@ -240,7 +244,7 @@ def path_cost(travel: TravelCost, table: PerformanceTable, path: Floats) -> floa
 
 
 class LegModel(NamedTuple):
-    """Scratch of `model_leg`: derivatives (2, 3) of a leg's cost with respect to its ends, curvature (2, 3, 2, 3)."""
+    """Scratch of `model_leg`: derivatives (2, 3) and curvature (2, 3, 2, 3) of a leg's cost by its ends."""
 
     slopes: Floats
     curvature: Floats
@@ -248,7 +252,7 @@ class LegModel(NamedTuple):
 
 @inner
 def model_leg(travel: TravelCost, table: PerformanceTable, start: Floats, finish: Floats, model: LegModel) -> float:
-    """Return the cost of a leg, finite for any leg; fill its derivatives with respect to its ends, and its curvature.
+    """Return the cost of a leg, finite for any leg; fill its derivatives and curvature by the leg's ends.
 
     The curvature is the sum of the curvatures of the length, of the time at each height, and of the power, all convex;
     the coupling of height and course is omitted, so that the matrix has no negative eigenvalue.
@@ -324,7 +328,10 @@ def _fill_length_hessian(hessian: Floats, displacement: tuple[float, float, floa
 
 @inner
 def _fill_time_curvature(curvature: Floats, time: LegTime, conditions: _FlightConditions, wx: float, wy: float) -> None:
-    """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D, g its gradient."""
+    """Fill the curvature (3, 3) of a leg's time: (1 - w g' - g w' - (V^2 - w^2) g g') / D.
+
+    Here g is the gradient of the time, w the wind, V the airspeed and D as in `leg_time`.
+    """
     wind = (conditions.wind * wx, conditions.wind * wy, 0.0)
     gradient = (time.by_east, time.by_north, time.by_up)
     speed2_difference = conditions.airspeed**2 - conditions.wind**2

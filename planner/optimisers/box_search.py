@@ -9,10 +9,10 @@ from world.arrays import Floats, Ints
 
 
 class BoxSearch(ABC):
-    """Base of population-based searches in a box: `ask` returns samples to score, `tell` takes their scores.
+    """Population-based search in a box: `ask` returns samples to score, `tell` takes their scores.
 
     lower, upper: (d,) box.
-    rank: function of scores (n, c) for their ranks (n,); smaller is better.
+    rank: function of scores (n, c) that returns their ranks (n,); smaller is better.
     population: even number of samples.
     initial: (population, d) first samples; None for uniform ones.
 
@@ -40,7 +40,7 @@ class BoxSearch(ABC):
         self.scores: Floats = np.empty((0, 0))
 
     def ask(self) -> Floats:
-        """Return the samples (n, d) inside the box to score."""
+        """Return the samples to score, (n, d), which are inside the box."""
         return self._pending_samples
 
     @abstractmethod

@@ -54,7 +54,7 @@ MAX_EXPONENT = 2
 
 
 class Kind(IntEnum):
-    """Kind of departure of a sample from its mean; each kind is equally frequent."""
+    """Kind of displacement of a sample from its mean; each kind is equally frequent."""
 
     NEAR = 0
     NOISE = 1
@@ -101,20 +101,25 @@ class FrontSampling:
         self.objectives: Floats = np.empty((0, reference.size))
 
     def ask(self) -> Floats:
-        """Draw samples (population, d) of the mixture."""
+        """Draw samples (population, d): solutions of the archive, randomly displaced and clipped to the box."""
         mean_rows = self._rng.integers(len(self.vectors), size=self._population)
         self._kinds = kinds = self._rng.integers(len(Kind), size=self._population)
         samples = self.vectors[mean_rows]
         is_near, is_in_block, is_noisy = kinds == Kind.NEAR, kinds >= Kind.BLOCK, kinds != Kind.BLOCK
-        samples[is_near] += self._draw_near_departures(mean_rows[is_near])
-        samples[is_in_block] += self._draw_block_departures(mean_rows[is_in_block])
+        samples[is_near] += self._draw_near_displacements(mean_rows[is_near])
+        samples[is_in_block] += self._draw_block_displacements(mean_rows[is_in_block])
         samples[is_noisy] += self._draw_noise(self._scales[kinds[is_noisy], None])
         return np.clip(samples, self._lower, self._upper)
 
-    def _draw_near_departures(self, mean_rows: Ints) -> Floats:
-        """Draw departures (n, d) from means, with the covariance of the nearest solutions, relative to the box."""
+    def _draw_near_displacements(self, mean_rows: Ints) -> Floats:
+        """Draw displacements (n, d) with the covariance of the solutions nearest to each mean.
+
+        mean_rows: (n,) rows of the means in the archive.
+
+        Distances are relative to the box.
+        """
         neighbour_count = min(NEIGHBOUR_COUNT, len(self.vectors) - 1)
-        departures = np.zeros((len(mean_rows), self._lower.size))
+        displacements = np.zeros((len(mean_rows), self._lower.size))
         scaled_vectors = (self.vectors / (self._upper - self._lower).clip(1e-12)).T
         # Summed over the first axis: in sequence, with the same rounding on every machine.
         distances2 = ((scaled_vectors[:, mean_rows, None] - scaled_vectors[:, None, :]) ** 2).sum(axis=0)
@@ -125,11 +130,11 @@ class FrontSampling:
             / np.sqrt(max(1, neighbour_count))
         )
         for k in range(neighbour_count):
-            departures += weights[:, k, None] * (self.vectors[nearest_rows[:, k]] - self.vectors[mean_rows])
-        return departures
+            displacements += weights[:, k, None] * (self.vectors[nearest_rows[:, k]] - self.vectors[mean_rows])
+        return displacements
 
-    def _draw_block_departures(self, mean_rows: Ints) -> Floats:
-        """Draw departures (n, d) of a block of points towards their positions in another solution."""
+    def _draw_block_displacements(self, mean_rows: Ints) -> Floats:
+        """Draw displacements (n, d) of a block of points towards their positions in another solution."""
         rng, count, point_count = self._rng, len(mean_rows), self._lower.size // self._axes
         other_rows = rng.integers(len(self.vectors), size=count)
         block_lengths = rng.integers(1, point_count + 1, size=count)
@@ -145,7 +150,10 @@ class FrontSampling:
         return np.asarray(fractions * is_moving_variable * (self.vectors[other_rows] - self.vectors[mean_rows]))
 
     def _draw_noise(self, scales: Floats) -> Floats:
-        """Draw noise (n, d) along a few directions per sample, at scales (n, 1) times a random factor per sample."""
+        """Draw noise (n, d) along a few directions per sample.
+
+        scales: (n, 1) scales of the samples, which a random factor per sample multiplies.
+        """
         rng, count, direction_count = self._rng, len(scales), len(self._directions)
         directions_per_sample = min(MAX_DIRECTIONS, direction_count)
         picked_directions = rng.integers(direction_count, size=(count, directions_per_sample))
@@ -158,7 +166,12 @@ class FrontSampling:
         return noise
 
     def tell(self, vectors: Floats, objectives: Floats, violations: Floats) -> None:
-        """Process samples (n, d) with objectives (n, m) and violations (n, c), all 0 if the constraints are met."""
+        """Insert the best samples into the archive, and adapt the scales of the displacements.
+
+        vectors: (n, d) samples.
+        objectives: (n, m).
+        violations: (n, c), all 0 if the constraints are met.
+        """
         feasible_rows = np.flatnonzero((violations <= 0.0).all(axis=1) & (objectives < self.reference).all(axis=1))
         is_in_archive = np.zeros(len(vectors), dtype=bool)
         if feasible_rows.size:

@@ -21,7 +21,9 @@ SEED = 20
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:
-    """Return the exact volume that points (n, m) dominate below a reference (m,), by slices of the last objective.
+    """Return the exact volume that points (n, m) dominate below a reference point (m,).
+
+    It is computed by slices of the last objective.
 
     >>> hypervolume(np.array([[1.0, 3.0], [2.0, 1.0]]), np.array([4.0, 4.0]))  # 3 x 1 and 2 x 2 of it below
     7.0
@@ -52,10 +54,10 @@ def _non_dominated(points: Floats) -> Floats:
 def covering_order(points: Floats, reference: Floats, count: int, rng: np.random.Generator | None = None) -> Ints:
     """Return up to `count` rows of points (n, m) below a reference (m,), in the order of a greedy choice.
 
+    rng: draws the probes; None for the same probes in every call.
+
     The best point of each objective comes first. Each further point adds most to the covered volume, counted at random
     probes between the points' best values and the reference. Points that add nothing come last, in their order.
-
-    rng: draws the probes; None for the same probes in every call.
 
     >>> front = np.array([[0.0, 9.0], [9.0, 0.0], [4.0, 4.0], [4.1, 4.1]])
     >>> covering_order(front, np.array([10.0, 10.0]), 3).tolist()
@@ -82,7 +84,8 @@ def covering_order(points: Floats, reference: Floats, count: int, rng: np.random
 def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
     """Return marks (n, p): 1 if a point is at or below a probe in every objective, otherwise 0.
 
-    points: (n, m).  probes: (m, p).
+    points: (n, m).
+    probes: (m, p).
     """
     marks = np.ones((points.shape[0], probes.shape[1]), dtype=np.uint8)
     for n in range(points.shape[0]):
@@ -94,11 +97,11 @@ def _mark_covered_probes(points: Floats, probes: Floats) -> Marks:
 
 @compiled
 def _choose_rows_greedily(marks: Marks, first_rows: Ints, count: int) -> Ints:
-    """Return rows of marks (n, p), (count,): `first_rows`, then always the row that covers most uncovered probes.
+    """Return `count` rows of marks (n, p): `first_rows`, then each time the row with most new probes.
 
-    Among equal rows, the first is chosen.
-    The gain of a row only decreases as others are chosen. Its last count is therefore an upper bound, and few rows are
-    counted again (Minoux, Optimization Techniques, Lecture Notes in Control and Information Sciences 7, 1978).
+    Among equal rows, the first is chosen. The gain of a row only decreases as others are chosen. Its last count is
+    therefore an upper bound, and few rows are counted again (Minoux, Optimization Techniques, Lecture Notes in Control
+    and Information Sciences 7, 1978).
     """
     size, width = marks.shape
     uncovered, count_positions, gains = np.ones(width, dtype=np.uint8), np.full(size, -1), np.full(size, width)

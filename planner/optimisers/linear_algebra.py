@@ -13,7 +13,8 @@ from world.kernels import compiled, inner
 def covariance(rows: Floats, first_column: int, second_column: int, size: int) -> Floats:
     """Return the covariance of two groups of columns, (size, size).
 
-    rows: (n, d) samples minus their mean.  first_column, second_column: index of the first column of each group.
+    rows: (n, d) samples minus their mean.
+    first_column, second_column: index of the first column of each group.
     size: number of columns of a group.
     """
     out = np.zeros((size, size))
@@ -82,7 +83,7 @@ def _add_multiple(values: Floats, factor: float, out: Floats) -> None:
 
 @inner
 def band_cholesky(matrix: Floats, out: Floats) -> None:
-    """Fill `out` with the lower Cholesky factor of a positive definite band matrix; both are stored as (d, b).
+    """Fill `out` with the lower Cholesky factor of a positive definite band matrix, both stored as (d, b).
 
     Entry [i, k] of both belongs to row i and column i - k. Pivots are at least 1e-12 times their diagonal entry.
     """
@@ -99,7 +100,8 @@ def band_cholesky(matrix: Floats, out: Floats) -> None:
 def solve_band(factor: Floats, right_side: Floats, out: Floats) -> None:
     """Fill `out` (d,) with the solution of a linear system.
 
-    factor: band factor of the matrix, as `band_cholesky` computes it.  right_side: (d,).
+    factor: band factor of the matrix, as `band_cholesky` computes it.
+    right_side: (d,).
     """
     size, width = factor.shape
     for i in range(size):

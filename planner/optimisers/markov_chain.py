@@ -17,7 +17,10 @@ VARIANCE_RIDGE = 1e-6
 
 
 class MarkovChain(Umda):
-    """Estimation of distribution like `planner.optimisers.umda.Umda`, with a first-order Markov chain over groups.
+    """Estimation of distribution like `planner.optimisers.umda.Umda`, with a Markov chain over groups.
+
+    The arguments are the same as for `Umda`; `basis` and `floor` are unused. The number of variables is a multiple of
+    `GROUP`; each group of consecutive variables depends on the previous group only.
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
@@ -35,7 +38,7 @@ class MarkovChain(Umda):
     GROUP = 3
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples group by group, each conditional on the previous group, and keep them inside the box."""
+        """Draw samples group by group, each conditional on the previous group; redraw those outside the box."""
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
         slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, VARIANCE_RIDGE)
@@ -48,7 +51,10 @@ class MarkovChain(Umda):
 def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:
     """Fit a linear regression of each group of variables on the previous group.
 
-    rows: (n, d) samples minus their mean.  size: number of variables of a group.  ridge: see `cholesky`.
+    rows: (n, d) samples minus their mean.
+    size: number of variables of a group.
+    ridge: see `cholesky`.
+
     Returns the regression matrices and the Cholesky factors of the residuals' covariances, (g, size, size) each.
     """
     group_count = rows.shape[1] // size

@@ -46,7 +46,9 @@ MAX_DEVIATION_RATIO = 1e7
 class Gaussian:
     """Gaussian in the unit box, reflected at its sides, with the best point that it has found.
 
-    mean: (d,).  deviation: fraction of the box.  population: number of samples per generation.
+    mean: (d,).
+    deviation: fraction of the box.
+    population: number of samples per generation.
     scale: (d,) relative standard deviations of the variables at the start; None for equal ones.
     """
 
@@ -121,7 +123,7 @@ class Gaussian:
         )
 
     def _update_distribution(self, draws: Floats) -> None:
-        """Move mean, deviation and covariance towards the normal draws (m, d) of the better half, best first."""
+        """Update mean, deviation and covariance by the normal draws (m, d) of the better half, best first."""
         self._generations += 1
         steps = multiply_by_lower(draws, self._factor)
         mean_draw, mean_step = (self.weights[:, None] * draws).sum(axis=0), (self.weights[:, None] * steps).sum(axis=0)
@@ -187,7 +189,7 @@ class Multistart(BoxSearch):
         self._search: Gaussian | None = None
         if initial is None:
             self._search = self._start_search()
-            self._draw(self._search)
+            self._draw_generation(self._search)
 
     def tell(self, scores: Floats) -> None:
         """Process the scores (n, c) of the last samples of `ask`, and draw the next generation."""
@@ -206,7 +208,7 @@ class Multistart(BoxSearch):
                 or self._search.evaluations - self._slice_start >= SLICE_EVALUATIONS * self.lower.size
             ):
                 self._search = self._next_search(self._search)
-        self._draw(self._search)
+        self._draw_generation(self._search)
 
     def _store_generation(self, points: Floats, scores: Floats) -> None:
         """Store a generation, best first, after the best sample of all."""
@@ -218,25 +220,25 @@ class Multistart(BoxSearch):
         """Scale points (n, d) of the search box to the unit box."""
         return (points - self.lower) / (self.upper - self.lower)
 
-    def _draw(self, search: Gaussian) -> None:
-        """Draw the next generation of a search, in the unit box and in the search box."""
+    def _draw_generation(self, search: Gaussian) -> None:
+        """Draw the next generation of a search; store it scaled to the unit box and to the search box."""
         self._pending_unit_samples = search.draw(self._rng)
         self._pending_samples = np.clip(
             self.lower + self._pending_unit_samples * (self.upper - self.lower), self.lower, self.upper
         )
 
     def _next_search(self, search: Gaussian) -> Gaussian:
-        """Return the search that gets the next slice, after a slice of `search`."""
+        """Return the search that gets the next slice of evaluations, after a slice of `search`."""
         self._spent_evaluations[self._is_continued] += search.evaluations - self._slice_start
         next_search = search if self._may_continue(search) else self._choose_search()
         self._slice_start = next_search.evaluations
         return next_search
 
     def _may_continue(self, search: Gaussian) -> bool:
-        """Return True if a search, at the end of a slice, is among the better half of the equally narrow searches.
+        """Return True if a search may get another slice at once.
 
-        The searches are compared by their results at the same width.  The best search of all waits for its turn, so
-        that half of the evaluations go to others.
+        It must be among the better half of the searches that have reached the same width, compared by their results at
+        that width. The best search of all waits for its turn, so that half of the evaluations go to others.
         """
         if search.best is None:
             return False
@@ -260,7 +262,7 @@ class Multistart(BoxSearch):
         return 2 * int((ranks[1:] < ranks[0]).sum()) <= len(equally_narrow_scores)
 
     def _choose_search(self) -> Gaussian:
-        """Return the best waiting search or a new start, whichever kind has had fewer evaluations."""
+        """Return the best waiting search or a new one, whichever kind has had fewer evaluations."""
         waiting_searches = [search for search in self._searches if search.curve and not search.is_done]
         self._is_continued = bool(waiting_searches) and self._spent_evaluations[True] <= self._spent_evaluations[False]
         if self._is_continued:
@@ -270,7 +272,7 @@ class Multistart(BoxSearch):
         return self._start_search()
 
     def _start_search(self) -> Gaussian:
-        """Start a new search, the first from the centre with a typical width, later ones with any width."""
+        """Start a search: the first from the centre with a typical width, later ones with a random width."""
         size = self.lower.size
         min_population = min(self._population, 4 + int(3.0 * math.log(size)))
         if not self._searches:

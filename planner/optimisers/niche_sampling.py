@@ -29,7 +29,7 @@ class NicheSampling:
     """Sampling of groups of variables (g, n, d), from the whole box to the niches of the best samples.
 
     lower, upper: (g, d) boxes.
-    allowed: function of samples (n, d) and their groups (n,) that returns True for each feasible sample, (n,).
+    allowed: function of samples (n, d) and their groups (n,) that returns a mask (n,): True where a sample is feasible.
     rng: random generator of all samples.
 
     >>> lower, upper = np.full((3, 2), -2.0), np.full((3, 2), 6.0)
@@ -64,20 +64,24 @@ class NicheSampling:
         lower, upper = self._lower[:, None, :], extended_upper[:, None, :]
 
         def draw(groups: Ints) -> Floats:
+            """Return one uniform sample for each group number, (n, d)."""
             fractions = self._rng.random((groups.size, size[2]))
             return np.asarray(
                 np.minimum(lower[groups, 0] + fractions * (upper - lower)[groups, 0], self._upper[groups])
             )
 
-        return self._draw(size, draw, MAX_FIRST_REDRAWS)
+        return self._draw_feasible(size, draw, MAX_FIRST_REDRAWS)
 
     def next(
         self, rows: Floats, costs: Floats, count: int, deviation: Floats, max_cost: float, elite: Floats
     ) -> Floats:
         """Return samples (g, count, d): the elite, the best of each niche, and new samples around these.
 
-        rows: (g, n, d) with costs (g, n). deviation: (d,) standard deviations of new samples. max_cost: maximum cost of
-        a selected sample. elite: (g, d), always selected.
+        rows: (g, n, d) samples.
+        costs: (g, n) costs of the samples.
+        deviation: (d,) standard deviations of new samples.
+        max_cost: maximum cost of a selected sample.
+        elite: (g, d), always selected.
         """
         selected, counts = _select(
             rows, costs, elite, CLEARING_RADIUS_RATIO * deviation, max_cost, max(1, int(MAX_SELECTED_FRACTION * count))
@@ -85,19 +89,24 @@ class NicheSampling:
         groups, parents = len(rows), selected.shape[1]
 
         def draw(group_numbers: Ints) -> Floats:
+            """Return one sample near a random selected sample for each group number, (n, d)."""
             parent = np.floor(self._rng.random(group_numbers.size) * counts[group_numbers]).astype(np.int64)
             samples = selected[group_numbers, parent] + deviation * self._rng.standard_normal(
                 (group_numbers.size, rows.shape[2])
             )
             return np.clip(samples, self._lower[group_numbers], self._upper[group_numbers])
 
-        out = self._draw((groups, count, rows.shape[2]), draw, MAX_REDRAWS)
+        out = self._draw_feasible((groups, count, rows.shape[2]), draw, MAX_REDRAWS)
         is_selected = np.arange(parents) < counts[:, None]
         out[:, :parents][is_selected] = selected[is_selected]
         return out
 
-    def _draw(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
-        """Draw samples of this shape with a function of the group numbers, and redraw infeasible samples."""
+    def _draw_feasible(self, size: tuple[int, int, int], draw: Callable[[Ints], Floats], max_redraws: int) -> Floats:
+        """Draw samples of a shape, and redraw infeasible samples.
+
+        draw: function that returns samples (n, d) for group numbers (n,).
+        max_redraws: number of attempts, after which infeasible samples remain.
+        """
         groups = np.repeat(np.arange(size[0]), size[1])
         samples = draw(groups)
         infeasible_rows = np.flatnonzero(~self._allowed(samples, groups))
@@ -138,7 +147,10 @@ def _select(
 
 @inner
 def _is_distinct(row: Floats, other_rows: Floats, clearing_radius: Floats) -> bool:
-    """Return True if a sample (d,) differs from every other sample by the clearing radius or more in some variable."""
+    """Return True if a sample (d,) is at least the clearing radius away from each other sample.
+
+    Two samples are that far apart if they differ by the radius or more in at least one variable.
+    """
     for n in range(other_rows.shape[0]):
         is_near = True
         for d in range(row.size):

@@ -26,7 +26,7 @@ TREE_THRESHOLD = 4000
 
 @dataclass(frozen=True, slots=True)
 class Level:
-    """Priority level: columns of the scores, all minimised, and a goal for each (`NO_GOAL` without a goal)."""
+    """Priority level: columns of the scores, all minimised, with their goals (`NO_GOAL` for none)."""
 
     columns: tuple[int, ...]
     goals: tuple[float, ...]
@@ -54,14 +54,17 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
     # The lowest level is appended without goals, to compare rows that are equal on all levels.
     table = np.concatenate([np.maximum(scores[:, columns], goals), scores[:, lowest_level_columns]], axis=1)
     widths = np.array([*(len(level.columns) for level in levels), len(lowest_level_columns)])
-    return np.asarray(_rank_rows(np.ascontiguousarray(table.T), widths))
+    return np.asarray(_rank_candidates(np.ascontiguousarray(table.T), widths))
 
 
 @compiled
-def _rank_rows(table: Floats, widths: Ints) -> Ints:
-    """Return the ranks (n,) of n candidates whose scores are the columns of a table (c, n).
+def _rank_candidates(table: Floats, widths: Ints) -> Ints:
+    """Rank candidates by the number of candidates that are preferred to each, level by level, (n,).
 
-    widths: number of rows of the table that belong to each level.
+    table: (c, n) one column of scores per candidate.
+    widths: number of rows of the table in each priority level, highest priority first.
+
+    A lower level only decides between candidates that are equal on all higher levels.
     """
     count = table.shape[1]
     row_ranks = np.zeros(count, dtype=np.int64)
@@ -108,7 +111,10 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:
 
 @inner
 def _merge_sort(table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int) -> None:
-    """Sort order[begin:end] lexicographically by `width` columns of the table: a stable merge sort."""
+    """Sort order[begin:end] lexicographically by `width` rows of the table, from row `column` on.
+
+    The merge sort is stable.
+    """
     for k in range(begin + 1, end):
         # Insertion sort of short runs.
         run_begin = begin + (k - begin) // INSERTION_RUN * INSERTION_RUN
@@ -140,7 +146,7 @@ def _merge_sort(table: Floats, column: int, width: int, order: Ints, scratch: In
 
 @inner
 def _precedes(table: Floats, column: int, width: int, a: int, b: int) -> bool:
-    """Return True if row a precedes row b, column by column."""
+    """Return True if candidate a precedes candidate b in lexicographic order."""
     for c in range(column, column + width):
         if table[c, a] != table[c, b]:
             return bool(table[c, a] < table[c, b])
@@ -151,9 +157,9 @@ def _precedes(table: Floats, column: int, width: int, a: int, b: int) -> bool:
 def _add_dominator_counts(
     rows: Floats, width: int, begin: int, end: int, order: Ints, scratch: Ints, row_ranks: Ints
 ) -> None:
-    """Add the number of dominators of each row of a group to `row_ranks`.
+    """Add the number of dominators of each candidate of a tied group to `row_ranks`.
 
-    rows: (c, n), sorted, so that only earlier rows can dominate.
+    rows: (c, n), sorted, so that only earlier candidates can dominate.
     """
     dominators = 0
     for k in range(begin + 1, end):
@@ -186,14 +192,14 @@ def _count_at_most(values: Floats, limit: float) -> int:
 
 @inner
 def _clear_marks_above(values: Floats, limit: float, marks: Ints) -> None:
-    """Clear the marks of values above the limit."""
+    """Set the marks of values above the limit to 0."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
 
 
 @inner
 def _count_marks(marks: Ints) -> int:
-    """Count the marks that are 1; the others are 0."""
+    """Return the number of marks that are 1; the others are 0."""
     count = 0
     for k in range(marks.size):
         count += marks[k]
@@ -202,7 +208,7 @@ def _count_marks(marks: Ints) -> int:
 
 @inner
 def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
-    """Return the dense ranks of a group's rows by the second column, from 1, and the number of different ranks.
+    """Return the dense ranks of a group's candidates by the second row, from 1, and the number of ranks.
 
     Equal values have the same rank.
     """
@@ -221,9 +227,9 @@ def _dense_ranks(rows: Floats, begin: int, end: int) -> tuple[Ints, int]:
 
 @inner
 def _add_dominator_counts_by_tree(rows: Floats, begin: int, end: int, order: Ints, row_ranks: Ints) -> None:
-    """Add the number of dominators of each row of a group to `row_ranks`, in O(n log n), for many rows.
+    """Add the number of dominators of each candidate of a group to `row_ranks`, in O(n log n).
 
-    Uses a Fenwick tree over the second of two columns.
+    Uses a Fenwick tree over the second of two rows of scores; it is faster for many candidates.
     """
     dense_ranks, rank_count = _dense_ranks(rows, begin, end)
     tree = np.zeros(rank_count + 1, dtype=np.int64)

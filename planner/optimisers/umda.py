@@ -54,7 +54,7 @@ class Umda(BoxSearch):
         self._floor = floor
 
     def tell(self, scores: Floats) -> None:
-        """Take the scores (n, c) of the last samples of `ask`, select the better half, and draw the next samples."""
+        """Select the better half of all samples by the scores (n, c) of the last `ask`; draw new samples."""
         samples = np.concatenate([self.samples, self._pending_samples])
         all_scores = np.concatenate([self.scores, scores]) if len(self.scores) else scores
         # Ties are broken by a seeded draw, not by age.
@@ -63,7 +63,7 @@ class Umda(BoxSearch):
         self._pending_samples = self._sample(len(samples) - self._half)
 
     def _sample(self, count: int) -> Floats:
-        """Draw samples of independent Gaussians (maximum likelihood, 1/N), redrawn and finally clipped to the box."""
+        """Draw samples of independent Gaussians (maximum likelihood, 1/N), redrawn and clipped to the box."""
         selected = self.samples if self._basis is None else _project(self.samples, self._basis)
         mean, deviation = selected.mean(axis=0), selected.std(axis=0)
         if self._floor is not None:
@@ -76,7 +76,10 @@ class Umda(BoxSearch):
         )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
-        """Draw samples with `draw`, redraw those outside the box, and finally clip them."""
+        """Draw samples, redraw those outside the box, and finally clip them.
+
+        draw: function that returns a number of samples.
+        """
         samples = draw(count)
         outside_rows = np.flatnonzero(((samples < self.lower) | (samples > self.upper)).any(axis=1))
         for _ in range(MAX_REDRAWS):
@@ -101,5 +104,5 @@ class Umda(BoxSearch):
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    """Multiply rows (n, d) by a basis (d, k), copied where the kernel needs contiguous arrays."""
+    """Multiply rows (n, d) by a basis (d, k), after copying arrays that are not contiguous."""
     return multiply_by_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))

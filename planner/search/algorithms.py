@@ -26,7 +26,7 @@ class Algorithm:
     graded: scores violations by amount along the whole path, and ranks kill exposure before length.
     smooth: draws first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
     seeded: starts from grid routes, improved by a pattern search.
-    tightened: finally moves all waypoints of the best path at once.
+    final_shortening: finally shortens the best path; among zones, or if that fails, moves all its waypoints at once.
     optimiser: name of an optimiser in `planner.optimisers`; "waypoints" is
     `planner.search.generations.waypoint_generations`.
     """
@@ -37,7 +37,7 @@ class Algorithm:
     graded: bool = False
     smooth: bool = False
     seeded: bool = False
-    tightened: bool = False
+    final_shortening: bool = False
     optimiser: Optimiser = "umda"
 
 
@@ -49,14 +49,14 @@ ALGORITHMS: dict[str, Algorithm] = {
             "the default: grid routes on all sides of obstacles, shortened; evolutionary search only if none is safe",
             graded=True,
             seeded=True,
-            tightened=True,
+            final_shortening=True,
             optimiser="waypoints",
         ),
         Algorithm(
             "fda",
             "evolutionary search of waypoints, each ranked by the best path through it; needs no seeds and no grids",
             graded=True,
-            tightened=True,
+            final_shortening=True,
             optimiser="waypoints",
         ),
         Algorithm(
@@ -65,7 +65,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
-            tightened=True,
+            final_shortening=True,
         ),
         Algorithm(
             "umda-smooth",
@@ -79,7 +79,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
-            tightened=True,
+            final_shortening=True,
             optimiser="emna",
         ),
         Algorithm(
@@ -91,7 +91,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
-            tightened=True,
+            final_shortening=True,
             optimiser="chain",
         ),
         Algorithm(
@@ -107,7 +107,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
-            tightened=True,
+            final_shortening=True,
             optimiser="differential",
         ),
         Algorithm(
@@ -148,9 +148,11 @@ def algorithm_lines() -> str:
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
-    """Return the algorithm with this name, or the default for None. Raises ScenarioError for an unknown name.
+    """Return the algorithm with this name, or the default for None.
 
     source: origin of the name, with which the error message begins.
+
+    Raises ScenarioError for an unknown name.
 
     >>> find_algorithm(None, "example.toml").name, find_algorithm("umda-polar", "example.toml").encoding
     ('fda-seeded', 'polar')
@@ -163,5 +165,8 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
 
 
 def limits_for(algorithm: Algorithm, limits: "Limits") -> "Limits":
-    """Return the limits for an algorithm; without tracking error if it counts violations as the paper does."""
+    """Return the limits that an algorithm plans with.
+
+    An algorithm that counts violations, as the paper does, has no tracking error.
+    """
     return limits if algorithm.graded else replace(limits, tracking=None)

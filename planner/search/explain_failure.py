@@ -42,15 +42,15 @@ class SeparatingZones(NamedTuple):
     """Zones that separate start and destination.
 
     zones: names of the zones adjacent to both the region of the start and the region of the destination.
-    pitch: side of the cells, m.
+    cell_side: side of the cells of the examined grid, m.
     """
 
     zones: tuple[str, ...]
-    pitch: float
+    cell_side: float
 
 
 def separating_zones(scenario: Scenario) -> SeparatingZones | None:
-    """Return the zones that separate start and destination, or None if no zones do, or if the ground does.
+    """Return the zones that separate start and destination; None if no zones do, or if the ground does.
 
     A gap narrower than a cell is treated as closed. Missiles and the aircraft's climb are ignored.
 
@@ -61,8 +61,8 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     terrain = scenario.terrain
     if terrain is None or not scenario.zones:
         return None
-    pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
-    east, north = (np.arange(lower + 0.5 * pitch, upper, pitch) for lower, upper in scenario.bounds)
+    cell_side = float(np.ptp(scenario.bounds, axis=1).max()) / CELL_COUNT
+    east, north = (np.arange(lower + 0.5 * cell_side, upper, cell_side) for lower, upper in scenario.bounds)
     ground_altitudes = terrain.height(east[None, :], north[:, None])
     min_heights = np.maximum(ground_altitudes + scenario.limits.min_clearance_m, scenario.floor)
     max_heights = np.full(ground_altitudes.shape, scenario.ceiling)
@@ -70,7 +70,9 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
         max_heights = np.minimum(max_heights, ground_altitudes + scenario.limits.max_height_m)
     cells = np.full((HEIGHT_COUNT, *ground_altitudes.shape), _OPEN_CELL, dtype=np.int64)
     cells[:, ~(min_heights <= max_heights)] = _GROUND_CELL
-    ends = [_end_cell(scenario, end, pitch, min_heights, max_heights) for end in (scenario.start, scenario.destination)]
+    ends = [
+        _end_cell(scenario, end, cell_side, min_heights, max_heights) for end in (scenario.start, scenario.destination)
+    ]
     if not _are_connected(cells, ends):
         return None
     _close_cells(zone_records(scenario.zones), east, north, ground_altitudes, min_heights, max_heights, cells)
@@ -81,14 +83,14 @@ def separating_zones(scenario: Scenario) -> SeparatingZones | None:
     adjacent_cells = [_grow_cells(_reachable_cells(cells == _OPEN_CELL, end)) for end in ends]
     adjacent_zones = [set(cells[edge_cells].tolist()) for edge_cells in adjacent_cells]
     zone_indices = (adjacent_zones[0] & adjacent_zones[1]) or (adjacent_zones[0] | adjacent_zones[1])
-    return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(zone_indices) if z >= 0), pitch)
+    return SeparatingZones(tuple(scenario.zones[z].name for z in sorted(zone_indices) if z >= 0), cell_side)
 
 
 def _end_cell(
-    scenario: Scenario, end: Floats, pitch: float, min_heights: Floats, max_heights: Floats
+    scenario: Scenario, end: Floats, cell_side: float, min_heights: Floats, max_heights: Floats
 ) -> tuple[int, int, int]:
     """Return the height, row and column indices of a fixed end's cell."""
-    cell = ((end[:2] - scenario.bounds[:, 0]) / pitch).astype(np.int64)
+    cell = ((end[:2] - scenario.bounds[:, 0]) / cell_side).astype(np.int64)
     column, row = (
         int(np.clip(index, 0, size - 1))
         for index, size in zip(cell, (min_heights.shape[1], min_heights.shape[0]), strict=True)
@@ -105,9 +107,9 @@ def _are_connected(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
 
 
 def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
-    """Return a mask of the open cells that a cell is connected to through sides of open cells.
+    """Return a mask (as `is_open`): True for open cells that are connected to the start cell.
 
-    The mask is empty if the cell itself is not open.
+    Cells are connected through sides. No cell is reachable if the start cell is not open.
     """
     is_reachable = np.zeros_like(is_open)
     is_reachable[start] = is_open[start]
@@ -118,7 +120,7 @@ def _reachable_cells(is_open: Flags, start: tuple[int, int, int]) -> Flags:
 
 
 def _grow_cells(cells: Flags) -> Flags:
-    """Return a mask of the given cells and all cells that share a side with one of them."""
+    """Return a mask: True for the given cells and all cells that share a side with one of them."""
     grown = cells.copy()
     for axis in range(cells.ndim):
         target, source = np.moveaxis(grown, axis, 0), np.moveaxis(cells, axis, 0)
@@ -160,7 +162,9 @@ def _close_cells(
 
 
 def closed_bands(problem: Problem) -> list[str]:
-    """Return a line for each band of altitudes, of the limits or of an inclusion, that the required margins close.
+    """Return a line for each altitude band that the required margins close.
+
+    A band is that between clearance and maximum height above ground, or that of an inclusion.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -197,7 +201,7 @@ def closed_bands(problem: Problem) -> list[str]:
 
 
 def max_altitude(problem: Problem) -> tuple[float, str]:
-    """Return the maximum altitude of a plan, m AMSL, and the limit that sets it, the ceiling or an inclusion's ceiling.
+    """Return the maximum altitude of a plan, m AMSL, and the name of the limit that sets it.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -226,14 +230,14 @@ MAX_NAMES = 4
 # Maximum number of missiles that are named.
 MAX_NAMED_MISSILES = 12
 # Spacing of points on a path that is tested against zones, m.
-ZONE_PITCH_M = 20.0
+ZONE_SAMPLE_SPACING_M = 20.0
 
 
 def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
-    """Return lines that explain why a plan is infeasible, and which kinds of routes its search could not have found.
+    """Return lines that explain why a plan is infeasible, and which routes its search could not find.
 
     limits: limits of the path; if given, the margins that a plan requires are checked, too, and the result is empty if
-    the path keeps all of them.
+        the path keeps all of them.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
@@ -260,7 +264,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
     barrier = separating_zones(scenario)
     if barrier is not None:
         names = ", ".join(barrier.zones[:MAX_NAMES]) + (" and more" if len(barrier.zones) > MAX_NAMES else "")
-        lines.append(f"zones block every route (gaps narrower than {barrier.pitch:.0f} m count as closed): {names}")
+        lines.append(f"zones block every route (gaps narrower than {barrier.cell_side:.0f} m count as closed): {names}")
     has_no_explanation, violated_names = not lines, violated_zones(scenario, plan.waypoints)
     if violated_names:
         lines.append(f"the best path violates: {', '.join(violated_names[:MAX_NAMES])}")
@@ -281,7 +285,7 @@ def explain_failure(plan: Plan, limits: Limits | None = None) -> list[str]:
 
 
 def _describe_walls(scenario: Scenario) -> list[str]:
-    """Describe lines across the whole map where the ground reaches the ceiling, or missiles cover every height."""
+    """Return a line if the ground, or ground and missiles, block the whole width of the map."""
     terrain = scenario.terrain
     if terrain is None:
         return []
@@ -305,7 +309,10 @@ def _describe_walls(scenario: Scenario) -> list[str]:
 
 
 def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
-    """Yield lines across the map between start and destination: the distance from the start, m, and points (n, 2)."""
+    """Yield lines across the map between start and destination: distance from the start, points (n, 2).
+
+    The distance is in m.
+    """
     frame = rotated_frame(scenario.start, scenario.destination)
     half_width = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
     across = np.linspace(-half_width, half_width, POINTS_ACROSS)
@@ -318,7 +325,7 @@ def _map_crossings(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
 
 
 def _describe_margin_walls(problem: Problem) -> list[str]:
-    """Describe lines across the whole map where ground, clearance and required margins leave no height."""
+    """Return a line if ground, clearance and margins leave no height across the whole map."""
     scenario, data = problem.scenario, problem.certified
     if scenario.terrain is None:
         return []
@@ -340,7 +347,10 @@ def _describe_margin_walls(problem: Problem) -> list[str]:
 
 
 def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) -> bool:
-    """Return True if any height above any of the points (n, 2) is outside every kill sphere."""
+    """Return True if some altitude above some of the points (n, 2) is outside every kill sphere.
+
+    min_altitudes: lowest allowed altitude at each point, m, (n,).
+    """
     threats = scenario.threats
     has_missile = threats.kill_radius > 0.0
     positions, radii = threats.position[has_missile], threats.kill_radius[has_missile]
@@ -356,7 +366,7 @@ def _has_gap(scenario: Scenario, points: np.ndarray, min_altitudes: np.ndarray) 
 
 
 def _describe_proven_closure(problem: Problem) -> list[str]:
-    """Name the missiles or the altitude limit that block every path; return no line if no blockage is proven."""
+    """Return a line on missiles or the altitude limit if they provably block every path, otherwise []."""
     data, ceiling = problem.certified, "the ceiling"
     missiles, max_level_altitude = blocking_missiles(data), highest_level_flight(data)
     if missiles is None:
@@ -381,7 +391,9 @@ def _describe_proven_closure(problem: Problem) -> list[str]:
 
 
 def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
-    """Return the names of the exclusion zones that a path (w, 3) enters, and of the inclusion zones that it leaves.
+    """Return the names of the zones that a path (w, 3) violates.
+
+    These are exclusions that it enters and inclusions that it leaves.
 
     >>> from world.scenario import load_scenario
     >>> violated_zones(load_scenario("tight"), np.zeros((2, 3)))
@@ -390,7 +402,7 @@ def violated_zones(scenario: Scenario, path: np.ndarray) -> list[str]:
     if not scenario.zones:
         return []
     records = zone_records(scenario.zones)
-    counts = [max(2, math.ceil(math.dist(a, b) / ZONE_PITCH_M)) for a, b in itertools.pairwise(path)]
+    counts = [max(2, math.ceil(math.dist(a, b) / ZONE_SAMPLE_SPACING_M)) for a, b in itertools.pairwise(path)]
     legs = zip(path[:-1], path[1:], counts, strict=True)
     points = np.concatenate([np.linspace(a, b, count) for a, b, count in legs])
     ground = np.full(len(points), math.nan)

@@ -14,7 +14,7 @@ from world.arrays import Floats
 
 
 def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
-    """Remove the waypoints that a plan's safety does not need; the plan becomes no longer.
+    """Remove the waypoints that a plan's safety does not need; this never makes the path longer.
 
     The waypoints with the smallest detours are removed first. Distances to missiles stay at the distance that plans
     keep, or at the plan's own distance if that is smaller.
@@ -48,10 +48,11 @@ def drop_waypoints(plan: Plan, limits: Limits) -> Plan:
 def _drop_one_waypoint(
     problem: Problem, waypoints: Floats, min_kill_distance: float
 ) -> tuple[Floats, Certificate] | None:
-    """Remove one waypoint of a path (w, 3), and return the path with its certificate, or None if this is impossible.
+    """Remove one waypoint of a path (w, 3); return the path and its certificate, or None if impossible.
 
-    The path must be certified, and no nearer to a missile than `min_kill_distance` (m). The waypoint with the smallest
-    detour is tried first.
+    min_kill_distance: required distance from missiles, m.
+
+    The path must be certified. The waypoint with the smallest detour is tried first.
     """
     legs, chords = np.diff(waypoints, axis=0), waypoints[2:] - waypoints[:-2]
     lengths = np.linalg.norm(legs, axis=1)

@@ -75,7 +75,7 @@ def path_generations(search: Search, population: int, generations: int, starts: 
 
 
 def _preference_levels(search: Search) -> tuple[Level, ...]:
-    """Return the preference levels for ranking, with the goals of the scenario, if any."""
+    """Return the preference levels by which paths are ranked, with the goals of the scenario, if any."""
     goals = search.problem.scenario.planner.goals
     length_goal = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill_goal = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
@@ -85,7 +85,7 @@ def _preference_levels(search: Search) -> tuple[Level, ...]:
 
 
 def _best_row(scores: Floats) -> Floats:
-    """Return the best of the scores (n, 8), in the archive's order."""
+    """Return the best row (8,) of scores (n, 8), in the archive's order."""
     return np.asarray(scores[best_first(scores)[0]])
 
 
@@ -105,7 +105,7 @@ def _make_optimiser(
 
 
 def _is_stagnant(best_scores: list[Floats]) -> bool:
-    """Return True if the last generations gained almost nothing."""
+    """Return True if the last `STALLED_GENERATIONS` generations gained almost nothing."""
     if len(best_scores) <= STALLED_GENERATIONS:
         return False
     earlier, latest = best_scores[-1 - STALLED_GENERATIONS], best_scores[-1]
@@ -117,7 +117,7 @@ def _is_stagnant(best_scores: list[Floats]) -> bool:
 
 # Maximum number of generations; the last ones move waypoints by decimetres.
 MAX_GENERATIONS = 10
-# Maximum number of generations with seeds, whose best path is tightened anyway.
+# Maximum number of generations with seeds, whose best path is finally shortened anyway.
 SEEDED_GENERATIONS = 6
 # Population with seeds, as a fraction of the usual population.
 SEEDED_POPULATION_FRACTION = 0.4
@@ -164,8 +164,8 @@ REPAIR_EVALUATIONS = 100
 def waypoint_generations(search: Search, population: int, generations: int) -> None:
     """Run the factorised distribution algorithm, and insert the paths that it finds into the archive.
 
-    population: candidates per interval in the first generation. generations: limited to `MAX_GENERATIONS`, or
-    `SEEDED_GENERATIONS` with seeds.
+    population: candidates per interval in the first generation.
+    generations: limited to `MAX_GENERATIONS`, or `SEEDED_GENERATIONS` with seeds.
     """
     encoding, space = search.encoding, search.problem.space
     inner_count = encoding.waypoints - 2
@@ -251,7 +251,9 @@ def _as_vectors(rows: Floats) -> Floats:
 
 
 def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointChains:
-    """Find the best paths through the waypoints of paths (k, w, 3), with a bound relative to the best known path.
+    """Find the best paths through the waypoints of paths (k, w, 3), up to a cost bound.
+
+    slack: fraction by which the bound exceeds the cost of the best known path.
 
     Without a bound almost every leg is evaluated; if few legs are left, only the first candidates are joined.
     """
@@ -277,7 +279,7 @@ def _join_candidates(search: Search, paths: Floats, slack: float) -> WaypointCha
 
 
 def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
-    """Evaluate whole paths through some of the best candidates, and repair one path as long as no path is feasible."""
+    """Evaluate whole paths through some of the best candidates, and repair one if none is feasible."""
     candidate_chains = set()
     for i in range(1, len(chains.cost) - 1, INTERVAL_STEP):
         for k in np.argsort(chains.cost[i], kind="stable")[:BEST_PER_INTERVAL]:

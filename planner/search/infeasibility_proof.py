@@ -31,14 +31,17 @@ LEVEL_FLIGHT_ROUNDING_M = 1e-6
 
 
 def column_side(data: ProblemArrays) -> float:
-    """Return the side of the columns, m; closed areas narrower than about this may be treated as open."""
+    """Return the side of the columns (m); a closed area narrower than about this may be treated as open."""
     return max(MIN_SIDE_M, max(data.east - data.west, data.north - data.south) / COLUMN_COUNT)
 
 
 def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float = 0.0) -> bool:
-    """Return True if it is proven that no path stays above the clearance, below the ceiling and outside all missiles.
+    """Return True if it is proven that ground, ceiling and missiles leave no path.
 
-    missiles: (m,) True for the `data.threats` to consider; None for all. margin: distance from their spheres, m.
+    missiles: (m,) True for the `data.threats` to consider; None for all.
+    margin: distance from their spheres, m.
+
+    A path stays above the clearance, below the ceiling and outside the missiles' spheres.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -55,7 +58,9 @@ def is_closed(data: ProblemArrays, missiles: Flags | None = None, margin: float 
     if max(data.start[2], data.destination[2]) > max_altitude:
         return True
     return bool(
-        _is_closed(data._replace(ceiling=min(data.ceiling, max_altitude)), is_considered, column_side(data), margin)
+        _is_proven_closed(
+            data._replace(ceiling=min(data.ceiling, max_altitude)), is_considered, column_side(data), margin
+        )
     )
 
 
@@ -90,9 +95,9 @@ def highest_level_flight(data: ProblemArrays) -> float:
 
 
 def blocking_missiles(data: ProblemArrays) -> list[int] | None:
-    """Return the indices of a minimal set of missiles that, together with ground and ceiling, block every path.
+    """Return the indices of a minimal set of missiles that block every path, with ground and ceiling.
 
-    The list is empty if ground and ceiling alone block every path.  Returns None if no blockage is proven.
+    The list is empty if ground and ceiling alone block every path. Returns None if no blockage is proven.
     """
     if not is_closed(data):
         return None
@@ -110,14 +115,14 @@ def blocking_missiles(data: ProblemArrays) -> list[int] | None:
 
 
 def _index_mask(indices: Ints, count: int) -> Flags:
-    """Return flags (count,), True at the given indices."""
+    """Return a mask (count,): True at the given indices."""
     flags = np.zeros(count, dtype=np.bool_)
     flags[indices] = True
     return flags
 
 
 @compiled
-def _is_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
+def _is_proven_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin: float) -> bool:
     """Implement `is_closed` for the missiles that are True in `missiles`.
 
     column_size: side of the square columns, m.
@@ -159,7 +164,7 @@ def _is_closed(data: ProblemArrays, missiles: Flags, column_size: float, margin:
 
 @inner
 def _lowest_ground(data: ProblemArrays, i: int, j: int, column_size: float) -> float:
-    """Return the height of the lowest pixel under a column and next to it, m; -inf if any of them has no data."""
+    """Return the height of the lowest pixel under a column and next to it, m; -inf if one has no data."""
     first_column, first_row, last_column, last_row = math.inf, math.inf, -math.inf, -math.inf
     for corner in range(4):
         east, north = data.west + (i + corner % 2) * column_size, data.south + (j + corner // 2) * column_size
@@ -192,7 +197,7 @@ def _close_sphere(
 ) -> None:
     """Close the altitudes of columns that are completely inside a sphere.
 
-    east, north: distances from the map's corner, m.
+    east, north: distances of the sphere's centre from the map's south-western corner, m.
     """
     columns, rows = range_counts.shape
     first_column, last_column = (
@@ -224,9 +229,9 @@ def _close_sphere(
 def _close_range(
     range_bottoms: Floats, range_tops: Floats, range_counts: Ints, j: int, bottom: float, top: float
 ) -> None:
-    """Add an altitude range to the closed ranges of column j of a row.
+    """Add an altitude range to the closed ranges of column j of a row of columns.
 
-    A range beyond the maximum number stays open.
+    A range beyond the maximum number of ranges stays open.
     """
     kept_count = 0
     for k in range(range_counts[j]):
@@ -250,7 +255,7 @@ def _close_range(
 def _reaches_destination(
     data: ProblemArrays, column_size: float, range_bottoms: Floats, range_tops: Floats, range_counts: Ints
 ) -> bool:
-    """Return True if the destination can be reached from the start through open altitudes of adjacent columns.
+    """Return True if open altitudes of adjacent columns connect start and destination.
 
     Each open range of a column is above the closed range with the same index.
     """

@@ -49,7 +49,9 @@ class _Task(NamedTuple):
 
 
 def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
-    """Run the kernels of one part of planning, in `PARTS` or `FRONT`, once, so that they are compiled.
+    """Run the kernels of one part of planning once, so that they are compiled.
+
+    part: a name in `PARTS`, or `FRONT`.
 
     Use a small scenario, because the result is discarded.
 
@@ -66,7 +68,7 @@ def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
 
 
 def _call_scores(task: _Task) -> None:
-    """Score two paths, rank them, and run a pattern search."""
+    """Call the kernels that score and rank paths, and those of a pattern search."""
     scores = score_table(*graded_scores(task.problem.search, np.stack([task.path, task.path])))
     best_first(scores)
     vector = rotated_vectors(task.problem.space, task.encoding, task.path[None])[0]
@@ -74,17 +76,17 @@ def _call_scores(task: _Task) -> None:
 
 
 def _call_certify(task: _Task) -> None:
-    """Call the kernel that certifies a path; the certificate is not used."""
+    """Call the kernels that certify a path."""
     certify(task.problem, task.path)
 
 
 def _call_shortening(task: _Task) -> None:
-    """Shorten a path."""
+    """Call the kernels that shorten a path."""
     shorten_path(task.problem.search, task.path)
 
 
 def _call_routes(task: _Task) -> None:
-    """Find the best route over a grid, and fit waypoints to it."""
+    """Call the kernels that find the best route over a grid, and fit waypoints to it."""
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     best_route = grid_route(data, frame, make_grid(data, frame, span, STAGES))
     for route in [best_route] if isinstance(best_route, GridRoute) else []:
@@ -92,25 +94,25 @@ def _call_routes(task: _Task) -> None:
 
 
 def _call_side_routes(task: _Task) -> None:
-    """Find routes on other sides of the obstacles."""
+    """Call the kernels that find routes on other sides of the obstacles."""
     data, (frame, span) = task.problem.search, _frame_and_span(task)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
     side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
 
 
 def _frame_and_span(task: _Task) -> tuple[RotatedFrame, tuple[float, float]]:
-    """Return the frame of the direct line, and the smallest and largest offset of waypoints across the line, m."""
+    """Return the frame of the direct line, and the smallest and largest offset of waypoints across it, m."""
     space, lower, upper = task.problem.space, task.encoding.lower, task.encoding.upper
     return rotated_frame(space.start, space.destination), (float(lower[1::3].min()), float(upper[1::3].max()))
 
 
 def _call_paper_scores(task: _Task) -> None:
-    """Score a path by the objectives of the paper."""
+    """Call the kernels that score a path as the paper does."""
     paper_scores(task.problem.certified, task.path[None])
 
 
 def _call_front(task: _Task) -> None:
-    """Compute the values of a path for a front, and select rows that cover the hypervolume."""
+    """Call the kernels that value paths for a front, and those that select rows by hypervolume."""
     data = task.problem.search
     front_values(data, make_energy_cost(task.problem.limits.envelope, data.aircraft), task.path[None])
     covering_order(np.eye(SAMPLE_COUNT), np.full(SAMPLE_COUNT, 2.0), SAMPLE_COUNT)

@@ -115,15 +115,16 @@ class FinalModel(NamedTuple):
     slope: Callable[[float, float, float, float], float]
 
 
-def with_ground_ways(
+def add_departure_and_approach(
     plan: Plan, limits: Limits, final_model: FinalModel, kept_departure: ClimbOut | None = None
 ) -> Plan:
     """Add the departure and approach that a plan's scenario requires, or the reason why they are missing.
 
-    They are required by the tables `[launch]` and `[landing]`; without these tables the plan is returned unchanged.
     limits: limits of the plan.
     final_model: airspeed and slope of the autopilot on a final.
     kept_departure: departure of a plan whose first legs have already been flown.
+
+    They are required by the tables `[launch]` and `[landing]`; without these tables the plan is returned unchanged.
     """
     scenario = plan.scenario
     if scenario.home is None or scenario.terrain is None or (scenario.launch is None and scenario.landing is None):
@@ -167,6 +168,7 @@ class _Site:
 
     @property
     def scenario(self) -> Scenario:
+        """Scenario of the plan."""
         return self.plan.scenario
 
     def slopes(self, course: float, amsl: float) -> tuple[float, float]:
@@ -186,19 +188,21 @@ class _Site:
         return slopes[0], slopes[1]
 
     def min_path_length(self, height_change: float, is_descent: bool) -> float:
-        """Return the length (m) of the shortest path that climbs by a height (m), or descends if `is_descent`.
+        """Return the length (m) of the shortest path that climbs or descends by a height (m).
 
-        The length is inf if the aircraft can neither climb nor descend on any course.
+        is_descent: True for a descent.
+
+        The length is inf if the aircraft cannot climb (or descend) on any course.
         """
         altitude = float(max(self.scenario.start[2], self.scenario.destination[2]))
         max_slope = max(self.slopes(course, altitude)[is_descent] for course in np.arange(8) * (math.pi / 4.0))
         return max(0.0, abs(height_change)) / max_slope if max_slope > 0.0 else math.inf
 
     def certify_path(self, path: Floats, end_points: tuple[Floats, Floats]) -> Certificate:
-        """Return the certificate of a path, (n, 3) m.
+        """Return the certificate of a path, (n, 3) m, with a lower required height near two points.
 
-        end_points: two points, (3,) m; near a point that is itself closer to the ground than required, the required
-            height is lower.
+        end_points: the two points, (3,) m; the height is reduced near a point that is itself closer to the ground than
+            required.
         """
         data = self.problem.certified
         start_buffer, end_buffer = (
@@ -220,7 +224,10 @@ class _Site:
         return float(point[2] - self.terrain.height(point[0], point[1]))
 
     def describe_obstacle(self, chain: Sequence[Sequence[float]]) -> str:
-        """Describe the missile or zone that a low chain enters; "" if it enters none."""
+        """Describe the missile or zone that a path close to the ground enters; "" if it enters none.
+
+        chain: positions of the path, (n, 3) m.
+        """
         certificate = certify(self.low_problem, np.array(chain, dtype=np.float64))
         if certificate.kill_distance <= 0.0:
             return f"{-certificate.kill_distance:.0f} m inside a missile's reach"
@@ -232,7 +239,7 @@ class _Site:
 
 
 def _make_site(plan: Plan, limits: Limits, home: Floats, terrain: Terrain) -> _Site:
-    """Make the data for departures and approaches: the problems of their certificates and the size of their turns."""
+    """Make the problems that certify departures and approaches, and measure the size of their turns."""
     scenario = plan.scenario
     algorithm = scenario.planner.algorithm if plan.algorithm == GIVEN_WAYPOINTS else plan.algorithm
     algorithm_limits = limits_for(find_algorithm(algorithm, scenario.name), limits)
@@ -267,7 +274,7 @@ def _interpolate_turn_lengths(length_table: Floats, speed_ratio: float) -> list[
 
 
 def _read_only(position: Floats) -> Floats:
-    """Return a read-only copy of a position, because a writable array would make the kernels compile again."""
+    """Return a read-only copy of a position: a writable array would make the kernels compile again."""
     copy = np.array(position, dtype=np.float64)
     copy.setflags(write=False)
     return copy
@@ -279,20 +286,23 @@ def _join_altitudes(points: Sequence[MapPoint], altitudes: Floats) -> Floats:
 
 
 def _ground_profile(terrain: Terrain, start: MapPoint, course: float, length: float) -> tuple[Floats, Floats]:
-    """Return distances from a start along a course, m, and the terrain altitude at each, m AMSL; NaN if unknown."""
+    """Return distances along a course, m, and the terrain altitude at each, m AMSL; NaN if unknown."""
     distances = np.arange(0.0, length + _GROUND_SPACING_M, _GROUND_SPACING_M)
     east, north = start[0] + distances * math.sin(course), start[1] + distances * math.cos(course)
     return distances, terrain.height(east, north)
 
 
 class _BestRejected:
-    """Best rejected path, and the number of rejected paths."""
+    """Best rejected path, and the number of rejected paths, for a message."""
 
     def __init__(self) -> None:
         self.count, self._margin, self.problem = 0, -math.inf, ""
 
     def add(self, certificate: Certificate | None) -> None:
-        """Count a rejected path; a path without a problem in its certificate is inside a missile's reach."""
+        """Count a rejected path, and keep its problem if it has the largest margin so far.
+
+        A path without a problem in its certificate is inside a missile's reach. None is not counted.
+        """
         if certificate is None:
             return
         self.count += 1
@@ -307,7 +317,7 @@ class _BestRejected:
 
 
 def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
-    """Return the shortest accepted departure, or None and the reason."""
+    """Return the shortest accepted departure, or None and the reason why there is none."""
     data, first_waypoint = site.problem.certified, site.plan.waypoints[0]
     home_altitude, start_altitude = float(site.home[2]), float(first_waypoint[2])
     takeoff_height = max(_MIN_TAKEOFF_HEIGHT_M, data.clearance + data.buffer + _CLEARANCE_EXCESS_M)
@@ -344,9 +354,11 @@ def _find_departure(site: _Site, launch: Launch) -> tuple[ClimbOut | None, str]:
 def _make_departure(
     site: _Site, course: float, points: list[MapPoint], takeoff_altitude: float
 ) -> ClimbOut | Certificate | None:
-    """Return a departure over these points; its certificate if it is rejected; None if the climb is too steep.
+    """Return the departure over these points, or its certificate if it is rejected.
 
     takeoff_altitude: altitude at the end of the take-off, m AMSL.
+
+    Return None if the climb would be too steep.
     """
     next_waypoints, first_waypoint = site.plan.waypoints[1:3], site.plan.waypoints[0]
     goal_altitude, top_altitude = float(first_waypoint[2]), max(takeoff_altitude, float(first_waypoint[2]))
@@ -435,7 +447,10 @@ def _find_launches(site: _Site, launch: Launch, takeoff_height: float, altitude:
 def _list_departures(
     site: _Site, launches: Sequence[_Launch], laps: int
 ) -> Iterator[tuple[float, float, list[MapPoint]]]:
-    """Yield the cost, launch course and points of departures from home to the plan's first waypoint."""
+    """Yield the cost (m), launch course and points of departures from home to the plan's first waypoint.
+
+    laps: number of laps flown to gain height.
+    """
     first_waypoint, start_course = site.plan.waypoints[0], site.scenario.start_course
     next_course = float(leg_courses(site.plan.waypoints[:2])[0]) if start_course is None else start_course
     end, home = (float(first_waypoint[0]), float(first_waypoint[1])), (float(site.home[0]), float(site.home[1]))
@@ -458,9 +473,10 @@ def _list_departures(
 
 
 def _list_lap_counts(site: _Site, height_change: float, is_descent: bool) -> list[int]:
-    """Return the numbers of laps to try, in increasing order, for a climb or (if `is_descent`) a descent.
+    """Return the numbers of laps to try, in increasing order, to gain or lose height.
 
     height_change: height to climb or descend, m.
+    is_descent: True for a descent.
     """
     max_laps = math.ceil(
         site.min_path_length(height_change, is_descent) / _SLOPE_FACTORS[-1] / (4.0 * LAP_SIDE_RADII * site.turn_radius)
@@ -473,7 +489,11 @@ def _list_lap_counts(site: _Site, height_change: float, is_descent: bool) -> lis
 
 
 class _Final(NamedTuple):
-    """Final: course (rad), length and height over the landing point (m), line-up, (2, 3) m, and landing point."""
+    """Final approach: course (rad), length and height over the landing point (m), and its positions.
+
+    final_waypoints: line-up, (2, 3) m.
+    point: landing point, (3,) m.
+    """
 
     course: float
     length: float
@@ -483,7 +503,7 @@ class _Final(NamedTuple):
 
 
 def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) -> tuple[Descent | None, str]:
-    """Return the first accepted approach, or None and the reason."""
+    """Return the first accepted approach, or None and the reason why there is none."""
     field_altitude = float(site.terrain.height(strip.east, strip.north))
     point = np.array([strip.east, strip.north, field_altitude])
     landing_course = strip.landing_course(site.scenario.wind, field_altitude)
@@ -517,7 +537,7 @@ def _find_approach(site: _Site, strip: LandingStrip, final_model: FinalModel) ->
 
 
 def _describe_strip_fault(terrain: Terrain, strip: LandingStrip, course: float) -> str:
-    """Describe the fault of a strip's ground; "" if it is suitable."""
+    """Describe why a strip's ground is unsuitable for landing; "" if it is suitable."""
     for direction, slope in zip(("along", "across"), strip_slopes(terrain, strip, course), strict=True):
         if math.isnan(slope):
             return "the terrain of the strip is unknown towards its ends"
@@ -568,9 +588,10 @@ def _find_finals(
 
 
 def _line_up_points(site: _Site, point: Floats, course: float, length: float, height: float) -> Floats:
-    """Return the start of the line-up and the start of the glide (2, 3), both at `height` (m) above the landing point.
+    """Return the start of the line-up and the start of the glide, (2, 3) m.
 
     course, length: course (rad) and length (m) of the final.
+    height: height of both points above the landing point, m.
     """
     distances = np.array([length + max(_MIN_LINE_UP_M, _LINE_UP_RADII * site.turn_radius), length])
     east, north = point[0] - distances * math.sin(course), point[1] - distances * math.cos(course)
@@ -578,7 +599,7 @@ def _line_up_points(site: _Site, point: Floats, course: float, length: float, he
 
 
 def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
-    """Return a final's margin, m, negative if the final is blocked, and a description of its obstacle, or ""."""
+    """Return a final's margin (m), negative if it is blocked, and a description of its obstacle, or ""."""
     glide_start, point = final.final_waypoints[1], final.point
     distances, terrain_heights = _ground_profile(
         site.terrain, (float(glide_start[0]), float(glide_start[1])), final.course, final.length
@@ -608,7 +629,7 @@ def _check_final(site: _Site, final: _Final) -> tuple[float, str]:
 
 
 def _find_path_to_line_up(site: _Site, final: _Final) -> tuple[Floats | None, str]:
-    """Return corners (n, 3) of the shortest path from the plan's end to a line-up, or None and the reason."""
+    """Return corners (n, 3) of the shortest path from the plan's end to a line-up, or None and why not."""
     waypoints, final_altitude = site.plan.waypoints, float(final.final_waypoints[0, 2])
     last_waypoint, end_altitude = waypoints[-1], float(waypoints[-1, 2])
     destination_course = site.scenario.destination_course
@@ -720,9 +741,11 @@ def _min_go_around_height(site: _Site, final: _Final) -> float | None:
 
 
 def _min_height_to_line_up(site: _Site, turn_point: Floats, line_up: Floats) -> float:
-    """Return the minimum height above ground on the way from the end of a go-around to the line-up, m.
+    """Return the minimum height above ground between the end of a go-around's climb and the line-up, m.
 
-    turn_point: end of the go-around's climb, (3,) m.  Returns -inf if the ground is unknown.
+    turn_point: end of the go-around's climb, (3,) m.
+
+    Returns -inf if the ground is unknown.
     """
     length = float(leg_runs(np.stack([turn_point, line_up]))[0])
     fractions = np.linspace(0.0, 1.0, max(2, math.ceil(length / _GROUND_SPACING_M)))

@@ -109,7 +109,7 @@ class FrontPlan:
 class Front:
     """Plans, the shortest first; no plan is better than another plan in every objective.
 
-    Of any two plans at least one gains more than `noticed_amounts` over the other in some objective.
+    Of any two plans at least one gains more than `noticeable_gains` over the other in some objective.
 
     asked: requested maximum number of plans.
     fourth: fourth objective, after length, exposure and clearance: "time" or "energy".
@@ -150,12 +150,15 @@ class Front:
         return html_table(f"Front of {name}: {len(self.plans)} of {self.asked} plans, {self.ended}", rows, head)
 
     def objectives(self) -> Floats:
-        """Return length, exposure, negated clearance, and time or energy of the plans, (n, 4); smaller is better."""
+        """Return the four objectives of the plans, (n, 4); smaller is better.
+
+        They are length, exposure, negated clearance, and time or energy.
+        """
         return np.array([_objective_row(plan, self.fourth) for plan in self.plans]).reshape(-1, 4)
 
 
 def _objective_row(plan: FrontPlan, fourth: str) -> list[float]:
-    """Return the plan's length, exposure, negated clearance, and time or energy, as `fourth` says."""
+    """Return a plan's length, exposure, negated clearance, and time or energy, as `fourth` says."""
     return [plan.length, plan.exposure, -plan.clearance, plan.time if fourth == "time" else plan.energy]
 
 
@@ -231,11 +234,11 @@ class FrontTask(NamedTuple):
     travel: TravelCost
 
     def values(self, paths: Floats) -> Floats:
-        """Return the values (n, 5) of paths (n, w, 3)."""
+        """Return the values of paths (n, w, 3), (n, 5), in the order of `Value`."""
         return front_values(self.problem.search, self.energy, paths)
 
     def scores(self, paths: Floats) -> tuple[Floats, Floats]:
-        """Return objectives (n, 4), and violations (n, 5): four graded constraints and the exposure to missiles.
+        """Return objectives (n, 4) and violations (n, 5): graded constraints, then exposure to missiles.
 
         Objectives are infinite if a constraint is violated, because computing them takes most of the time.
         """
@@ -246,18 +249,18 @@ class FrontTask(NamedTuple):
         return objectives, all_violations
 
     def objectives(self, values: Floats) -> Floats:
-        """Convert values (n, 5) to the objectives length, exposure, negated clearance, and time or energy, (n, 4)."""
+        """Convert values (n, 5) to objectives (n, 4): length, exposure, negated clearance, and time or energy."""
         fourth = Value.TIME if self.fourth == "time" else Value.ENERGY
         out = values[:, [Value.LENGTH, Value.EXPOSURE, Value.CLEARANCE, fourth]]
         out[:, 2] *= -1.0
         return np.asarray(out)
 
-    def vectors(self, paths: Floats) -> Floats:
+    def to_vectors(self, paths: Floats) -> Floats:
         """Convert paths (n, w, 3) to vectors of their inner waypoints in the rotated frame, (n, 3 (w - 2))."""
         return np.asarray(self.frame.to_frame(paths[:, 1:-1]).reshape(len(paths), -1))
 
-    def paths(self, vectors: Floats) -> Floats:
-        """Convert vectors (n, 3 (w - 2)) of inner waypoints to paths (n, w, 3) with both ends; inverts `vectors`."""
+    def to_paths(self, vectors: Floats) -> Floats:
+        """Convert vectors (n, 3 (w - 2)) of inner waypoints to paths (n, w, 3); inverts `to_vectors`."""
         data, count = self.problem.search, len(vectors)
         inner_waypoints = self.frame.to_world(vectors.reshape(count, -1, 3))
         ends = [np.broadcast_to(end, (count, 1, 3)) for end in (data.start, data.destination)]
@@ -265,7 +268,7 @@ class FrontTask(NamedTuple):
 
 
 def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
-    """Make the problem of a scenario with several objectives, with the margins of the default planner's search."""
+    """Make the problem of a front, with the margins of the default planner's search."""
     algorithm = find_algorithm(None, scenario.name)
     problem = make_problem(scenario, limits_for(algorithm, limits))
     aircraft = problem.search.aircraft
@@ -278,7 +281,10 @@ def front_task(scenario: Scenario, limits: Limits) -> FrontTask:
 
 
 def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
-    """Return the problem with margins between the certificate's (fraction 0) and the search's (fraction 1)."""
+    """Return the problem with margins between those of the certificate and those of the search.
+
+    fraction: 0 for the certificate's margins, 1 for the search's.
+    """
     search, certified = problem.search, problem.certified
     field_names = ("buffer", "start_buffer", "destination_buffer", "kill_margin")
     certified_margins = {name: getattr(certified, name) for name in field_names}
@@ -288,7 +294,7 @@ def _with_margins(problem: Problem, fraction: float) -> ProblemArrays:
 
 
 def fit_margins(task: FrontTask, default: Floats) -> FrontTask:
-    """Reduce the task's margins to the margins of the default path (w, 3), so that other paths may be equally tight."""
+    """Reduce the task's margins to those of the default path (w, 3), so that other paths may be as tight."""
     for fraction in MARGIN_FRACTIONS:
         task = task._replace(scored=_with_margins(task.problem, fraction))
         if (task.scores(default[None])[1] <= 0.0).all():
@@ -308,7 +314,7 @@ def reference_point(task: FrontTask, default: FrontPlan) -> Floats:
 
 
 def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
-    """Return a plan with its values; the clearance is exact, not sampled."""
+    """Return a plan with its values; its clearance is exact, not sampled."""
     row = task.values(np.array(plan.waypoints)[None])[0]
     clearance = least_height(task.problem.certified, plan.waypoints)
     return FrontPlan(plan, row[Value.LENGTH], row[Value.EXPOSURE], clearance, row[Value.TIME], row[Value.ENERGY])
@@ -318,7 +324,10 @@ def _with_values(task: FrontTask, plan: Plan) -> FrontPlan:
 
 
 def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
-    """Yield paths (w, 3) for various preferences, from the default path (w, 3) and routes past the obstacles."""
+    """Yield paths (w, 3) with which the search begins, for various preferences.
+
+    They are the default path (w, 3), and the default path and routes on other sides of the obstacles, shortened.
+    """
     yield default
     count = len(default)
     routes = [default, *(resample(route, count) for route in _list_routes(task, default))]
@@ -331,7 +340,7 @@ def seed_paths(task: FrontTask, default: Floats) -> Iterator[Floats]:
 
 
 def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
-    """Return routes (k, 3) on other sides of the obstacles; none among zones, which routes ignore."""
+    """Return routes (k, 3) on other sides of the obstacles; [] among zones, which routes ignore."""
     data, frame = task.problem.search, task.frame
     if is_limited(data.airspace):
         return []
@@ -350,7 +359,7 @@ def _list_routes(task: FrontTask, default: Floats) -> list[Floats]:
 
 
 def _preferred_problems(task: FrontTask) -> Iterator[ProblemArrays]:
-    """Yield variants of the problem: with a larger clearance, with radars as obstacles, and with another cost."""
+    """Yield variants of the problem: a larger clearance, radars as obstacles, and another cost."""
     data, scenario = task.problem.search, task.problem.scenario
     end_legs = np.stack([[end, end] for end in (data.start, data.destination)])
     spare_height = max(0.0, float(task.values(end_legs)[:, Value.CLEARANCE].min()) - data.clearance)
@@ -377,20 +386,20 @@ def _run_generations(
     stop: StopCondition | None,
     generations: int,
 ) -> tuple[int, str]:
-    """Sample generations from the seeds; return the number of paths evaluated, and why the search ended."""
+    """Sample generations from the seeds; return the number of evaluated paths, and why the search ended."""
     paths, reason = [], ""
     for path in seed_paths(task, np.array(default)):
         paths.append(path)
         if stop is not None and (reason := stop()):
             break
     seeds = np.array(paths)
-    search.tell(task.vectors(seeds), *task.scores(seeds))
+    search.tell(task.to_vectors(seeds), *task.scores(seeds))
     evaluations = len(seeds)
     for generation in range(generations):
         if len(search.vectors) == 0 or (stop is not None and (reason := stop())):
             break
         vectors = search.ask()
-        search.tell(vectors, *task.scores(task.paths(vectors)))
+        search.tell(vectors, *task.scores(task.to_paths(vectors)))
         evaluations += len(vectors)
         if progress is not None:
             progress(generation + 1, generations, f"{len(search.vectors)} paths that no other dominates")
@@ -400,7 +409,12 @@ def _run_generations(
 def make_sampling(
     task: FrontTask, waypoints: int, reference: Floats, size: int, rng: np.random.Generator
 ) -> FrontSampling:
-    """Make the estimation of distribution for paths of `waypoints` waypoints, with an archive of `size` solutions."""
+    """Make the estimation of distribution for paths.
+
+    waypoints: number of waypoints of a path.
+    reference: (4,) reference point of the hypervolume.
+    size: number of solutions in the archive.
+    """
     data, frame, inner_count = task.problem.search, task.frame, waypoints - 2
     corners = np.array([[x, y, 0.0] for x in (data.west, data.east) for y in (data.south, data.north)])
     rotated = frame.to_frame(corners)
@@ -416,7 +430,7 @@ def make_sampling(
     return FrontSampling(
         np.tile(min_corner, inner_count),
         np.tile(max_corner, inner_count),
-        directions(inner_count, scales),
+        noise_directions(inner_count, scales),
         reference,
         3,
         size,
@@ -425,10 +439,12 @@ def make_sampling(
     )
 
 
-def directions(inner_count: int, scales: Floats) -> Floats:
-    """Return directions of noise, (k, 3 inner_count): smooth modes of the whole path, and bumps of a few waypoints.
+def noise_directions(inner_count: int, scales: Floats) -> Floats:
+    """Return the directions of the sampling noise, (k, 3 inner_count).
 
     scales: (3,) largest deviations along, across and up, m.
+
+    They are smooth modes of the whole path, and bumps of a few waypoints.
     """
     modes, deviations = bridge_modes(inner_count)
     waves = (modes * deviations / np.abs(modes[:, 0]).max()).T
@@ -444,7 +460,7 @@ def directions(inner_count: int, scales: Floats) -> Floats:
     return out.reshape(3 * len(shapes), 3 * inner_count)
 
 
-def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
+def noticeable_gains(default: FrontPlan, fourth: str) -> Floats:
     """Return the smallest noticeable gain of each objective over a default plan, (4,)."""
     length, exposure, _, fourth_value = _objective_row(default, fourth)
     exposure_gain = NOTICEABLE_EXPOSURE_FRACTION * max(MIN_EXPOSURE_S, exposure)
@@ -459,7 +475,9 @@ def noticed_amounts(default: FrontPlan, fourth: str) -> Floats:
 
 
 def distinct_rows(objectives: Floats, amounts: Floats) -> list[int]:
-    """Return the indices of objectives (n, m) that gain more than `amounts` (m,) over every row chosen before.
+    """Return the indices of objectives (n, m) that differ noticeably from every row chosen before.
+
+    amounts: (m,) noticeable gains.
 
     The additive epsilon-dominance of Laumanns, Thiele, Deb and Zitzler (Evolutionary Computation 10, 2002): a row is
     omitted if an earlier row is worse by no more than the amounts in every objective.
@@ -482,11 +500,15 @@ def _certify_distinct(
     template: Plan,
     finish: Callable[[Plan], Plan],
 ) -> tuple[list[FrontPlan], int]:
-    """Return up to `count` distinct plans that cover most of the safe ones, and the number of unsafe others.
+    """Return up to `count` distinct safe plans that cover the front, and the number of unsafe plans.
 
-    Each plan is certified and completed. default_plan: the completed plan, which is included if no plan is better.
+    default_plan: the completed plan, which is included if no plan is better.
+    template: plan whose fields the plans take over.
+    finish: completes a plan.
+
+    Each plan is certified and completed.
     """
-    amounts, plans = noticed_amounts(default_plan, task.fourth), dict[int, FrontPlan]()
+    amounts, plans = noticeable_gains(default_plan, task.fourth), dict[int, FrontPlan]()
     remaining_rows = np.arange(len(search.vectors))
     while True:
         ranked_rows = remaining_rows[
@@ -495,7 +517,7 @@ def _certify_distinct(
         rows = ranked_rows[distinct_rows(search.objectives[ranked_rows], amounts)][:count].tolist()
         for row in rows:
             if row not in plans:
-                path = task.paths(search.vectors[row][None])[0]
+                path = task.to_paths(search.vectors[row][None])[0]
                 plans[row] = _with_values(task, finish(_make_plan(task, path, template)))
         rejected_rows = [row for row in rows if not plans[row].plan.safe]
         accepted_plans: list[FrontPlan] = []
@@ -508,7 +530,7 @@ def _certify_distinct(
 
 
 def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> list[FrontPlan]:
-    """Return the plans with a noticeable gain that are not dominated by their exact values."""
+    """Return the plans that no other plan dominates, and that differ noticeably from one another."""
     objectives = np.array([_objective_row(plan, fourth) for plan in plans])
     indices = np.arange(len(objectives))
     # Keep the first of several equal plans.
@@ -519,7 +541,7 @@ def _drop_dominated(plans: list[FrontPlan], fourth: str, amounts: Floats) -> lis
 
 
 def _make_plan(task: FrontTask, path: Floats, template: Plan) -> Plan:
-    """Return a plan of a path (w, 3) with scores and certificate; its other fields are copied from a template."""
+    """Return the plan of a path (w, 3), with scores and certificate; other fields are the template's."""
     counts, objectives = paper_scores(task.problem.certified, path[None])
     return replace(
         template,

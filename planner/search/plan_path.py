@@ -54,7 +54,7 @@ ATTEMPTS = (
 MAX_ATTEMPTS_AMONG_ZONES = 2
 # Maximum evaluations of the final pattern search.
 FINAL_SEARCH_EVALUATIONS = 200
-# Scales of the moves that finally tighten the best path, relative to the moves that fit a seed.
+# Scales of the final moves of the waypoints of the best path, relative to the moves that fit a seed.
 FINAL_MOVE_SCALES = (1.0, 0.5, 0.25, 0.12)
 # Rounds of each of these moves.
 FINAL_MOVE_ROUNDS = 4
@@ -163,7 +163,10 @@ def certify_waypoints(scenario: Scenario, limits: Limits, waypoints: Floats, *, 
 
 
 def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Floats, Certificate]:
-    """Search, and repeat the search with finer grids and more samples while the certificate fails."""
+    """Search, and repeat the search with finer grids and more samples while the certificate fails.
+
+    Returns the best path (w, 3) and its certificate.
+    """
     attempts = len(ATTEMPTS) if search.algorithm.seeded else 1
     if is_limited(search.problem.search.airspace):
         attempts = min(attempts, MAX_ATTEMPTS_AMONG_ZONES)
@@ -196,9 +199,9 @@ def _search_repeatedly(search: Search, previous_path: Floats | None) -> tuple[Fl
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
-    """Check that a path can be searched. Raises ScenarioError for the first obstacle.
+    """Check that a path can be searched; raise ScenarioError for the first reason against it.
 
-    Obstacles are: more wind than the airspeed (m/s) allows, too many values in a population, a budget below the
+    Reasons are: more wind than the airspeed (m/s) allows, too many values in a population, a budget below the
     population, and a start or destination inside a missile's kill radius.
     """
     if scenario.wind.speed > MAX_WIND_FRACTION * airspeed:
@@ -278,12 +281,15 @@ def _run_attempt(search: Search, attempt: int, previous_path: Floats | None) -> 
             waypoint_generations(search, population, settings.generations)
     else:
         last_vector = path_generations(search, population, settings.generations, starts)
-    if algorithm.tightened and search.end_reason == "completed":
+    if algorithm.final_shortening and search.end_reason == "completed":
         _finish_search(search, last_vector)
 
 
 def _finish_search(search: Search, last_vector: Floats | None) -> None:
-    """Shorten or tighten the best path, and the result of the generations, if any, (d,)."""
+    """Shorten the best path and the path of the last generation, if any; otherwise move their waypoints.
+
+    last_vector: vector (d,) of that path.
+    """
     if search.can_shorten:
         if last_vector is not None:
             search.shorten(search.encoding.decode(last_vector[None])[0])
@@ -291,10 +297,10 @@ def _finish_search(search: Search, last_vector: Floats | None) -> None:
     if search.shortest is None:
         # The result of the generations may take another route than the improved seed.
         if last_vector is not None:
-            search.tighten(last_vector, FINAL_MOVE_ROUNDS, 0.5, FINAL_SEARCH_EVALUATIONS)
+            search.move_and_improve(last_vector, FINAL_MOVE_ROUNDS, 0.5, FINAL_SEARCH_EVALUATIONS)
         for scale in FINAL_MOVE_SCALES:
             if search.must_end():
                 break
-            search.tighten(search.archive.vectors[0], FINAL_MOVE_ROUNDS, scale, FINAL_SEARCH_EVALUATIONS)
+            search.move_and_improve(search.archive.vectors[0], FINAL_MOVE_ROUNDS, scale, FINAL_SEARCH_EVALUATIONS)
     search.record_history()
     search.report_progress(0)

@@ -48,10 +48,13 @@ MAX_LAPS = 8
 def candidate_chains(
     start: MapPoint, course: float, end: MapPoint, end_course: float, turn_radius: float, laps: int
 ) -> Iterator[list[MapPoint]]:
-    """Yield lists of corners between two points: at most one corner near the start, and at most two before the end.
+    """Yield lists of corners that connect two legs, for paths of a departure or approach.
 
-    course, end_course: course of the leg before the start, and of the leg after the end, rad.
-    turn_radius: radius of the tightest turn, m.  laps: number of laps before these corners.
+    course, end_course: course of the leg before `start`, and of the leg after `end`, rad.
+    turn_radius: radius of the tightest turn, m.
+    laps: number of laps before the other corners.
+
+    A list has at most one corner near the start, and at most two before the end.
     """
     lap_chains: list[list[MapPoint]] = [[]]
     if laps:
@@ -98,7 +101,10 @@ def _offset_point(point: MapPoint, course: float, distance: float) -> MapPoint:
 
 
 class TurnLengths(NamedTuple):
-    """Leg lengths, m, that turns occupy before and after corners, for turns from 0 in steps of `TURN_STEP_RAD`."""
+    """Leg lengths (m) that turns take up before and after corners, by turn.
+
+    The turns are from 0 in steps of `TURN_STEP_RAD`.
+    """
 
     before: tuple[float, ...]
     after: tuple[float, ...]
@@ -127,9 +133,10 @@ def arc_turn_lengths(radius: float) -> TurnLengths:
 class PathMeasures(NamedTuple):
     """Horizontal measures of a path.
 
-    length: m.  cost: length plus a cost of sharp turns, because their arcs are shorter, and so steeper, than the legs.
+    length: m.
+    cost: length plus a cost of sharp turns, whose arcs are shorter, and therefore steeper, than the legs.
     max_turn: sharpest turn, rad.
-    max_fraction: largest fraction of a leg that its turns occupy.
+    max_fraction: largest fraction of a leg that its turns take up.
     """
 
     length: float
@@ -180,6 +187,7 @@ def climb_altitudes(
     """Return the altitude at each point of a path that climbs as steeply as allowed, m AMSL, (n,).
 
     start_altitude: altitude at the first point, m.
+    climb: function that returns the climb slope on a course.
     min_altitude: minimum altitude except at the end, m.
     end_altitude: final altitude, which is not exceeded, m; the last altitude is lower if the path is too short.
 
@@ -202,7 +210,9 @@ def descent_altitudes(
 ) -> Floats:
     """Return the altitude at each point of a path that descends late or climbs early, m AMSL, (n,).
 
-    The first or the last altitude differs from the requested one if the path is too short.
+    climb, dive: functions that return the slope on a course.
+
+    The first or the last altitude differs from the requested altitude if the path is too short.
 
     >>> descent_altitudes([(0.0, 0.0), (0.0, 500.0), (0.0, 1500.0)], 200.0, lambda _: 0.1, lambda _: 0.1, 50.0).tolist()
     [200.0, 150.0, 50.0]

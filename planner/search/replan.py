@@ -74,6 +74,7 @@ def replan(
 
     def search(changed_scenario: Scenario, changed_limits: Limits) -> Plan:
         # A search with another number of waypoints cannot start from the old plan.
+        """Plan the path ahead, from the remaining path if its number of waypoints fits."""
         previous_path = remaining_path if changed_scenario.planner.waypoints == len(remaining_path) else None
         return plan_path(
             changed_scenario,
@@ -88,7 +89,7 @@ def replan(
     budget = SharedBudget(search)
     new_plan = budget(remaining_scenario, limits)
     if settle is not None:
-        new_plan = budget.total(settle(new_plan, budget))
+        new_plan = budget.with_total_evaluations(settle(new_plan, budget))
     waypoints = np.concatenate([old_plan.waypoints[:leg], new_plan.waypoints])
     algorithm_limits = limits_for(find_algorithm(new_plan.algorithm, scenario.name), limits)
     violations, objectives = paper_scores(make_problem(scenario, algorithm_limits).certified, waypoints[None])
@@ -103,7 +104,7 @@ def replan(
 
 
 def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
-    """Check that a plan has the ends of a scenario. Raises MissionError if its ends differ.
+    """Raise MissionError if the ends of a plan are not those of a scenario.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from world.scenario import load_scenario
@@ -128,7 +129,7 @@ def check_same_mission(scenario: Scenario, old_plan: Plan) -> None:
 
 
 def _check_first_waypoint(scenario: Scenario, old_plan: Plan, leg: int) -> None:
-    """Check the first waypoint of the new plan. Raises MissionError if it is in a kill radius or violates a zone."""
+    """Raise MissionError if the new plan's first waypoint is in a kill radius or violates a zone."""
     threats = scenario.threats
     depths = threats.kill_radius - np.sqrt(((threats.position - old_plan.waypoints[leg]) ** 2).sum(axis=1))
     missile = int(np.argmax(np.where(threats.kill_radius > 0.0, depths, -math.inf))) if len(depths) else -1

@@ -55,7 +55,10 @@ _CertifiedPath = tuple[Floats, Certificate]
 
 
 def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) -> TravelCost:
-    """Make the cost that a scenario's plan minimises. Raises ScenarioError for energy if the power is unknown."""
+    """Make the cost that a scenario's plan minimises.
+
+    Raises ScenarioError for energy if the power is unknown.
+    """
     objective = scenario.planner.objective or "length"
     travel_cost = make_travel_cost(objective, limits.envelope, problem.search.aircraft)
     if travel_cost is None:
@@ -65,8 +68,9 @@ def make_objective_cost(scenario: Scenario, limits: Limits, problem: Problem) ->
 
 
 def search_cheapest_path(search: Search, shortest_path: _CertifiedPath, weights: TravelCost) -> _CertifiedPath:
-    """Return the cheapest path and its certificate, or the shortest path if no equally safe path is cheaper.
+    """Return the cheapest path and its certificate; the shortest path if no equally safe path is cheaper.
 
+    shortest_path: the shortest path and its certificate.
     weights: weights of length, time and energy in the cost.
     """
     minimises_length = weights.time == 0.0 and weights.energy == 0.0
@@ -129,7 +133,7 @@ def _start_paths(search: Search, shortest_path: Floats) -> Iterator[Floats]:
 def _choose_cheaper(
     search: Search, evaluation_data: ProblemArrays, start: Floats, best_path: _CertifiedPath
 ) -> _CertifiedPath:
-    """Return the result of shortening a start path if it is certified and cheaper; otherwise the best path.
+    """Shorten a start path; return the result if it is certified and cheaper, otherwise the best path.
 
     Larger margins are tried until a shortened path is certified.
     """

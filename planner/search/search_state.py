@@ -23,7 +23,7 @@ from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.shortening import MAX_MODELS, shorten_path
-from planner.seeding.waypoint_fitting import tighten
+from planner.seeding.waypoint_fitting import move_all_waypoints
 from world.arrays import Flags, Floats, Ints
 from world.errors import ScenarioError
 from world.geometry import path_length
@@ -43,27 +43,27 @@ ARCHIVE_LEVELS = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_
 
 
 def score_table(violations: NDArray[np.generic], objectives: Floats) -> Floats:
-    """Return scores (n, 8) of violations (n, 4) and objectives (n, 4)."""
+    """Join violations (n, 4) and objectives (n, 4) into scores (n, 8)."""
     return np.concatenate([violations.astype(np.float64), objectives], axis=1)
 
 
 def no_scores() -> Floats:
-    """Return an empty table of scores (0, 8)."""
+    """Return an empty table of scores, (0, 8)."""
     return np.empty((0, SCORE_COLUMNS))
 
 
 def are_violated(scores: Floats) -> Flags:
-    """Return a mask (...,) of the scores (..., 8) of paths that violate a constraint."""
+    """Return a mask (...,): True where a path's scores (..., 8) show a violated constraint."""
     return np.asarray(scores[..., : len(Violation)].any(axis=-1))
 
 
 def are_safe(scores: Floats) -> Flags:
-    """Return a mask (...,) of the scores (..., 8) of paths without violations and without exposure to missiles."""
+    """Return a mask (...,): True where a path's scores (..., 8) show no violation and no missile exposure."""
     return np.asarray(~are_violated(scores) & ~(scores[..., KILL] > 0.0))
 
 
 def best_first(scores: Floats) -> Ints:
-    """Return the rows of scores (n, 8) in the archive's order; the sort is stable."""
+    """Return the rows of scores (n, 8), best first, in the archive's order; the sort is stable."""
     return np.argsort(ranks(scores, ARCHIVE_LEVELS), kind="stable")
 
 
@@ -84,8 +84,8 @@ SLOPE_MARGINS_RAD = (math.radians(0.2), math.radians(0.6))
 MAX_SHORTENING_DEPTH_M = 15.0
 # Distance from missiles in addition to the certificate's margin, m, in gaps too narrow for the search's usual margin.
 NARROW_KILL_MARGIN_M = 1.0
-# Evaluations that `tighten` may take: with less budget left it is skipped.
-TIGHTENING_EVALUATIONS = 600
+# Evaluations that must be left for `move_all_waypoints`; otherwise it is skipped.
+MIN_MOVE_BUDGET = 600
 # Waypoints evaluated between two checks of the stop condition: some 10 ms.
 WAYPOINTS_PER_PAUSE = 4000
 # Number of pauses that a stopped search without a result may still take to find its first route: some 100 ms.
@@ -244,7 +244,7 @@ class Search:
         return bool(reason)
 
     def _archive_and_count(self, vectors: Floats, scores: Floats) -> None:
-        """Add evaluated vectors to the number of evaluations and to the archive."""
+        """Count evaluated vectors, insert them into the archive, and report a new best path to `improved`."""
         self.evaluations += len(vectors)
         old_best = self.archive.vectors[:1]
         self.archive.insert(vectors, scores)
@@ -268,18 +268,21 @@ class Search:
         self.evaluations += evaluations - len(vectors)
         return np.asarray(scores[0])
 
-    def tighten(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
-        """Move all waypoints of a vector (d,) at once, then `improve` it, and return the best scores (8,)."""
-        if self._evaluation_budget() - self.evaluations < TIGHTENING_EVALUATIONS:
+    def move_and_improve(self, vector: Floats, rounds: int, scale: float, max_evaluations: int) -> Floats:
+        """Move all waypoints of a vector (d,) at once, then `improve` it; return the best scores (8,)."""
+        if self._evaluation_budget() - self.evaluations < MIN_MOVE_BUDGET:
             return self.improve(vector, max_evaluations)
-        moved_vector, evaluations = tighten(self.problem.search, self.encoding, vector, rounds, scale)
+        moved_vector, evaluations = move_all_waypoints(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += evaluations
         return self.improve(moved_vector, max_evaluations)
 
     @property
     def can_shorten(self) -> bool:
-        """True if shortening may move waypoints out of their intervals; False among zones, which shortening ignores."""
-        return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
+        """True if shortening may move waypoints out of their intervals; False among zones.
+
+        Shortening ignores zones.
+        """
+        return self.algorithm.final_shortening and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3); if the result is the shortest finished path, keep it and return True."""
@@ -375,7 +378,10 @@ class Search:
         self.history.append(row)
 
     def report_progress(self, remaining_generations: int) -> None:
-        """Report progress and the best path.  remaining_generations: number of generations that may follow."""
+        """Report the progress and the best path to `progress`.
+
+        remaining_generations: number of generations that may follow.
+        """
         if self.progress is not None:
             best_scores = self.archive.scores[0]
             remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best_scores[KILL]:.3g}"
@@ -387,10 +393,10 @@ class Search:
             )
 
     def best_certified(self) -> tuple[Floats, Certificate]:
-        """Return the first path of the archive that is certified with the full kill margin, and its certificate.
+        """Return the archive's first path that is certified with the full kill margin, and its certificate.
 
-        Without such a path, return the certified path furthest from missiles, or the first path if none is certified.
-        A search that is asked to end examines only the first few paths.
+        Without such a path, return the certified path furthest from missiles, or the first path if none is certified. A
+        search that is asked to end examines only the first few paths.
         """
         first_path: tuple[Floats, Certificate] | None = None
         furthest_path: tuple[Floats, Certificate] | None = None
@@ -415,9 +421,9 @@ class Search:
         return result
 
     def best_path(self) -> tuple[Floats, Certificate]:
-        """Return the archive's best path or, if it is shorter or the only one that meets the goal, the shortened path.
+        """Return the better of the archive's best path and the shortened path, with its certificate.
 
-        The path (w, 3) is returned with its certificate.
+        The shortened path is better if it is shorter, or the only one that meets the goal.
         """
         path, certificate = self.best_certified()
         if self.shortest is None or (
@@ -427,7 +433,10 @@ class Search:
         return self.shortest
 
     def _certify_vector(self, vector: Floats, path: Floats) -> Certificate:
-        """Return the certificate of a vector's path; it is cached, because all attempts have the same certificate."""
+        """Return the certificate of a vector's path from the cache, where it is stored at first.
+
+        All attempts have the same certificate.
+        """
         key = vector.tobytes()
         certificate = self.certificates.get(key)
         if certificate is None:

@@ -47,7 +47,7 @@ MAX_FOLLOWED_RETRY_ROUTES = 3
 
 
 def try_straight_line(search: Search) -> bool:
-    """Return True if the straight line is a safe path, so that no shorter path exists and the search is finished."""
+    """Return True if the straight line is safe; then no path is shorter, and the search is finished."""
     if search.encoding.name != "rotated":
         return False
     vectors = search.straight_vectors()
@@ -61,12 +61,15 @@ def try_straight_line(search: Search) -> bool:
 def starting_vectors(
     search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None, *, is_retry: bool = False
 ) -> Floats:
-    """Return the start vectors of a search, (n, d): the seed with the best improved result, and the previous path.
+    """Return the start vectors of a search: the seed with the best improved result, and the previous path.
 
-    The marginals of several routes at once describe none of them, so only one seed is used. It is used in its form
-    before the improvement: afterwards it is so close to every limit that hardly any sample around it is feasible.
+    previous: older path (w, 3), or None.
     is_retry: True if an earlier attempt has failed; then, among zones, grids that are no finer than another grid are
-    skipped, and only the best routes are followed.
+        skipped, and only the best routes are followed.
+
+    The result is (n, d). The marginals of several routes at once describe none of them, so only one seed is used. It is
+    used in its form before the improvement: afterwards it is so close to every limit that hardly any sample around it
+    is feasible.
     """
     encoding, space, waypoint_count = search.encoding, search.problem.space, search.encoding.waypoints
     if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
@@ -99,7 +102,9 @@ def starting_vectors(
 def _list_routes(search: Search, grids: tuple[tuple[int, int], ...], is_retry: bool) -> list[GridRoute]:
     """Return the routes of the grids, ordered by their quickly fitted paths, best first.
 
-    Each fitted path is archived as soon as it is found. is_retry: as in `starting_vectors`.
+    is_retry: as in `starting_vectors`.
+
+    Each fitted path is archived as soon as it is found.
     """
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     if search.progress is not None:
@@ -178,13 +183,13 @@ def search_other_sides(search: Search) -> None:
         return
     tried_paths = _try_grids(search, GRIDS)
     if not search.has_safe() or search.length_ratio() > 1.0 + LONG_PATH_EXCESS_FRACTION:
-        tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling(search)
+        tried_paths += _try_grids(search, FINER_GRIDS) + _try_ceiling_routes(search)
     if not search.has_safe():
         _try_narrow_margins(search, tried_paths)
 
 
 def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> list[Floats]:
-    """Shorten the routes on other sides that these grids propose, and return the routes as paths (w, 3)."""
+    """Shorten the routes on other sides that these grids propose; return the routes as paths (w, 3)."""
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame, straight_length = rotated_frame(space.start, space.destination), math.dist(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
@@ -200,8 +205,11 @@ def _try_grids(search: Search, grids: tuple[tuple[int, float, float], ...]) -> l
     return tried_paths
 
 
-def _try_ceiling(search: Search) -> list[Floats]:
-    """Shorten routes at the altitude of the ceiling, one for each step and depth, and return them as paths (w, 3)."""
+def _try_ceiling_routes(search: Search) -> list[Floats]:
+    """Shorten routes at the altitude of the ceiling; return the routes as paths (w, 3).
+
+    There is one route for each step and depth.
+    """
     data, space = search.problem.search, search.problem.space
     frame = rotated_frame(space.start, space.destination)
     tried_paths: list[Floats] = []
@@ -235,7 +243,7 @@ def _try_narrow_margins(search: Search, paths: list[Floats]) -> None:
 
 
 def shorten_best(search: Search) -> None:
-    """Shorten the archive's best path; then space its waypoints equally and shorten it again, while that helps."""
+    """Shorten the archive's best path; then resample it equally and shorten it again while that helps."""
     search.shorten(search.encoding.decode(search.archive.vectors[:1])[0])
     for _ in range(MAX_REPEATS):
         if search.shortest is None or search.must_end():
@@ -270,7 +278,10 @@ FOLLOWED_MARGINS_M = (2.0, 5.0, 2.0)
 
 
 def may_turn_back(search: Search, certificate: Certificate) -> bool:
-    """Return True if the straight frame has no safe path, or only a long one, so that a path may have to turn back."""
+    """Return True if no safe path, or only a long one, advances along the straight line.
+
+    A path may then have to turn back.
+    """
     if not search.algorithm.seeded or search.encoding.name != "rotated" or search.must_end():
         return False
     if not search.meets_goal(certificate):
@@ -280,6 +291,8 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
 
 def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
     """Search along a route that may turn back.
+
+    best: best path so far and its certificate.
 
     Returns the better of the path found and the path of `best`, with its certificate.
     """
@@ -303,7 +316,7 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
         is_safe = search.meets_goal(best[1])
         if is_safe and path_length(route) > MAX_ROUTE_FRACTION * path_length(best[0]):
             break
-        path, certificate, is_shortened = _search_along(search, route)
+        path, certificate, is_shortened = _search_along_route(search, route)
         if search.meets_goal(certificate) and (not is_safe or path_length(path) < path_length(best[0])):
             return (path, certificate) if is_shortened else _follow_shortened(search, (path, certificate))
         if not is_safe and (certificate.ok, certificate.kill_distance) > (
@@ -315,7 +328,7 @@ def search_turning_back(search: Search, best: tuple[Floats, Certificate]) -> tup
 
 
 def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
-    """Shorten the best path without regard to its certificate, and search for a safe path along the result.
+    """Shorten the best path without regard to its certificate; search for a safe path along the result.
 
     Returns the path found with its certificate if it is safe and shorter than `best`; otherwise returns `best`.
     """
@@ -327,14 +340,14 @@ def _follow_shortened(search: Search, best: tuple[Floats, Certificate]) -> tuple
         path = resample(best[0], search.encoding.waypoints)
         route, evaluations = shorten_path(search.problem.search, path, extra_margin=extra_margin, corners_too=True)
         search.evaluations += evaluations
-        path, certificate, _ = _search_along(search, route)
+        path, certificate, _ = _search_along_route(search, route)
         if search.meets_goal(certificate) and path_length(path) < path_length(best[0]):
             best = path, certificate
     return best
 
 
-def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
-    """Search along a route (k, 3). Return the best path, its certificate, and True if it comes from shortening."""
+def _search_along_route(search: Search, route: Floats) -> tuple[Floats, Certificate, bool]:
+    """Search along a route (k, 3); return the best path, its certificate, and True if it was shortened."""
     waypoints = search.encoding.waypoints
     piece_ends, _ = sample_route(route, waypoints - 1)
     encoding = route_encoding(search.problem.space, piece_ends[:, :2])
@@ -354,12 +367,12 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate, b
     path = fit_points(inner_search.problem.search, frames, _candidate_points(route, encoding), CLOSE_FIT)
     vector = np.clip(frames.to_frame(path[1:-1]).ravel(), encoding.lower, encoding.upper)
     with suppress(SearchEnded):
-        _improve_along(inner_search, vector, (path, route))
+        _improve_and_shorten(inner_search, vector, (path, route))
     search.evaluations, search.end_reason = inner_search.evaluations, inner_search.end_reason
     return *inner_search.best_path(), inner_search.shortest is not None
 
 
-def _improve_along(search: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
+def _improve_and_shorten(search: Search, vector: Floats, routes: tuple[Floats, ...]) -> None:
     """Improve the path of a vector (d,), then shorten the path and the routes (k, 3), which may be better."""
     search.evaluate(vector[None])
     for _ in range(FIRST_SEARCH_COUNT):
@@ -369,7 +382,7 @@ def _improve_along(search: Search, vector: Floats, routes: tuple[Floats, ...]) -
     for scale in MOVE_SCALES:
         if search.must_end() or search.first_safe_found():
             return
-        search.tighten(search.archive.vectors[0], MOVE_ROUNDS, scale, LATER_SEARCH_EVALUATIONS)
+        search.move_and_improve(search.archive.vectors[0], MOVE_ROUNDS, scale, LATER_SEARCH_EVALUATIONS)
     if search.can_shorten:
         for route in routes:
             search.shorten(resample(route, search.encoding.waypoints))
@@ -377,9 +390,11 @@ def _improve_along(search: Search, vector: Floats, routes: tuple[Floats, ...]) -
 
 
 def _candidate_points(route: Floats, encoding: Encoding) -> Floats:
-    """Return candidates for each inner waypoint in its frame, on its piece of a route, (w - 2, candidates, 3).
+    """Return candidates for each inner waypoint on its piece of a route, (w - 2, candidates, 3).
 
     route: (k, 3) m.
+
+    The candidates are in the waypoints' frames.
     """
     count = encoding.waypoints - 2
     dense_points, _ = sample_route(route, count * (CLOSE_FIT.candidates + 1) + 1)

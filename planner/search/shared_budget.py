@@ -12,7 +12,7 @@ Search = Callable[[Scenario, Limits], Plan]
 
 
 class SharedBudget:
-    """A search that may be repeated for the same plan, in another scenario or within other limits.
+    """Search that may be repeated for the same plan, in another scenario or within other limits.
 
     Each search may use the remaining evaluations of the scenario's budget. If fewer evaluations than one population
     remain, no further search is run.
@@ -35,7 +35,7 @@ class SharedBudget:
         limited_scenario = replace(scenario, planner=settings.model_copy(update={"budget": remaining_evaluations}))
         return self._record_plan(replace(self._search(limited_scenario, limits), scenario=scenario))
 
-    def total(self, plan: Plan) -> Plan:
+    def with_total_evaluations(self, plan: Plan) -> Plan:
         """Return the final plan with the evaluations of all searches.
 
         A plan that is not safe gets the end reason of the first search that did not complete, as a complete search

@@ -42,24 +42,24 @@ COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", n
 
 
 class AirspaceGrid(NamedTuple):
-    """One resolution: positions across (m from the line) at stages + 1 positions along, and layers of height.
+    """Grid of one resolution: positions across at stages + 1 positions along, and layers of height.
 
-    pitch: spacing of the layers, m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor`
-    (m).
+    across: m from the line.
+    layer_spacing: m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor` (m).
     gentle: True if changes of course have a cost and slopes stay below the steepest.
     """
 
     stages: int
     across: Floats
     layers: int
-    pitch: float
+    layer_spacing: float
     follows: bool
     floor: float
     gentle: bool = False
 
 
 class _ClosedHeights(NamedTuple):
-    """Heights closed to a step, from low to high, m; low > high for none."""
+    """Altitudes closed to a step, from low to high, m AMSL; low > high for none."""
 
     low: float
     high: float
@@ -123,7 +123,9 @@ def _closed_heights(zones: ZonesWithMargins, line: MapSegment, lateral: float, g
 def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, fraction: float) -> Floats:
     """Return the slopes that a grid uses for each lateral step: tangents of climb and dive, (sideways, 2).
 
-    step: length of a step along, m.  amsl: altitude of the slope limits, m.  fraction: fraction of the limits.
+    step: length of a step along, m.
+    amsl: altitude of the slope limits, m.
+    fraction: fraction of the limits.
     """
     slopes, a, b = np.zeros((2 * MAX_SIDE + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
@@ -139,7 +141,7 @@ def _step_slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: fl
 
 
 @inner
-def _set_cell_costs(
+def _set_layer_costs(
     grid: AirspaceGrid,
     columns: Records,
     obstacles: Records,
@@ -149,10 +151,12 @@ def _set_cell_costs(
     last_across: int,
     cell_costs: Floats,
 ) -> None:
-    """Fill `cell_costs` (per m) for a range of a stage's cells; inf for a cell that no path may enter.
+    """Fill the costs (per m) of a stage's cells for a range across; inf for a cell that no path may enter.
 
-    along: position of the stage, m.  extra: (across,) additional cost per m.
-    first_across, last_across: range of cells across, both included.  cell_costs: (across, layers).
+    along: position of the stage, m.
+    extra: (across,) additional cost per m.
+    first_across, last_across: range of cells across, both included.
+    cell_costs: (across, layers) array to fill.
     """
     near_obstacles, horizontal2 = np.empty(obstacles.shape[0], dtype=np.int64), np.empty(obstacles.shape[0])
     for y in range(first_across, last_across + 1):
@@ -166,7 +170,7 @@ def _set_cell_costs(
         first_height = column.lowest if grid.follows else grid.floor
         mid_height, half_height = 0.5 * (column.lowest + column.highest), 0.5 * (column.highest - column.lowest)
         for z in range(grid.layers):
-            height = first_height + z * grid.pitch
+            height = first_height + z * grid.layer_spacing
             if not column.lowest <= height <= column.highest:
                 cell_costs[y, z] = math.inf
                 continue
@@ -181,7 +185,7 @@ def _set_cell_costs(
 
 
 @inner
-def _relax_stage(
+def _relax_airspace_stage(
     data: ProblemArrays,
     frame: RotatedFrame,
     grid: AirspaceGrid,
@@ -194,11 +198,13 @@ def _relax_stage(
     previous_parents: Codes,
     parents: Codes,
 ) -> None:
-    """Compute the costs of the routes to the cells of a stage from the costs of the previous stage; store parent cells.
+    """Compute the costs of the routes to a stage's cells from those of the previous stage; store parents.
 
-    previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this one. previous_parents:
-    parents of the previous stage. Changes of course are counted along the cheapest route to a cell only, so the result
-    is not exactly the optimum.
+    previous_columns, columns: `COLUMN` records (across,) of the previous stage and of this one.
+    cost, next_cost: (across, layers) costs of the routes to the cells of the previous stage and of this one.
+    previous_parents, parents: parents of the cells of both stages.
+
+    Changes of course are counted along the cheapest route to a cell only, so the result is not exactly the optimum.
     """
     step, width, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
     # No tracking error at a fixed end.
@@ -225,16 +231,18 @@ def _relax_stage(
             for z in range(grid.layers):
                 if cost[y, z] == math.inf:
                     continue
-                height = first_height + z * grid.pitch
+                height = first_height + z * grid.layer_spacing
                 course_change = 0 if stage == 1 else side - (y - previous_parents[y, z] // grid.layers)
                 base_cost = cost[y, z] + turn_cost * course_change * course_change
-                lowest_layer = max(0, math.ceil((height - dive - target_first_height) / grid.pitch))
-                highest_layer = min(grid.layers - 1, math.floor((height + climb - target_first_height) / grid.pitch))
+                lowest_layer = max(0, math.ceil((height - dive - target_first_height) / grid.layer_spacing))
+                highest_layer = min(
+                    grid.layers - 1, math.floor((height + climb - target_first_height) / grid.layer_spacing)
+                )
                 for next_z in range(lowest_layer, highest_layer + 1):
                     # A step is at least as long as a level step; most cost too much even then, and need no square root.
                     if base_cost + horizontal_length * cell_costs[target, next_z] >= next_cost[target, next_z]:
                         continue
-                    altitude_change = target_first_height + next_z * grid.pitch - height
+                    altitude_change = target_first_height + next_z * grid.layer_spacing - height
                     end_height = height + altitude_change
                     if max(height, end_height) > closed_heights.low and min(height, end_height) < closed_heights.high:
                         continue
@@ -278,9 +286,11 @@ def cheapest_airspace_route(
 ) -> tuple[Floats, float]:
     """Return points (stages + 1, 3) along, across, up of the cheapest route over a grid, and its cost.
 
-    Return (0, 3) points and inf if no route is found.
-    extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost. pause: called after every
-    `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    extra: (stages + 1, across) added to the cost per m.
+    bound: upper limit on the cost.
+    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+
+    Without a route, the points are (0, 3) and the cost is inf.
     """
     stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers))
     search: AirspaceSearch = begin_airspace_route(data, frame, grid)
@@ -339,11 +349,11 @@ def continue_airspace_route(
         first, last = max(0, first - MAX_SIDE), min(width - 1, last + MAX_SIDE)
         for y in range(first, last + 1):
             _fill_column(data, frame, grid, along, grid.across[y], columns[stage, y])
-        _set_cell_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, cell_costs)
+        _set_layer_costs(grid, columns[stage], obstacles, along, extra[stage], first, last, cell_costs)
         if stage == stages:
             cell_costs[centre_index, _nearest_layer(grid, columns[stage, centre_index], data.destination[2])] = 1.0
         next_cost[:] = math.inf
-        _relax_stage(
+        _relax_airspace_stage(
             data,
             frame,
             grid,
@@ -369,7 +379,7 @@ def continue_airspace_route(
 def end_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, search: AirspaceSearch
 ) -> tuple[Floats, float]:
-    """Return points (stages + 1, 3) of the route found, and its cost, or (0, 3) points and inf."""
+    """Return points (stages + 1, 3) of the route found, and its cost; (0, 3) points and inf if none."""
     stages, step, columns, y = grid.stages, frame.length / grid.stages, search.columns, search.centre_index
     z = _nearest_layer(grid, columns[stages, y], data.destination[2])
     total = search.cost[y, z]
@@ -381,7 +391,7 @@ def end_airspace_route(
         points[stage, 0], points[stage, 1], points[stage, 2] = (
             stage * step,
             grid.across[y],
-            first_height + z * grid.pitch,
+            first_height + z * grid.layer_spacing,
         )
         if stage > 0:
             parent = search.cells[stage, y, z]
@@ -393,7 +403,7 @@ def end_airspace_route(
 def _nearest_layer(grid: AirspaceGrid, column: Record, height: float) -> int:
     """Return the index of the layer nearest to a height, m."""
     first_height = column.lowest if grid.follows else grid.floor
-    return min(grid.layers - 1, max(0, round((height - first_height) / grid.pitch)))
+    return min(grid.layers - 1, max(0, round((height - first_height) / grid.layer_spacing)))
 
 
 # --- Grids and routes ---
@@ -407,14 +417,14 @@ FINER_COST_RATIO = 1.05
 MIN_LAYERS = 8
 # Maximum number of layers of a band of heights above ground.
 MAX_LAYERS = 24
-# Minimum pitch of layers that do not follow the ground, as a fraction of the step along.
-MIN_LAYER_PITCH_STEPS = 0.05
+# Minimum layer_spacing of layers that do not follow the ground, as a fraction of the step along.
+MIN_LAYER_SPACING_STEPS = 0.05
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
-    """Return a grid with a number of stages, which is reduced if the grid would be too large.
+    """Return a grid with at most a number of stages; fewer if the grid would be too large.
 
     span: limits across, m.
     """
@@ -427,19 +437,19 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
     while True:
         step = frame.length / stages
         across = np.arange(-math.floor(-span[0] / step), math.floor(span[1] / step) + 1) * step
-        pitch = max(1.0, gentler_slope * step / LAYERS_PER_STEP)
+        layer_spacing = max(1.0, gentler_slope * step / LAYERS_PER_STEP)
         if follows_ground:
-            layers = min(MAX_LAYERS, max(MIN_LAYERS, math.ceil(band_height / pitch) + 1))
+            layers = min(MAX_LAYERS, max(MIN_LAYERS, math.ceil(band_height / layer_spacing) + 1))
             # Near an end with smaller buffers the band is wider.
             max_band_height = space.max_height - data.clearance
-            pitch = max(1.0, band_height) / (layers - 1)
-            layers = max(layers, min(2 * MAX_LAYERS, math.ceil(max_band_height / pitch) + 1))
+            layer_spacing = max(1.0, band_height) / (layers - 1)
+            layers = max(layers, min(2 * MAX_LAYERS, math.ceil(max_band_height / layer_spacing) + 1))
         else:
-            pitch = max(pitch, MIN_LAYER_PITCH_STEPS * step)
-            layers = max(1, math.floor((data.ceiling - min_height) / pitch) + 1)
+            layer_spacing = max(layer_spacing, MIN_LAYER_SPACING_STEPS * step)
+            layers = max(1, math.floor((data.ceiling - min_height) / layer_spacing) + 1)
         if stages <= 8 or (stages + 1) * across.size * layers <= MAX_CELLS:
             return AirspaceGrid(
-                stages, np.asarray(across, np.float64), layers, pitch, follows_ground, min_height, gentle=True
+                stages, np.asarray(across, np.float64), layers, layer_spacing, follows_ground, min_height, gentle=True
             )
         stages = max(8, int(stages / 1.2))
 
@@ -453,11 +463,14 @@ def airspace_routes(
     *,
     finer_only: bool = False,
 ) -> Iterator[GridRoute]:
-    """Yield routes for each grid (stages, number of different routes), with `STAGE_FACTOR` times its stages.
+    """Yield routes over grids, for a problem with zones or a maximum height.
 
-    Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
-    gaps can require steep or curved routes. pause: as in `cheapest_airspace_route`.
+    grids: number of stages, which `STAGE_FACTOR` multiplies, and number of different routes of each grid.
+    pause: as in `cheapest_airspace_route`.
     finer_only: True to skip grids that `MAX_CELLS` makes no finer than an earlier grid.
+
+    Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, and first,
+    because narrow gaps can require steep or curved routes.
     """
     expected_cost, max_stages = EXPECTED_COST_RATIO * math.dist(data.start, data.destination), 0
     for index, (stages, route_count) in enumerate(grids):

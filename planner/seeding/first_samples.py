@@ -21,9 +21,10 @@ MAX_SPREAD_FRACTION = 0.3
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
     """Return the modes of the kernel min(s, t) - s t of a Brownian bridge at equal steps.
 
-    inner: number n of inner points.  Returns the eigenvectors, (n, n), and their standard deviations, (n,).
-    They have a closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines.
-    Deviations are relative to the deviation of the first mode.
+    inner: number n of inner points.
+
+    Returns the eigenvectors, (n, n), and their standard deviations, (n,), relative to that of the first mode. They have
+    a closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines.
     """
     k = np.arange(1, inner + 1)
     modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))
@@ -32,9 +33,9 @@ def bridge_modes(inner: int) -> tuple[Floats, Floats]:
 
 
 def bridge_basis(inner: int) -> Floats:
-    """Return an orthogonal basis of vectors of the rotated encoding: bridge modes across and up, unit vectors along.
+    """Return an orthogonal basis (3 n, 3 n) of vectors of the rotated encoding, for n inner waypoints.
 
-    inner: number n of inner waypoints; the basis has the shape (3 n, 3 n).
+    It consists of bridge modes across and up, and of unit vectors along.
     """
     modes, _ = bridge_modes(inner)
     basis = np.zeros((3 * inner, 3 * inner))

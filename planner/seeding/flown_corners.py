@@ -62,7 +62,7 @@ class FlownCorners(NamedTuple):
 
 @inner
 def no_corners(count: int, margin: float) -> FlownCorners:
-    """Return the record of a path without corners near the ground.
+    """Return the `FlownCorners` of a path without corners near the ground.
 
     margin: additional margin, m.
     """
@@ -76,8 +76,9 @@ def no_corners(count: int, margin: float) -> FlownCorners:
 def corners_near_ground(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, corners: Records, lags: Records, margin: float
 ) -> FlownCorners:
-    """Find the corners of a path (w, 3) that are flown close to the ground, or almost as steeply as possible.
+    """Find a path's corners that are flown close to the ground, or almost as steeply as possible.
 
+    path: (w, 3) m.
     corners, lags: simulated turns at the waypoints, and altitude errors of the legs.
     margin: height added to the required clearance, m.
     """
@@ -117,7 +118,10 @@ def corners_near_ground(
 
 @inner
 def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown: FlownCorners) -> None:
-    """Fill the radii and slope limits of the arcs whose slopes are close to the limits on one of their courses."""
+    """Fill the radii and slope limits of the arcs whose slopes are close to their limits.
+
+    The limits are the lower of those on the two courses of a corner.
+    """
     level_start, level_end = np.zeros(3), np.zeros(3)
     for i in range(1, path.shape[0] - 1):
         if not 0.0 < corners[i].radius < math.inf or math.isinf(corners[i].tangent):
@@ -136,18 +140,23 @@ def _find_steep_arcs(data: ProblemArrays, path: Floats, corners: Records, flown:
         radius = corners[i].radius
         arc = radius * min(MAX_TURN_RAD, 2.0 * math.atan(corners[i].tangent / radius))
         for sign, max_slope in ((1.0, climb), (-1.0, dive)):
-            if arc_room(path[i - 1], path[i], path[i + 1], radius, sign, max_slope) < (1.0 - STEEP_FRACTION) * arc:
+            if (
+                spare_arc_length(path[i - 1], path[i], path[i + 1], radius, sign, max_slope)
+                < (1.0 - STEEP_FRACTION) * arc
+            ):
                 flown.steep_radii[i] = radius
 
 
 @inner
-def arc_room(
+def spare_arc_length(
     previous: Floats, waypoint: Floats, next_waypoint: Floats, radius: float, sign: float, max_slope: float
 ) -> float:
-    """Return the length of a corner's arc that exceeds the length needed for its climb or descent, m.
+    """Return the length of a corner's arc beyond the length that its climb or descent needs, m.
 
-    sign: 1 for a climb, -1 for a descent.  max_slope: tangent of the maximum slope.
-    Slopes are those of `aircraft.path_limits.arc_slope`.
+    sign: 1 for a climb, -1 for a descent.
+    max_slope: tangent of the maximum slope.
+
+    Slopes are those of `aircraft.path_limits.arc_slope`. The length is negative if the arc is too short.
     """
     length_in, length_out = _horizontal_length(previous, waypoint), _horizontal_length(waypoint, next_waypoint)
     ux, uy, vx, vy = (
@@ -167,7 +176,7 @@ def arc_room(
 
 @inner
 def leg_index(sample: int) -> int:
-    """Return 0 for a sample on the leg before its corner, 1 for a sample on the leg after it."""
+    """Return 0 if a sample of a corner is on the leg before the corner, 1 if it is on the leg after it."""
     return 2 * sample // SAMPLES_PER_CORNER
 
 
@@ -197,7 +206,9 @@ def corner_point(
 ) -> None:
     """Fill `out` (3,) with the position of a sample of the flown corner at `waypoint`.
 
-    radius: of the turn, m.  sample: number of the sample.
+    radius: radius of the turn, m.
+    sample: number of the sample.
+
     Heights are those of the legs, or of the arc between its tangent points, and not lowered.
     """
     length_in, length_out = _horizontal_length(previous_waypoint, waypoint), _horizontal_length(waypoint, next_waypoint)
@@ -237,12 +248,13 @@ def corner_point(
 
 
 @inner
-def corner_slopes(
+def corner_derivatives(
     data: ProblemArrays, corner: Floats, radius: float, sample: int, gradient: Floats, point: Floats, slopes: Floats
 ) -> None:
-    """Fill `slopes` (3, 3) with the derivatives of a value at a sample with respect to the corner's waypoints.
+    """Fill `slopes` (3, 3) with the derivatives of a value at a corner's sample by the corner's waypoints.
 
-    corner: waypoints, (3, 3).  gradient: (3,) derivatives of the value with respect to the sample's position.
+    corner: waypoints, (3, 3).
+    gradient: (3,) derivatives of the value with respect to the sample's position.
     point: scratch memory, (3,).
     """
     for row in range(3):
@@ -257,20 +269,20 @@ def corner_slopes(
 
 
 @inner
-def arc_room_slopes(corner: Floats, radius: float, sign: float, max_slope: float, slopes: Floats) -> None:
-    """Fill `slopes` (3, 3) with the derivatives of `arc_room` with respect to the waypoints of a corner, (3, 3)."""
+def spare_length_derivatives(corner: Floats, radius: float, sign: float, max_slope: float, slopes: Floats) -> None:
+    """Fill `slopes` (3, 3) with the derivatives of `spare_arc_length` by a corner's waypoints, (3, 3)."""
     for row in range(3):
         for axis in range(3):
             coordinate, slopes[row, axis] = corner[row, axis], 0.0
             for direction in (1.0, -1.0):
                 corner[row, axis] = coordinate + direction * CORNER_STEP_M
-                value = arc_room(corner[0], corner[1], corner[2], radius, sign, max_slope)
+                value = spare_arc_length(corner[0], corner[1], corner[2], radius, sign, max_slope)
                 slopes[row, axis] += direction * value / (2.0 * CORNER_STEP_M)
             corner[row, axis] = coordinate
 
 
 @inner
-def ground_slopes(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
+def height_derivatives(data: ProblemArrays, x: float, y: float, out: Floats) -> None:
     """Fill `out` (3,) with the derivatives of the height above ground at a point.
 
     Horizontal derivatives are 0 if the ground nearby is unknown.

@@ -44,10 +44,13 @@ OBSTACLE = np.dtype(
 
 @by_reference
 class Grid(NamedTuple):
-    """One resolution: number of stages along, positions across (m from the line) and layers of height (m).
+    """Grid of one resolution: stages along, positions across and layers of height.
 
+    stages: number of stages.
+    across: m from the line.
+    layers: altitudes, m.
     shrink: fraction of a step by which kill spheres are reduced; 0 for none. Routes on such a grid may have to be
-    shortened to be safe, but pass gaps between its cells.
+        shortened to be safe, but pass gaps between its cells.
     spread: fraction of a step around a cell over which the highest ground is taken.
     ratio: spacing across as a fraction of a step; below 1 the grid has more courses and resolves finer gaps.
     """
@@ -87,10 +90,11 @@ def _min_height(
     across: float,
     steps: _PixelSteps,
 ) -> float:
-    """Return the lowest allowed altitude in a cell, m: the highest of 3 x 3 ground samples plus the clearance.
+    """Return the lowest allowed altitude in a cell, m: the highest of 3 x 3 ground samples plus clearance.
+
+    steps: steps between the samples; a step of 0 along the frame leaves only the middle sample.
 
     The result is inf outside the map or without data.
-    steps: steps between the samples; a step of 0 along the frame leaves only the middle sample.
     """
     east, north = to_world_position(frame, along, across)
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
@@ -112,23 +116,24 @@ def _min_height(
 
 
 @inner
-def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float) -> _PixelSteps:
-    """Return the raster steps that correspond to steps of `pitch` (m) along and across the frame.
+def _pixel_steps(data: ProblemArrays, frame: RotatedFrame, along: float, length: float) -> _PixelSteps:
+    """Return the raster steps that correspond to steps along and across the frame.
 
     along: position in the frame at which the steps are computed, m.
+    length: length of the steps in the frame, m.
     """
     east, north = to_world_position(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
-    east, north = to_world_position(frame, along + pitch, 0.0)
+    east, north = to_world_position(frame, along + length, 0.0)
     column_along, row_along = polymap(data.to_pixel, east, north)
-    east, north = to_world_position(frame, along, pitch)
+    east, north = to_world_position(frame, along, length)
     column_across, row_across = polymap(data.to_pixel, east, north)
     return _PixelSteps(column_along - column, row_along - row, column_across - column, row_across - row)
 
 
 @compiled
 def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0) -> Records:
-    """Return `OBSTACLE` records of the missiles for a grid with the given step between stages.
+    """Return `OBSTACLE` records of the missiles for a grid with the given step between stages (m).
 
     shrink: see `Grid`.
     """
@@ -154,12 +159,14 @@ def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float, shrink
 def _add_kill_cost(
     obstacles: Records, along: float, grid: Grid, first_across: int, last_across: int, cell_costs: Floats
 ) -> None:
-    """Add the cost of kill spheres, which increases inwards, to the cells `first_across` to `last_across` of a stage.
+    """Add the cost of kill spheres, which increases inwards, to cells of a stage.
 
-    along: position of the stage, m.  cell_costs: (layers, across) cost per m.
+    along: position of the stage, m.
+    first_across, last_across: range of the cells across, both included.
+    cell_costs: (layers, across) cost per m.
     """
     across, layers = grid.across, grid.layers
-    pitch = across[1] - across[0] if across.size > 1 else 1.0
+    across_spacing = across[1] - across[0] if across.size > 1 else 1.0
     for k in range(obstacles.shape[0]):
         obstacle = obstacles[k]
         radius = obstacle.radius
@@ -167,8 +174,8 @@ def _add_kill_cost(
         if along2 >= radius * radius:
             continue
         half_width = math.sqrt(radius * radius - along2)
-        first_y = max(first_across, math.ceil((obstacle.across - half_width - across[0]) / pitch))
-        last_y = min(last_across, math.floor((obstacle.across + half_width - across[0]) / pitch))
+        first_y = max(first_across, math.ceil((obstacle.across - half_width - across[0]) / across_spacing))
+        last_y = min(last_across, math.floor((obstacle.across + half_width - across[0]) / across_spacing))
         for z in range(layers.size):
             plane_distance2 = along2 + (layers[z] - obstacle.up) ** 2
             if plane_distance2 >= radius * radius:
@@ -192,10 +199,13 @@ def set_cell_costs(
     last_across: int,
     cell_costs: Floats,
 ) -> None:
-    """Fill `cell_costs` (per m) for the cells `first_across` to `last_across` of a stage.
+    """Fill the costs (per m) of cells of a stage.
+
+    extra: (stages + 1, across) additional cost per m.
+    first_across, last_across: range of the cells across, both included.
+    cell_costs: (layers, across) array to fill.
 
     The cost is inf for a cell too close to the ground, and higher inside kill spheres.
-    extra: (stages + 1, across) additional cost per m.  cell_costs: (layers, across).
     """
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
@@ -226,11 +236,11 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 @inner
 def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float) -> Records:
-    """Return the steepest climb and descent of a step, in layers: `STEP_LAYERS` records (sideways, layers).
+    """Return the steepest climb and descent of a step in layers: `STEP_LAYERS` records (sideways, layers).
 
     They depend on the course of the step, and on the layer in which the step begins.
     """
-    pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
+    layer_spacing = layers[1] - layers[0] if layers.size > 1 else 1.0
     step_layers = np.zeros((2 * MAX_SIDE + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
     for side in range(-MAX_SIDE, MAX_SIDE + 1):
@@ -241,8 +251,12 @@ def layers_per_step(data: ProblemArrays, frame: RotatedFrame, step: float, layer
             a[2] = layers[z]
             b[2] = layers[z]
             climb, dive = slope_limits(data, a, b)
-            step_layers[side + MAX_SIDE, z].climb = max(0, math.floor(math.tan(climb) * horizontal_length / pitch))
-            step_layers[side + MAX_SIDE, z].sink = max(0, math.floor(math.tan(dive) * horizontal_length / pitch))
+            step_layers[side + MAX_SIDE, z].climb = max(
+                0, math.floor(math.tan(climb) * horizontal_length / layer_spacing)
+            )
+            step_layers[side + MAX_SIDE, z].sink = max(
+                0, math.floor(math.tan(dive) * horizontal_length / layer_spacing)
+            )
     return step_layers
 
 
@@ -258,11 +272,14 @@ def relax_cells(
     count: int,
     length: float,
 ) -> None:
-    """Offer routes through `count` adjacent cells to as many cells of the next stage; keep those that are cheaper.
+    """Offer routes through adjacent cells to as many cells of the next stage; keep cheaper routes.
 
-    cost, next_cost: costs of the routes to the cells of both stages.  cell_costs: cost per m of the cells.
-    parents: cells from which the cheapest routes come.  length: of each step, m.
+    cost, next_cost: costs of the routes to the cells of both stages.
+    cell_costs: cost per m of the cells.
+    parents: cells from which the cheapest routes come.
     first_source, first_target, first_cell_cost: indices of the first cells, and of the first cell cost, in flat arrays.
+    count: number of the cells.
+    length: length of each step, m.
     """
     for k in range(count):
         # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
@@ -283,13 +300,17 @@ def relax_stage(
     step_layers: Records,
     cell_costs: Floats,
     step: float,
-    pitch: float,
+    layer_spacing: float,
     ratio: float,
 ) -> None:
-    """Compute the costs of the routes to the cells of a stage from the costs of the previous stage; store parent cells.
+    """Compute the costs of the routes to a stage's cells from those of the previous stage; store parents.
 
     cost, next_cost: (layers, across) costs of the routes to the cells of the previous stage and of this stage.
-    spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: spacing of the layers, m.
+    parents: (layers, across) cells of the previous stage from which the cheapest routes come.
+    spans: `SPAN` records (layers,) of the cells with a finite cost in the previous stage.
+    step: length of a step along, m.
+    layer_spacing: m.
+    ratio: spacing across as a fraction of a step.
     """
     layer_count, width = cost.shape
     flat_cost, flat_next_cost, flat_parents, flat_cell_costs = (
@@ -309,7 +330,7 @@ def relax_stage(
             limit = step_layers[side + MAX_SIDE, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
-                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
+                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * layer_spacing) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
                 relax_cells(
                     flat_cost,
@@ -325,13 +346,17 @@ def relax_stage(
 
 
 @inner
-def fill_goal_distances(columns: int, home: int, remaining_stages: int, step: float, ratio: float, out: Floats) -> None:
+def fill_goal_distances(
+    columns: int, goal_index: int, remaining_stages: int, step: float, ratio: float, out: Floats
+) -> None:
     """Fill `out` with the shortest horizontal distance from each position across to the destination, m.
 
-    home: index across of the destination.  The distance is inf if the destination cannot be reached from there.
+    goal_index: index across of the destination.
+
+    The distance is inf if the destination cannot be reached in the remaining stages.
     """
     for y in range(columns):
-        offset = abs(y - home)
+        offset = abs(y - goal_index)
         if offset > MAX_SIDE * remaining_stages:
             out[y] = math.inf
             continue
@@ -351,9 +376,10 @@ def prune_cells(
     first_across: int,
     last_across: int,
 ) -> None:
-    """Set the cost of cells without a route to the destination within the bound to inf, and fill the remaining spans.
+    """Set the cost of cells without a route to the destination within the bound to inf; fill the spans.
 
-    spans: `SPAN` records (layers,) to fill. goal_distances: (across,) horizontal distance to the destination, m.
+    spans: `SPAN` records (layers,) to fill with the remaining cells.
+    goal_distances: (across,) horizontal distance to the destination, m.
     height_differences: (layers,) height differences to the destination, m.
     """
     for z in range(next_cost.shape[0]):
@@ -407,9 +433,11 @@ def cheapest_route(
 ) -> tuple[Records, float]:
     """Return `ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost.
 
-    Return no records if there is no route.
-    extra: (stages + 1, across), added to the cost per m. bound: upper limit on the cost; more expensive routes are not
-    searched. pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+    extra: (stages + 1, across), added to the cost per m.
+    bound: upper limit on the cost; more expensive routes are not searched.
+    pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
+
+    Without a route, there are no records and the cost is inf.
     """
     stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
     search: GridSearch = begin_route(data, frame, grid)
@@ -460,7 +488,7 @@ def continue_route(
     """Continue a search by up to `max_stages` stages, or until no route can continue, and return it."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
-    pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
+    layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     required = required_clearance(data)
     (
         step_layers,
@@ -487,7 +515,7 @@ def continue_route(
             break
         set_cell_costs(data, required, frame, stage, obstacles, grid, extra, first, last, cell_costs)
         next_cost[:, first : last + 1] = np.inf
-        relax_stage(cost, next_cost, parents[stage], spans, step_layers, cell_costs, step, pitch, grid.ratio)
+        relax_stage(cost, next_cost, parents[stage], spans, step_layers, cell_costs, step, layer_spacing, grid.ratio)
         fill_goal_distances(width, centre_index, stages - stage, step, grid.ratio, goal_distances)
         prune_cells(next_cost, spans, goal_distances, height_differences, bound, first, last)
         cost, next_cost = next_cost, cost
@@ -508,7 +536,10 @@ def continue_route(
 
 @compiled
 def end_route(search: GridSearch) -> tuple[Records, float]:
-    """Return `ROUTE_CELL` records (stages + 1,) of the route found, or no records, and its cost."""
+    """Return `ROUTE_CELL` records (stages + 1,) of the route found, and its cost.
+
+    Without a route, there are no records and the cost is inf.
+    """
     goal_layer, centre_index, cost = search.goal_layer, search.centre_index, search.cost
     if (
         search.spans[goal_layer].first > centre_index
@@ -538,12 +569,12 @@ def trace_back(parents: Codes, layer: int, across: int) -> Records:
 
 # --- Grids and routes ---
 
-# Layers that the gentler slope limit climbs per step along; the limits of the pitch below apply.
+# Layers that the gentler slope limit climbs per step along; the limits of the layer spacing below apply.
 LAYERS_PER_STEP = 2.5
-# Smallest pitch of the layers, as a fraction of the step along.
-MIN_LAYER_PITCH = 0.05
-# Largest pitch of the layers, as a fraction of the step along.
-MAX_LAYER_PITCH = 0.12
+# Smallest spacing of the layers, as a fraction of the step along.
+MIN_LAYER_SPACING_STEPS = 0.05
+# Largest spacing of the layers, as a fraction of the step along.
+MAX_LAYER_SPACING_STEPS = 0.12
 # Maximum number of cells of a grid: stages x across x layers.
 MAX_CELLS = 1_200_000
 # Expected cost of the first route over the straight line; with few courses, grid routes are too long by about this.
@@ -565,26 +596,27 @@ class GridRoute:
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
     """Return a grid with square cells in the plane, and with a layer at the start's altitude.
 
-    span: limits across, m.  stages: number of stages, which is reduced if the grid would be too large.
+    span: limits across, m.
+    stages: number of stages, which is reduced if the grid would be too large.
     """
     min_height, max_height = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level_point = np.array([*data.destination[:2], data.start[2]])
     gentler_slope = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level_point))))
-    pitch_ratio = min(MAX_LAYER_PITCH, max(MIN_LAYER_PITCH, gentler_slope / LAYERS_PER_STEP))
+    spacing_ratio = min(MAX_LAYER_SPACING_STEPS, max(MIN_LAYER_SPACING_STEPS, gentler_slope / LAYERS_PER_STEP))
     while True:
         step = frame.length / stages
-        layer_pitch = pitch_ratio * step
+        layer_spacing = spacing_ratio * step
         right_count, left_count = math.floor(-span[0] / step), math.floor(span[1] / step)
         across = np.arange(-right_count, left_count + 1) * step
         layer_numbers = np.arange(
-            math.ceil((min_height - data.start[2]) / layer_pitch),
-            math.floor((max_height - data.start[2]) / layer_pitch) + 1,
+            math.ceil((min_height - data.start[2]) / layer_spacing),
+            math.floor((max_height - data.start[2]) / layer_spacing) + 1,
         )
         if stages <= 4 or (stages + 1) * across.size * max(1, layer_numbers.size) <= MAX_CELLS:
             return Grid(
                 stages,
                 np.asarray(across, np.float64),
-                np.asarray(data.start[2] + layer_numbers * layer_pitch, np.float64),
+                np.asarray(data.start[2] + layer_numbers * layer_spacing, np.float64),
             )
         stages = max(4, int(stages / 1.2))
 
@@ -601,7 +633,8 @@ def grid_route(
 
     earlier_routes: earlier routes, near which the cost is higher, so that the next route takes another side.
     expected_cost: cost bound to try first, such as the cost on a coarser grid; a search without a bound follows if it
-    fails. pause: as in `cheapest_route`.
+        fails.
+    pause: as in `cheapest_route`.
     """
     if grid.layers.size == 0:
         return None
@@ -618,7 +651,11 @@ def grid_route(
 
 
 def proximity_cost(along: Floats, across: Floats, earlier_routes: tuple[GridRoute, ...]) -> Floats:
-    """Return the additional cost per m near earlier routes, (s, y).  along: (s,) and across: (y,) positions, m."""
+    """Return the additional cost per m near earlier routes, (s, y).
+
+    along: (s,) positions along, m.
+    across: (y,) positions across, m.
+    """
     extra = np.zeros((along.size, across.size))
     width = max(ROUTE_SPACING_M, ROUTE_SPACING_STEPS * along[-1] / (along.size - 1))
     for route in earlier_routes:
@@ -636,7 +673,8 @@ def grid_routes(
 ) -> Iterator[GridRoute]:
     """Yield the routes of each grid, cheapest first.
 
-    grids: number of stages and number of different routes of each grid.  pause: as in `cheapest_route`.
+    grids: number of stages and number of different routes of each grid.
+    pause: as in `cheapest_route`.
     """
     expected_cost = EXPECTED_COST_RATIO * math.dist(data.start, data.destination)
     for stages, route_count in grids:

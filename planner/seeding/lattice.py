@@ -20,7 +20,7 @@ from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_limits
 from planner.evaluation.problem import ProblemArrays
 from planner.seeding.grids import to_world_position
-from planner.seeding.waypoint_fitting import leg_cost
+from planner.seeding.waypoint_fitting import penalised_leg_cost
 from world.arrays import Flags, Floats
 from world.by_reference import by_reference
 from world.kernels import Records, compiled, copy_into, inner
@@ -54,10 +54,14 @@ LATTICE_CELL = np.dtype([("along", np.int64), ("across", np.int64), ("layer", np
 class Lattice(NamedTuple):
     """Points in the rotated frame and layers of height.
 
-    step: spacing of the points, m. behind, right: points behind the start and to its right. along, across: number of
-    points.
-    goal: index along of the destination. low: height of the first layer, m. pitch: spacing of the layers, m.
-    layers: number of layers. start_layer, goal_layer: layers of the ends.
+    step: spacing of the points, m.
+    behind, right: number of points behind the start and to its right.
+    along, across: number of points.
+    goal: index along of the destination.
+    low: height of the first layer, m.
+    layer_spacing: m.
+    layers: number of layers.
+    start_layer, goal_layer: layers of the ends.
     """
 
     step: float
@@ -67,7 +71,7 @@ class Lattice(NamedTuple):
     across: int
     goal: int
     low: float
-    pitch: float
+    layer_spacing: float
     layers: int
     start_layer: int
     goal_layer: int
@@ -79,7 +83,7 @@ def _set_position(frame: RotatedFrame, lattice: Lattice, along: int, across: int
     out[0], out[1] = to_world_position(
         frame, (along - lattice.behind) * lattice.step, (across - lattice.right) * lattice.step
     )
-    out[2] = lattice.low + layer * lattice.pitch
+    out[2] = lattice.low + layer * lattice.layer_spacing
 
 
 @compiled
@@ -94,16 +98,18 @@ def _climb_layers(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) ->
         )
         horizontal_length = math.hypot(end[0] - start[0], end[1] - start[1])
         climb, dive = slope_limits(data, start, end)
-        layers[course, 0] = max(0, math.floor(math.tan(climb) * horizontal_length / lattice.pitch))
-        layers[course, 1] = max(0, math.floor(math.tan(dive) * horizontal_length / lattice.pitch))
+        layers[course, 0] = max(0, math.floor(math.tan(climb) * horizontal_length / lattice.layer_spacing))
+        layers[course, 1] = max(0, math.floor(math.tan(dive) * horizontal_length / lattice.layer_spacing))
     return layers
 
 
 class _StateTable(NamedTuple):
-    """State of the search, with a cost (m), parent and closed flag per state, and a feasible flag per step.
+    """Costs (m), parents and expanded flags of the search's states, and the feasibility of its steps.
 
     parents: the parent's number plus 1; 0 for an unreached state, whose cost is not set, and `_FIRST` for a state of
-    the start. layer_limits: (8, 2) maximum climb and descent in layers. steps: by cell, course and change of layer.
+        the start.
+    layer_limits: (8, 2) maximum climb and descent in layers.
+    steps: feasibility by cell, course and change of layer.
     """
 
     cost: Floats
@@ -124,9 +130,11 @@ def _expand_state(
     max_turn: int,
     open_states: list[tuple[float, int]],
 ) -> None:
-    """Expand a state: push each successor that the state reaches more cheaply than before to the open list.
+    """Expand a state: push each successor that it reaches more cheaply than before to the open list.
 
-    A successor is pushed with its cost plus its distance to the goal.  max_turn: in units of 45 degrees.
+    max_turn: in units of 45 degrees.
+
+    A successor is pushed with its cost plus its distance to the goal.
     """
     layer_limits, course, cell = table.layer_limits, state % 8, state // 8
     layer, position = cell % lattice.layers, cell // lattice.layers
@@ -157,7 +165,7 @@ def _expand_state(
             if table.steps[step_index] == _UNKNOWN:
                 is_free = (
                     _is_inside(data, end)
-                    and leg_cost(data, limits, start, end, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length
+                    and penalised_leg_cost(data, limits, start, end, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length
                 )
                 table.steps[step_index] = _FREE if is_free else _CLOSED
             if table.steps[step_index] == _FREE:
@@ -219,8 +227,9 @@ def continue_lattice_search(
 ) -> LatticeSearch:
     """Continue a search by up to `max_expansions` expansions, and return it.
 
-    The search has failed if its open list is empty.
     max_turn: largest turn per step, in units of 45 degrees.
+
+    The search has failed if its open list is empty.
     """
     limits, table, expanded_count = precompute_limits(data), search.table, search.expanded_count
     goal_cell = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
@@ -293,7 +302,7 @@ def simplify_route(data: ProblemArrays, points: Floats) -> Floats:
         for candidate_index in range(last_index, current_index + 1, -1):
             start, end = points[current_index], points[candidate_index]
             length = math.sqrt((end[0] - start[0]) ** 2 + (end[1] - start[1]) ** 2 + (end[2] - start[2]) ** 2)
-            if leg_cost(data, limits, start, end, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length:
+            if penalised_leg_cost(data, limits, start, end, MAX_COST_RATIO * length) <= MAX_COST_RATIO * length:
                 next_index = candidate_index
                 break
         current_index = next_index
@@ -335,7 +344,7 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     """Return a lattice over the whole map, with points at both ends.
 
     step: maximum spacing of the points, m; it is increased if the lattice would have more than `MAX_LATTICE_STATES`
-    states.
+        states.
     """
     corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
     min_corner, max_corner = frame.to_frame(corners)[:, :2].min(axis=0), frame.to_frame(corners)[:, :2].max(axis=0)
@@ -345,18 +354,28 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     stages = max(1, math.ceil(frame.length / step))
     while True:
         step = frame.length / stages
-        pitch = gentler_slope * step / LAYERS_PER_STEP
+        layer_spacing = gentler_slope * step / LAYERS_PER_STEP
         behind, right = math.floor(-min_corner[0] / step), math.floor(-min_corner[1] / step)
         along, across = behind + math.floor(max_corner[0] / step) + 1, right + math.floor(max_corner[1] / step) + 1
-        layers_below = max(0, math.floor((data.start[2] - min_height) / pitch))
-        layers = layers_below + max(0, math.floor((data.ceiling - data.start[2]) / pitch)) + 1
+        layers_below = max(0, math.floor((data.start[2] - min_height) / layer_spacing))
+        layers = layers_below + max(0, math.floor((data.ceiling - data.start[2]) / layer_spacing)) + 1
         if stages == 1 or along * across * layers * 8 <= MAX_LATTICE_STATES:
             break
         stages -= 1
-    goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / pitch) + layers_below))
-    first_height = data.start[2] - layers_below * pitch
+    goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / layer_spacing) + layers_below))
+    first_height = data.start[2] - layers_below * layer_spacing
     return Lattice(
-        step, behind, right, along, across, behind + stages, first_height, pitch, layers, layers_below, goal_layer
+        step,
+        behind,
+        right,
+        along,
+        across,
+        behind + stages,
+        first_height,
+        layer_spacing,
+        layers,
+        layers_below,
+        goal_layer,
     )
 
 
@@ -368,9 +387,12 @@ def cheapest_lattice_route(
     max_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Records, int]:
-    """Return the cheapest route as `LATTICE_CELL` records (none if there is no route), and the expanded states' number.
+    """Return `LATTICE_CELL` records of the cheapest route, and the number of expanded states.
 
-    max_turn: largest turn per step, in units of 45 degrees. max_states: maximum number of expanded states.
+    max_turn: largest turn per step, in units of 45 degrees.
+    max_states: maximum number of expanded states.
+
+    There are no records if there is no route.
     """
     search = begin_lattice_search(data, frame, lattice)
     while search.goal_state < 0 and len(search.states) and search.expanded_count < max_states:
@@ -392,8 +414,11 @@ def lattice_route(
 ) -> tuple[Floats, int]:
     """Find a route over a lattice; return its points, (k, 3) m, and the number of expanded states.
 
-    step: spacing of the lattice, m. pause: called after every `STATES_PER_PAUSE` states; an exception raised there
-    stops the search. max_states: maximum number of expanded states. If there is no route, k is 0.
+    step: spacing of the lattice, m.
+    pause: called after every `STATES_PER_PAUSE` states; an exception raised there stops the search.
+    max_states: maximum number of expanded states.
+
+    If there is no route, k is 0.
     """
     lattice = make_lattice(data, frame, step)
     # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
@@ -402,7 +427,7 @@ def lattice_route(
     if not len(cells):
         return np.empty((0, 3)), expanded_count
     positions = np.column_stack([cells["along"], cells["across"]]) * lattice.step
-    heights = lattice.low + cells["layer"] * lattice.pitch
+    heights = lattice.low + cells["layer"] * lattice.layer_spacing
     points = frame.to_world(np.column_stack([positions, heights]))
     points[0], points[-1] = data.start, data.destination
     return np.asarray(simplify_route(data, np.ascontiguousarray(points))), expanded_count
@@ -411,14 +436,14 @@ def lattice_route(
 def ceiling_route(
     data: ProblemArrays, frame: RotatedFrame, step: float, depth: float, pause: Callable[[], None] = lambda: None
 ) -> Floats:
-    """Return world points (k, 3) of a route at the height of the ceiling, where spheres on the ground are smallest.
+    """Return world points (k, 3) of a route at the altitude of the ceiling; (0, 3) without a route.
 
-    It climbs to the ceiling at its start and leaves it at its destination, however steeply, because a lattice of one
-    layer is searched in milliseconds. Return (0, 3) points without a route.
-
-    step: m.
+    step: spacing of the lattice, m.
     depth: depth to which the route may enter missiles' spheres, m.
     pause: see `lattice_route`.
+
+    Spheres on the ground are smallest at the ceiling. The route climbs to the ceiling at its start and leaves it at its
+    destination, however steeply, because a lattice of one layer is searched in milliseconds.
     """
     start, destination = (np.array([*end[:2], data.ceiling]) for end in (data.start, data.destination))
     for end in (start, destination):

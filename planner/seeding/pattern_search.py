@@ -97,12 +97,13 @@ def search_patterns(
     evaluations: int,
     must_end: Callable[[], bool] = lambda: False,
 ) -> tuple[Floats, int]:
-    """Shorten a path of the rotated encoding.
+    """Shorten a path of the rotated encoding; return vectors (k, d) and the number of evaluations.
 
-    Return vectors (k, d) and the number of evaluations. The vectors are the best feasible vector, if any, and the
-    vector with the lowest merit, if that is another one.
-    vector: (d,). evaluations: maximum number. must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; True
-    ends the search with its present result.
+    vector: (d,).
+    evaluations: maximum number of evaluations.
+    must_end: called after every `EVALUATIONS_PER_PAUSE` evaluations; True ends the search with its present result.
+
+    The vectors are the best feasible vector, if any, and the vector with the lowest merit, if that is another one.
     """
     frames = require_frames(encoding)
     inner_count = encoding.waypoints - 2
@@ -144,7 +145,10 @@ def merits(scores: Floats) -> Floats:
 
 @cache
 def _triangular_basis(inner_count: int) -> tuple[Floats, Ints]:
-    """Return triangular moves of 1, 2, 4, ... waypoints half-width, (k, 3 inner_count), and the axis of each, (k,)."""
+    """Return triangular moves of waypoints, (k, 3 inner_count), and the axis of each, (k,).
+
+    The half-widths of the triangles are 1, 2, 4, ... waypoints.
+    """
     moves: list[Floats] = []
     axes: list[int] = []
     positions = np.arange(inner_count, dtype=np.float64)
@@ -213,7 +217,10 @@ def _evaluate_merit(
 
 @inner
 def _merit_of_scores(violations: Record, objectives: Record) -> tuple[float, bool]:
-    """Return the merit of scores (the length ratio plus prices of violations), and True if nothing is violated."""
+    """Return the merit of scores, and True if nothing is violated.
+
+    The merit is the length ratio plus prices of violations.
+    """
     price, is_feasible = EXPOSURE_PRICE * objectives.kill_exposure, True
     if objectives.kill_exposure > 0.0:
         price += ANY_EXPOSURE_PRICE
@@ -256,7 +263,7 @@ def _begin_search(data: ProblemArrays, frames: WaypointFrames, start: Floats, st
 def _fill_trial(
     box: _Box, moves: Floats, k: int, steps: Floats, round_start: Floats, vector: Floats, trial: Floats
 ) -> None:
-    """Fill a trial (d,) with the vector after move k, clipped to the box.
+    """Fill a trial vector (d,) with the vector after move k, clipped to the box.
 
     For the number after the last move, the displacement of the whole round is repeated instead.
     """
@@ -276,8 +283,9 @@ def _continue_search(
     pause_count: int,
     max_evaluations: int,
 ) -> _State:
-    """Continue a search with moves (k, d) until `pause_count` evaluations, or to its end at `max_evaluations`.
+    """Continue a search until `pause_count` evaluations, or to its end at `max_evaluations`.
 
+    moves: (k, d).
     initial_steps: (k,) initial steps of the moves.
     """
     best_vector, best_merit, feasible_vector, feasible_merit, round_start, steps, move, has_moved, evaluations, _ = (

@@ -52,7 +52,7 @@ MIN_MOVE_M = 0.05
 def _newton_step(
     path: Floats, min_corner: Floats, max_corner: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:
-    """Fill `step` (n,) with the Newton step from a path within its box; return the step's largest component, m."""
+    """Fill `step` (n,) with the Newton step of a path within its box; return its largest component, m."""
     size = step.size
     for row in range(size):
         model.band[row, 0] += HESSIAN_DAMPING_PER_M
@@ -78,7 +78,12 @@ def _newton_step(
 
 
 class Shortening(NamedTuple):
-    """State: path (w, 3) m, active constraints, their multipliers, rounds done, models evaluated, and `corners_too`."""
+    """State of a shortening: path, active constraints, multipliers, and the work done.
+
+    path: (w, 3) m.
+    rounds, models: number of rounds done and of models evaluated.
+    corners_too: see `active_constraints`.
+    """
 
     path: Floats
     active: ActiveConstraints
@@ -94,14 +99,15 @@ def begin_shortening(
 ) -> Shortening:
     """Return a new shortening of a path (w, 3) m, before its first round.
 
-    samples: number of ground samples on each leg. extra_margin: additional margin to spheres and ground, m.
+    samples: number of ground samples on each leg.
+    extra_margin: additional margin to spheres and ground, m.
     corners_too: see `active_constraints`.
     """
     active = active_constraints(data, path, samples, extra_margin, corners_too)
     return Shortening(path.copy(), active, np.zeros(constraint_count(active)), 0, 0, corners_too)
 
 
-class _Descent(NamedTuple):
+class _DescentScratch(NamedTuple):
     """Scratch of a round's steps: corners (3,) of the box, model, matrix factor, step and trial path."""
 
     min_corner: Floats
@@ -119,7 +125,7 @@ def continue_shortening(
     """Continue a shortening by up to `max_rounds` rounds, and return it."""
     path, active, multipliers, round_number, models, corners_too = shortening
     limits, size = precompute_limits(data), 3 * (path.shape[0] - 2)
-    descent = _Descent(
+    descent = _DescentScratch(
         np.array([data.west, data.south, data.floor]),
         np.array([data.east, data.north, data.ceiling]),
         LagrangianModel(np.zeros(size), np.zeros((size, HESSIAN_HALF_BANDWIDTH)), np.zeros((4, 3))),
@@ -151,11 +157,11 @@ def _descend(
     multipliers: Floats,
     values: Floats,
     penalty: float,
-    descent: _Descent,
+    descent: _DescentScratch,
 ) -> int:
-    """Minimise the merit of a path (w, 3) in place, and fill `values` with the final values of the constraints.
+    """Minimise the merit of a path (w, 3) in place; return the number of models evaluated.
 
-    Returns the number of models evaluated.
+    values: filled with the final values of the constraints.
     """
     min_corner, max_corner, model, step, trial = (
         descent.min_corner,
@@ -196,7 +202,7 @@ def _descend(
 # --- Shortening a path ---
 
 # Spacing of ground samples on the mean leg, m.
-SAMPLE_PITCH_M = 30.0
+SAMPLE_SPACING_M = 30.0
 # Minimum number of ground samples per leg.
 MIN_SAMPLES = 6
 # Maximum number of ground samples per leg.
@@ -217,11 +223,13 @@ def shorten_path(
     corners_too: bool = False,
     pause: Callable[[], None] = lambda: None,
 ) -> tuple[Floats, int]:
-    """Shorten a path (w, 3) world m, or reduce its violations; also return the number of models evaluated.
+    """Shorten a path (w, 3), or reduce its violations; return it and the number of models evaluated.
 
-    A model is one evaluation. extra_margin: additional margin to spheres and ground, m. pause: called after some
-    milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
+    extra_margin: additional margin to spheres and ground, m.
     corners_too: True to constrain the height and slope of corners as flown, too, which is slower.
+    pause: called after some milliseconds of work; an exception raised there stops it.
+
+    A model counts as one evaluation. Zones and the maximum height above ground are ignored.
 
     >>> from planfly.workflow.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -234,7 +242,7 @@ def shorten_path(
     ((10, 3), True)
     """
     mean_length = math.dist(path[0], path[-1]) / (len(path) - 1)
-    samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean_length / SAMPLE_PITCH_M))))
+    samples = int(min(MAX_SAMPLES, max(MIN_SAMPLES, math.ceil(mean_length / SAMPLE_SPACING_M))))
     rounds = max(1, PAIRS_PER_PAUSE // (len(path) * max(1, len(data.missiles.missiles))))
     start = np.array(path, dtype=np.float64)
     # A grid's route ends at the height of a layer.

@@ -19,7 +19,7 @@ from planner.evaluation.corners import (
     LEG,
     SETTLING_FRACTION,
     SETTLING_LENGTH_M,
-    courses_at,
+    courses_at_waypoint,
     measure_corner,
     measure_corners,
     measure_legs,
@@ -34,15 +34,15 @@ from planner.seeding.flown_corners import (
     NEAR_GROUND_HEIGHT_M,
     SAMPLES_PER_CORNER,
     FlownCorners,
-    arc_room,
-    arc_room_slopes,
+    corner_derivatives,
     corner_point,
-    corner_slopes,
     corners_near_ground,
-    ground_slopes,
     height_above_required,
+    height_derivatives,
     leg_index,
     no_corners,
+    spare_arc_length,
+    spare_length_derivatives,
 )
 from world.arrays import Floats, Ints
 from world.frames import polymap
@@ -63,13 +63,17 @@ MAX_TURN_LENGTH_M = 1e4
 
 
 class ActiveConstraints(NamedTuple):
-    """Active constraints of a path of w waypoints in one round, linearised at the path with which the round began.
+    """Active constraints of a path of w waypoints, linearised at the path with which a round began.
 
-    pairs: (p, 2) leg and missile near it. distances: (p,) required (m) from the missile's centre.
-    samples: number of ground samples on each leg. low: (w - 1,) height required above the clearance, m.
-    climb, dive: (w - 1,) tangents. before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent
-    of half the turn. roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
-    turns_in_legs: True if legs must hold their turns. turn_margin: length of a leg in addition to its turns, m.
+    pairs: (p, 2) leg and missile near it.
+    distances: (p,) required distance from the missile's centre, m.
+    samples: number of ground samples on each leg.
+    low: (w - 1,) height required above the clearance, m.
+    climb, dive: (w - 1,) tangents of the slope limits.
+    before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent of half the turn.
+    roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
+    turns_in_legs: True if legs must hold their turns.
+    turn_margin: length of a leg in addition to its turns, m.
     flown: the corners that are flown near the ground, or almost as steeply as can be.
     """
 
@@ -91,11 +95,12 @@ class ActiveConstraints(NamedTuple):
 def active_constraints(
     data: ProblemArrays, path: Floats, samples: int, extra_margin: float, corners_too: bool
 ) -> ActiveConstraints:
-    """Return active constraints near a path (w, 3).
+    """Return the active constraints near a path (w, 3).
 
+    samples: number of ground samples on each leg.
     extra_margin: additional margin to spheres and ground, m.
-    corners_too: True to constrain the height and slope of flown corners, too; legs then keep twice
-    the additional margin in addition to their turns.
+    corners_too: True to constrain the height and slope of flown corners, too; legs then keep twice the additional
+        margin in addition to their turns.
     """
     limits = precompute_limits(data)
     count = path.shape[0] - 1
@@ -132,11 +137,11 @@ def _fill_turn_lengths(
 ) -> None:
     """Fill the lengths of the legs before and after each waypoint that its turn takes up, (w,) each.
 
-    The lengths are divided by the tangent of half the turn.
+    The lengths (m) are divided by the tangent of half the turn.
     """
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
-        ux, uy, vx, vy = courses_at(data, legs, i)
+        ux, uy, vx, vy = courses_at_waypoint(data, legs, i)
         cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
         turn = math.atan2(abs(cross), dot)
         if i in (0, path.shape[0] - 1) and turn == 0.0:
@@ -159,7 +164,7 @@ def _fill_turn_lengths(
 def _find_near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, extra_margin: float
 ) -> tuple[Ints, Floats]:
-    """Return pairs of a leg and a missile near it, (p, 2), and the required distance from each centre, m, (p,)."""
+    """Return pairs of a leg and a missile near it, (p, 2), and the required centre distances, m, (p,)."""
     missiles = data.missiles.missiles
     pairs, distances = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
     for k in range(missiles.shape[0]):
@@ -199,7 +204,7 @@ def constraint_count(active: ActiveConstraints) -> int:
 def carry_multipliers(
     previous_active: ActiveConstraints, multipliers: Floats, next_active: ActiveConstraints
 ) -> Floats:
-    """Return the multipliers of the next active constraints, taken from the same constraints of the previous round.
+    """Return the multipliers of the next active constraints, taken from those of the previous round.
 
     A new pair of leg and missile gets the multiplier 0.
     """
@@ -333,7 +338,10 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Add the distances of legs from missiles, the first constraints, and return their contribution to the merit."""
+    """Add the distances of legs from missiles to the model; return their contribution to the merit.
+
+    They are the first constraints. The parameters are those of `lagrangian`.
+    """
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(active.pairs.shape[0]):
         i, missile = active.pairs[p, 0], missiles[active.pairs[p, 1]]
@@ -365,9 +373,11 @@ def _add_ground(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add one ground-clearance constraint for each leg sample, numbered from `first_number`.
+    """Add a ground-clearance constraint for each sample of a leg; return their contribution to the merit.
 
-    Its value is the height above the required clearance, m. Parameters and result are those of `_add_missiles`.
+    first_number: number of the first of these constraints.
+
+    The value of a constraint is the height above the required clearance, m.
     """
     merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
     for i in range(path.shape[0] - 1):
@@ -381,7 +391,7 @@ def _add_ground(
             number = first_number + i * active.samples + k
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
-                ground_slopes(data, x, y, slopes[0])
+                height_derivatives(data, x, y, slopes[0])
                 for axis in range(3):
                     slopes[1, axis] = fraction * slopes[0, axis]
                     slopes[0, axis] *= 1.0 - fraction
@@ -401,9 +411,11 @@ def _add_corners(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the heights of flown corners above the required height, and the lengths of steep arcs.
+    """Add the heights of flown corners and lengths of steep arcs; return their contribution to the merit.
 
-    Constraints are numbered from `first_number`. Parameters and result are those of `_add_missiles`.
+    first_number: number of the first of these constraints.
+
+    The heights are above the required height (m), the lengths beyond the length that the arc needs (m).
     """
     merit, point, ground_gradient, corner = 0.0, np.empty(3), np.empty(3), np.empty((3, 3))
     for i in range(1, path.shape[0] - 1):
@@ -419,8 +431,8 @@ def _add_corners(
             value = height_above_required(data, limits, point) - flown.lowered[i, leg_index(k)]
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
-                ground_slopes(data, point[0], point[1], ground_gradient)
-                corner_slopes(data, corner, radius, k, ground_gradient, point, model.slopes)
+                height_derivatives(data, point[0], point[1], ground_gradient)
+                corner_derivatives(data, corner, radius, k, ground_gradient, point, model.slopes)
             merit += _add_constraint(value, i - 1, 3, multipliers[number], penalty, model)
         for k in range(2):
             number, radius = first_number + path.shape[0] * SAMPLES_PER_CORNER + 2 * i + k, flown.steep_radii[i]
@@ -428,10 +440,10 @@ def _add_corners(
             if radius <= 0.0:
                 continue
             sign, max_slope = 1.0 - 2.0 * k, flown.slopes[i, k]
-            value = arc_room(corner[0], corner[1], corner[2], radius, sign, max_slope) - flown.slope_margin
+            value = spare_arc_length(corner[0], corner[1], corner[2], radius, sign, max_slope) - flown.slope_margin
             values[number] = value
             if multipliers[number] - penalty * value > 0.0:
-                arc_room_slopes(corner, radius, sign, max_slope, model.slopes)
+                spare_length_derivatives(corner, radius, sign, max_slope, model.slopes)
             merit += _add_constraint(value, i - 1, 3, multipliers[number], penalty, model)
     return merit
 
@@ -446,7 +458,12 @@ def _add_slopes(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add the slope margins of legs, as m of height, and the lengths of legs above the minimum; see `_add_ground`."""
+    """Add the slope margins and minimum lengths of legs; return their contribution to the merit.
+
+    first_number: number of the first of these constraints.
+
+    Slope margins are expressed as m of height, lengths as m above the minimum.
+    """
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
         dx, dy, altitude_change = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
@@ -481,7 +498,10 @@ def _add_turns(
     model: LagrangianModel,
     first_number: int,
 ) -> float:
-    """Add turn margins, and the lengths of legs that remain between their turns; see `_add_ground`."""
+    """Add turn margins and the lengths of legs between turns; return their contribution to the merit.
+
+    first_number: number of the first of these constraints.
+    """
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn = np.zeros(count + 1)
     before_derivatives, after_derivatives = np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
@@ -528,7 +548,7 @@ def _add_turns(
 
 @inner
 def _add_turn_derivatives(before_derivatives: Floats, after_derivatives: Floats, factor: float, slopes: Floats) -> None:
-    """Add a multiple of a turn's derivatives to `slopes` (3, 3), the derivatives with respect to three waypoints.
+    """Add a multiple of a turn's derivatives to `slopes` (3, 3), the derivatives by three waypoints.
 
     before_derivatives, after_derivatives: derivatives of the turn with respect to the legs before and after it, (2,).
     """
@@ -549,9 +569,12 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:
-    """Return the augmented Lagrangian of a path (w, 3), m: its length or cost plus the terms of its constraints.
+    """Return the augmented Lagrangian of a path (w, 3), m: length or cost plus the terms of constraints.
 
-    values: filled with the values of the constraints.  model: filled with gradient and Hessian.
+    multipliers: multipliers of the constraints.
+    values: filled with the values of the constraints.
+    penalty: weight of the squared violations, per m.
+    model: filled with gradient and Hessian.
     """
     model.gradient[:], model.band[:] = 0.0, 0.0
     first_number = active.pairs.shape[0]

@@ -69,13 +69,13 @@ def _relax_stage_back(
     spans: Records,
     step_layers: Records,
     step: float,
-    pitch: float,
+    layer_spacing: float,
     ratio: float,
 ) -> None:
-    """Compute the costs of the routes from the cells of a stage to the destination from the costs of the next stage.
+    """Compute the costs to the destination from a stage's cells from those of the next stage.
 
     goal_costs, previous_goal_costs: (layers, across) costs from the cells of the next stage and of this stage.
-    spans: `SPAN` records (layers,) of the cells before it that are within the bound.
+    spans: `SPAN` records (layers,) of this stage's cells that are within the bound.
     """
     layer_count, width = goal_costs.shape
     flat_goal_costs, flat_previous, flat_successors, flat_cell_costs = (
@@ -95,7 +95,7 @@ def _relax_stage_back(
             limit = step_layers[side + MAX_SIDE, z]
             bottom, top = max(0, z - limit.sink), min(layer_count - 1, z + limit.climb)
             for next_z in range(bottom, top + 1):
-                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * pitch) ** 2)
+                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((next_z - z) * layer_spacing) ** 2)
                 source, target = z * width + first_cell, next_z * width + first_cell + side
                 relax_cells(
                     flat_goal_costs,
@@ -147,8 +147,9 @@ CELLS_PER_PAUSE = 100_000
 def grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float, pause: Callable[[], None] = lambda: None
 ) -> GridCosts:
-    """Return the costs of the cheapest partial routes over a grid, from start and to destination, up to a bound.
+    """Return the costs of the cheapest partial routes over a grid, from the start and to the destination.
 
+    bound: upper limit on the cost of a whole route.
     pause: called after every `CELLS_PER_PAUSE` cells; an exception raised there stops the search.
     """
     stages = max(1, CELLS_PER_PAUSE // (grid.across.size * grid.layers.size))
@@ -190,7 +191,7 @@ def continue_grid_costs(
     """Continue a search by up to `max_stages` stages, or end it if no route can continue, and return it."""
     stages, width, layer_count = grid.stages, grid.across.size, grid.layers.size
     step, required = frame.length / stages, required_clearance(data)
-    pitch = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
+    layer_spacing = grid.layers[1] - grid.layers[0] if layer_count > 1 else 1.0
     costs, step_layers, obstacles, cell_costs, spans, centre_index, goal, done = search
     start_costs, parents, goal_costs, successors = costs
     height_differences, goal_distances, extra = (
@@ -219,7 +220,7 @@ def continue_grid_costs(
                 step_layers,
                 cell_costs[stage],
                 step,
-                pitch,
+                layer_spacing,
                 grid.ratio,
             )
             fill_goal_distances(width, centre_index, stages - stage, step, grid.ratio, goal_distances)
@@ -237,7 +238,7 @@ def continue_grid_costs(
             spans[stage],
             step_layers,
             step,
-            pitch,
+            layer_spacing,
             grid.ratio,
         )
         _drop_cells_above_bound(start_costs[stage], goal_costs[stage], spans[stage], bound)
@@ -246,7 +247,10 @@ def continue_grid_costs(
 
 @inlined
 def passing_side(lateral_offset: float, vertical_offset: float) -> int:
-    """Return the side of a point, given its offsets to the left of an obstacle's centre and above it, m."""
+    """Return the side on which a point passes an obstacle.
+
+    lateral_offset, vertical_offset: offsets of the point to the left of the obstacle's centre and above it, m.
+    """
     if abs(lateral_offset) >= abs(vertical_offset):
         return LEFT if lateral_offset >= 0.0 else RIGHT
     return OVER if vertical_offset > 0.0 else UNDER
@@ -256,7 +260,7 @@ def passing_side(lateral_offset: float, vertical_offset: float) -> int:
 def cheapest_passings(costs: GridCosts, grid: Grid, obstacles: Records, step: float) -> Records:
     """Return the cheapest route past each `OBSTACLE` on each side, as `PASSING` records (obstacles, 4).
 
-    The sides are those of `passing_side`.  A route passes an obstacle at the stage nearest to the obstacle's centre; an
+    The sides are those of `passing_side`. A route passes an obstacle at the stage nearest to the obstacle's centre; an
     obstacle beyond the ends of the grid has no routes, which is a cost of inf.
     """
     passings = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
@@ -299,7 +303,7 @@ SAME_ROUTE_DISTANCE_M = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
-    """Return the side on which a route passes each obstacle, (k,); -1 for an obstacle beyond the route's ends.
+    """Return the side on which a route passes each obstacle, (k,); -1 beyond the route's ends.
 
     points: (s, 3) along, across, up, m.
 
@@ -331,10 +335,14 @@ def side_routes(
     max_routes: int,
     pause: Callable[[], None] = lambda: None,
 ) -> list[GridRoute]:
-    """Return up to `max_routes` routes with different sides and a cost of at most `bound`, cheapest first.
+    """Return routes that pass the obstacles on different sides, cheapest first.
+
+    bound: upper limit on the cost.
+    max_routes: maximum number of routes.
+    pause: as in `grid_costs`.
 
     Each route is the cheapest that passes one obstacle on one side; the first route is the cheapest of all. Among
-    routes close to each other, only the cheapest is returned. pause: as in `grid_costs`.
+    routes close to each other, only the cheapest is returned.
     """
     if grid.layers.size == 0:
         return []
@@ -371,7 +379,9 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """Return a grid with smaller kill spheres, and with ground from a smaller area around each cell; see `Grid`.
+    """Return a grid with smaller kill spheres, and with ground from a smaller area around each cell.
+
+    shrink, spread, ratio: see `Grid`.
 
     Its highest layer is the ceiling, where spheres on the ground are smallest.
     """
@@ -380,10 +390,13 @@ def optimistic_grid(
     across = np.arange(math.ceil(span[0] / step), math.floor(span[1] / step) + 1) * step
     layers, start = square_grid.layers, data.start[2]
     if data.ceiling > start and layers.size > 1:
-        pitch = (data.ceiling - start) / math.ceil((data.ceiling - start) / (layers[1] - layers[0]))
+        layer_spacing = (data.ceiling - start) / math.ceil((data.ceiling - start) / (layers[1] - layers[0]))
         layers = (
             start
-            + np.arange(-math.floor((start - layers[0]) / pitch), round((data.ceiling - start) / pitch) + 1) * pitch
+            + np.arange(
+                -math.floor((start - layers[0]) / layer_spacing), round((data.ceiling - start) / layer_spacing) + 1
+            )
+            * layer_spacing
         )
     return square_grid._replace(
         across=np.asarray(across, np.float64), layers=layers, shrink=shrink, spread=spread, ratio=ratio

@@ -16,7 +16,7 @@ from planner.evaluation.corners import CORNER, measure_corner
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance
 from planner.evaluation.threat_index import kill_density
-from planner.seeding.waypoint_fitting import COST_ROUNDING_M, leg_cost
+from planner.seeding.waypoint_fitting import COST_ROUNDING_M, penalised_leg_cost
 from world.arrays import Flags, Floats, Ints
 from world.frames import polymap
 from world.kernels import Records, compiled, inlined, inner
@@ -77,8 +77,9 @@ def waypoint_chains(
     """Return the best path through each candidate of each waypoint.
 
     candidates: (w, k, 3) m; only the first candidate of each end is used.
-    bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_PER_PAUSE`
-    legs; an exception raised there stops the work. max_legs: if more legs have to be evaluated, no path is returned.
+    bound: upper limit on the cost of a path, m; pruning by it saves time.
+    pause: called after every `LEGS_PER_PAUSE` legs; an exception raised there stops the work.
+    max_legs: if more legs have to be evaluated, no path is returned.
     """
     count, width, _ = candidates.shape
     legs = np.zeros((count - 1, width, width))
@@ -102,9 +103,10 @@ def waypoint_chains(
 def _advance_sweeps(
     data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, max_legs: int
 ) -> bool:
-    """Continue both sweeps from the cursor until `max_legs` legs have been evaluated; return True if both are done.
+    """Continue both sweeps until `max_legs` legs have been evaluated; return True if both are done.
 
-    legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative. cursor: a `_CURSOR` record (1,).
+    legs: (w - 1, k, k) costs, filled on demand; a lower bound is negative.
+    cursor: a `_CURSOR` record (1,), at which the sweeps continue.
     """
     count, width, _ = candidates.shape
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
@@ -149,7 +151,7 @@ def _advance_sweeps(
 
 @compiled
 def _costs_through(data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps) -> Floats:
-    """Return the cost of the best path through each candidate, including the turn there; inf above the bound."""
+    """Return the cost of the best path through each candidate, with its turn there; inf above the bound."""
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
     cost = sweeps.forward + sweeps.backward
     for i in range(1, candidates.shape[0] - 1):
@@ -180,11 +182,14 @@ def _extend_paths(
     lower_bounds: Floats,
     corners: Records,
 ) -> int:
-    """Extend partial paths with costs (w, k) to candidate k of waypoint i, and return the number of legs evaluated.
+    """Extend partial paths to candidate k of waypoint i; return the number of legs evaluated.
 
-    step: 1 for paths from the start, -1 from the destination. link: (w, k) neighbouring candidate of each partial path.
-    max_cost: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial
-    paths. lower_bounds, corners: scratch.
+    step: 1 for paths from the start, -1 for paths from the destination.
+    cost: (w, k) costs of the partial paths.
+    link: (w, k) neighbouring candidate of each partial path.
+    max_cost: upper limit on the cost of a partial path.
+    open_ends: candidates of the previous waypoint with partial paths.
+    lower_bounds, corners: scratch.
     """
     previous, evaluated_count, point = i - step, 0, candidates[i, k]
     if not max_cost > 0.0 or open_ends.size == 0:
@@ -213,7 +218,7 @@ def _extend_paths(
             if not cost[previous, j] - leg + turn_cost < min(cost[i, k], max_cost):
                 continue
             max_leg_cost = min(cost[i, k], max_cost) - cost[previous, j] - turn_cost + COST_ROUNDING_M
-            leg = leg_cost(
+            leg = penalised_leg_cost(
                 data,
                 limits,
                 candidates[min(i, previous), first_candidate],
@@ -250,7 +255,7 @@ def _corner_cost(
     next_waypoint: Floats,
     corners: Records,
 ) -> float:
-    """Return the cost of a waypoint's turn beyond the limit, and of legs that are too short for the turn, m of path.
+    """Return the cost of a turn beyond the limit, and of legs that are too short for it, m of path.
 
     corners: scratch, one record.
     """
@@ -288,7 +293,7 @@ def _corner_cost(
 
 @compiled
 def free_points(data: ProblemArrays, points: Floats) -> Flags:
-    """Return a mask of the points that are on the map, above the clearance and outside all kill spheres, (n,).
+    """Return a mask (n,): True where a point is on the map, above the clearance and outside kill spheres.
 
     points: (n, 3) m.
 

@@ -1,8 +1,8 @@
 """Fit waypoints to a route by dynamic programming over candidate points, with evaluation of whole legs.
 
 `fit_points` chooses one candidate per interval so that the sum of leg costs is smallest, then repeats this with
-candidates around each chosen waypoint and shrinking moves. `tighten` applies the same moves to a path of the rotated
-encoding. Turns are not part of the cost.
+candidates around each chosen waypoint and shrinking moves. `move_all_waypoints` applies the same moves to a path of the
+rotated encoding. Turns are not part of the cost.
 """
 
 import math
@@ -30,8 +30,8 @@ COST_ROUNDING_M = 1e-3
 
 
 @inner
-def leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, max_cost: float) -> float:
-    """Return the cost of one leg, its length and its violations, in m of path.
+def penalised_leg_cost(data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, max_cost: float) -> float:
+    """Return the length of a leg plus the costs of its violations, m of path.
 
     If the cost exceeds `max_cost`, the evaluation ends and returns a lower bound that exceeds `max_cost`.
     """
@@ -98,7 +98,7 @@ def _max_depth_below_leg(
     start_altitude: float,
     end_altitude: float,
 ) -> float:
-    """Return the largest distance of the aircraft below a long leg, m; negative if the aircraft is always above it.
+    """Return the largest distance of the aircraft below a long leg, m; negative if it is always above.
 
     east, north: unit course of the leg.
     """
@@ -113,7 +113,7 @@ def _max_depth_below_leg(
 def _choose_candidates(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:
     """Choose one of the candidates (w, c, 3) of each waypoint to minimise the sum of leg costs.
 
-    Return the chosen candidates and the number of legs evaluated.
+    Return the chosen candidates (w,) and the number of legs evaluated.
     """
     count, width, _ = candidates.shape
     parents = np.zeros((count, width), dtype=np.int64)
@@ -137,7 +137,7 @@ def _choose_candidates(data: ProblemArrays, candidates: Floats) -> tuple[Ints, i
                 lower_bounds[j] = np.inf
                 evaluated += 1
                 max_cost = next_cost[k] - cost[j] + COST_ROUNDING_M
-                total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b, max_cost)
+                total = cost[j] + penalised_leg_cost(data, limits, candidates[i - 1, j], b, max_cost)
                 if total < next_cost[k]:
                     next_cost[k] = total
                     parents[i, k] = j
@@ -193,9 +193,11 @@ def fit_waypoints(
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE_FIT) -> Floats:
-    """Choose waypoints among candidate points, move them locally, and return them with both ends, (w, 3) m.
+    """Choose waypoints among candidate points and move them locally; return them with both ends, (w, 3).
 
-    points: (w - 2, k, 3) candidates of each inner waypoint, in its frame.
+    points: (w - 2, k, 3) candidates of each inner waypoint, in its frame, m.
+
+    The returned waypoints are world positions, m.
     """
     inner_count, width, _ = points.shape
     candidates = np.zeros((inner_count + 2, width * len(fit.lifts), 3))
@@ -204,14 +206,18 @@ def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit:
     chosen, _ = _pick_candidates(data, frames, candidates)
     steps = _NEIGHBOURS if fit.diagonal else _AXIS_NEIGHBOURS
     moved, _ = _move_waypoints(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), MOVE_FACTOR)
-    return _to_world(frames, moved[:, None])[:, 0]
+    return _candidates_to_world(frames, moved[:, None])[:, 0]
 
 
-def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
-    """Shorten a path of the rotated encoding by moves of all its waypoints at once, evaluating single legs.
+def move_all_waypoints(
+    data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float
+) -> tuple[Floats, int]:
+    """Shorten a path of the rotated encoding by moves of all its waypoints at once.
 
-    vector: (d,). scale: initial moves relative to `FIRST_MOVES`. Turns are not evaluated. Returns the new
-    vector and the equivalent number of path evaluations.
+    vector: (d,).
+    scale: initial moves relative to `FIRST_MOVES`.
+
+    Single legs are evaluated, turns are not. Returns the new vector and the equivalent number of path evaluations.
     """
     frames = require_frames(encoding)
     path = np.zeros((encoding.waypoints, 3))
@@ -251,17 +257,23 @@ def _move_waypoints(
 
 
 def _pick_candidates(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
-    """Return the chosen candidates (w, 3) in their frames, with fixed ends, and the number of legs evaluated."""
+    """Return the best candidate of each waypoint (w, 3), in its frame, and the number of legs evaluated.
+
+    The ends are fixed.
+    """
     inner_count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
     for end, point, neighbour_index in ((0, data.start, 0), (-1, data.destination, inner_count - 1)):
         candidates[end] = frames.to_frame(np.tile(point, (inner_count, 1)))[neighbour_index]
-    chosen_indices, leg_count = _choose_candidates(data, np.ascontiguousarray(_to_world(frames, candidates)))
+    chosen_indices, leg_count = _choose_candidates(data, np.ascontiguousarray(_candidates_to_world(frames, candidates)))
     return candidates[np.arange(len(candidates)), chosen_indices], int(leg_count)
 
 
-def _to_world(frames: WaypointFrames, candidates: Floats) -> Floats:
-    """Return the world positions of candidates (w, c, 3); an end is in the frame of the waypoint next to it."""
+def _candidates_to_world(frames: WaypointFrames, candidates: Floats) -> Floats:
+    """Return the world positions of candidates (w, c, 3).
+
+    An end is in the frame of the waypoint next to it.
+    """
     rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
     east, north, cosine, sine = (values[rows] for values in frames[:4])
     row_frames = WaypointFrames(east, north, cosine, sine, frames.edges)

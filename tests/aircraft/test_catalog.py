@@ -8,9 +8,9 @@ import pytest
 
 from aircraft.catalog import (
     Aircraft,
+    copy_aircraft_folder,
     find_aircraft,
     load_aircraft,
-    make_own_folder,
     model_hash,
     read_aircraft,
 )
@@ -167,7 +167,7 @@ def test_metadata_agrees_with_the_trims() -> None:
 @pytest.mark.parametrize("name", ["aerosonde", "c172x"])
 def test_the_same_aircraft_under_another_name(name: str, tmp_path: Path) -> None:
     source = load_aircraft(name)
-    files = make_own_folder(tmp_path / "my-plane", source)
+    files = copy_aircraft_folder(tmp_path / "my-plane", source)
     assert sorted(path.name for path in (tmp_path / "my-plane").iterdir()) == list(files)
     assert [path.name for path in tmp_path.iterdir()] == ["my-plane"]
     mine = read_aircraft(tmp_path / "my-plane")
@@ -184,29 +184,29 @@ def test_the_same_aircraft_under_another_name(name: str, tmp_path: Path) -> None
 
 def test_a_folder_is_replaced_only_if_asked_and_only_if_it_is_an_aircrafts(tmp_path: Path) -> None:
     folder = tmp_path / "mine"
-    make_own_folder(folder, load_aircraft("aerosonde"))
+    copy_aircraft_folder(folder, load_aircraft("aerosonde"))
     (folder / "uncertainty.toml").write_text("of the aircraft before", encoding="utf-8")
     (folder / "flight.BIN").write_bytes(b"my log")
     with pytest.raises(FlightError, match="exists; overwrite=True replaces it"):
-        make_own_folder(folder, load_aircraft("zagi"))
-    make_own_folder(folder, load_aircraft("zagi"), overwrite=True)
+        copy_aircraft_folder(folder, load_aircraft("zagi"))
+    copy_aircraft_folder(folder, load_aircraft("zagi"), overwrite=True)
     assert read_aircraft(folder).mass == load_aircraft("zagi").mass
     assert (folder / "flight.BIN").read_bytes() == b"my log"
     assert not (folder / "uncertainty.toml").exists()
     (tmp_path / "photos").mkdir()
     with pytest.raises(FlightError, match=r"photos: not an aircraft's folder: it has no photos\.toml"):
-        make_own_folder(tmp_path / "photos", load_aircraft("zagi"), overwrite=True)
+        copy_aircraft_folder(tmp_path / "photos", load_aircraft("zagi"), overwrite=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["mine", "photos"]
 
 
 def test_a_folder_made_from_a_folder_brings_its_engines(tmp_path: Path) -> None:
     first = tmp_path / "first"
-    make_own_folder(first, load_aircraft("aerosonde"))
+    copy_aircraft_folder(first, load_aircraft("aerosonde"))
     (first / "Engines").mkdir()
     (first / "Engines" / "prop.xml").write_text("<propeller/>", encoding="utf-8")
     (first / "first.xml~").write_text("old", encoding="utf-8")
     shutil.copy(first / "gains.toml", first / "notes.txt")
-    made = make_own_folder(tmp_path / "second", read_aircraft(first))
+    made = copy_aircraft_folder(tmp_path / "second", read_aircraft(first))
     assert made == (
         "Engines/prop.xml",
         "README.md",
@@ -232,5 +232,5 @@ def test_what_cannot_be_made_is_refused_and_nothing_is_left(folder: str, said: s
     (tmp_path / "there").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "lost")
     with pytest.raises(FlightError, match=said):
-        make_own_folder(tmp_path / folder, load_aircraft("aerosonde"))
+        copy_aircraft_folder(tmp_path / folder, load_aircraft("aerosonde"))
     assert sorted(path.name for path in tmp_path.iterdir()) == ["link", "there"]

@@ -16,7 +16,7 @@ from world.address_space import (
     MIN_FREE_BYTES,
     AddressSpaceError,
     AddressSpaceGuard,
-    has_room,
+    has_address_space,
 )
 from world.raster import open_npz
 
@@ -44,7 +44,9 @@ def test_openblas_is_not_loaded_where_it_would_look_for_room_without_end() -> No
 
 def test_room_is_asked_for_by_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
-    monkeypatch.setattr(address_space, "has_room", lambda size: asked.append(size) or size < LLVM_MIN_FREE_BYTES)
+    monkeypatch.setattr(
+        address_space, "has_address_space", lambda size: asked.append(size) or size < LLVM_MIN_FREE_BYTES
+    )
     finder = AddressSpaceGuard(LIMIT)
     assert finder.find_spec("scipy.linalg") is None
     with pytest.raises(AddressSpaceError, match=r"leaves less than 192 MB to import llvmlite$"):
@@ -53,9 +55,9 @@ def test_room_is_asked_for_by_the_library(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_room_is_what_can_be_mapped() -> None:
-    assert has_room(2**20)
+    assert has_address_space(2**20)
     # More than the addresses that there are.
-    assert not has_room(2**60)
+    assert not has_address_space(2**60)
 
 
 @pytest.mark.parametrize(

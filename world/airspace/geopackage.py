@@ -38,7 +38,7 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
                 quoted = '"' + str(table).replace('"', '""') + '"'
                 cursor = database.execute(f"select * from {quoted}")  # a table name from the file, quoted
                 names = [entry[0] for entry in cursor.description]
-                code = _crs_code(database, system)
+                code = _crs_definition(database, system)
                 for number, row in enumerate(cursor, 1):
                     location = f"{table} row {number}"
                     columns = dict(zip(names, row, strict=True))
@@ -48,7 +48,7 @@ def geopackage_features(path: Path, source: str) -> Iterator[tuple[str, dict[str
         raise ScenarioError(f"{source}: cannot be read as a GeoPackage: {error}", file=source) from error
 
 
-def _crs_code(database: sqlite3.Connection, system: int) -> str:
+def _crs_definition(database: sqlite3.Connection, system: int) -> str:
     """Return a table's coordinate reference system for PROJ; "" for longitude and latitude on WGS84."""
     system_row = database.execute(
         "select organization, organization_coordsys_id, definition from gpkg_spatial_ref_sys where srs_id = ?", [system]
@@ -72,9 +72,11 @@ def _plain_columns(columns: dict[str, Any]) -> dict[str, Any]:
 
 
 def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
-    """Convert a GeoPackage geometry to GeoJSON in longitude and latitude.  Raises ScenarioError if it is invalid.
+    """Convert a GeoPackage geometry to GeoJSON in longitude and latitude.
 
-    code: coordinate reference system as `_crs_code` returns it.
+    code: coordinate reference system as `_crs_definition` returns it.
+
+    Raises ScenarioError if the geometry is invalid.
     """
     allowed = "expected a polygon, a multipolygon or a point"
     try:
@@ -92,11 +94,11 @@ def _read_shape(blob: Any, code: str, source: str) -> dict[str, Any]:
         to_degrees = partial(transformer.transform, direction="INVERSE")
         shape = shapely.transform(shape, lambda xy: np.column_stack(transform_points(to_degrees, xy[:, 0], xy[:, 1])))
     geometry: dict[str, Any] = shapely.geometry.mapping(shape)
-    return _with_lists(geometry)
+    return _tuples_to_lists(geometry)
 
 
-def _with_lists(geometry: dict[str, Any]) -> dict[str, Any]:
-    """Replace the tuples in a mapping of shapely by lists, as in JSON."""
+def _tuples_to_lists(geometry: dict[str, Any]) -> dict[str, Any]:
+    """Convert the tuples in a geometry from shapely to lists, as in JSON."""
 
     def to_lists(value: Any) -> Any:
         return [to_lists(element) for element in value] if isinstance(value, tuple | list) else value

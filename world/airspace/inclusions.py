@@ -13,9 +13,10 @@ _CIRCLE_CORNERS = 256
 
 
 def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
-    """Return the zones with all inclusions merged into one, for an autopilot that must be inside at least one of them.
+    """Return the zones with all inclusions merged into one.
 
-    Circles are approximated by inscribed polygons.  Exclusions, and a single inclusion, are returned unchanged.
+    An autopilot has to be inside at least one of several inclusions. Circles are approximated by inscribed polygons.
+    Exclusions, and a single inclusion, are returned unchanged.
 
     >>> from world.airspace.zones import make_cylinder
     >>> circles = [Zone(f"fence item {k}", "inclusion", make_cylinder(800.0 * k, 0.0, 500.0)) for k in range(2)]
@@ -26,7 +27,7 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
     inclusions = [zone for zone in zones if zone.kind == "inclusion"]
     if len(inclusions) < 2:
         return tuple(zones)
-    union = shapely.union_all([_outline(zone.shape) for zone in inclusions])
+    union = shapely.union_all([_zone_outline(zone.shape) for zone in inclusions])
     rings = [
         [(east, north) for east, north in ring.coords]
         for part in shapely.get_parts(union)
@@ -37,7 +38,7 @@ def unite_inclusions(zones: Sequence[Zone]) -> tuple[Zone, ...]:
     return (Zone(name, "inclusion", make_polygon(rings)), *exclusions)
 
 
-def _outline(shape: Polygon | Cylinder) -> shapely.Polygon:
+def _zone_outline(shape: Polygon | Cylinder) -> shapely.Polygon:
     """Return the outline of a zone that has no holes; a circle becomes a polygon inside it."""
     if isinstance(shape, Polygon):
         return shapely.Polygon(shape.rings[0])

@@ -38,7 +38,7 @@ _ABOVE_GROUND = ("AGL", "AAGL", "ASFC", "GND", "SFC")
 
 @dataclass(slots=True)
 class _Block:
-    """Airspace that is being read, with the contents of its lines up to the current line."""
+    """Airspace that is being read: its class, and the contents of its lines up to the current line."""
 
     line: int
     airspace_class: str
@@ -65,10 +65,10 @@ def is_openair(text: str) -> bool:
 
 
 def openair_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any] | str]]:
-    r"""Yield each zone's location in the file and its [[zones]] entries, or the reason why it restricts no flight.
+    r"""Yield each zone's location in the file and its [[zones]] entries, or why it restricts no flight.
 
-    Every airspace is an exclusion, except classes E, F, G and unclassified without a type that requires more.  An arc
-    is drawn with chords within `ARC_BEND` of it.  Raises ScenarioError for a line that cannot be read.
+    Every airspace is an exclusion, except classes E, F, G and unclassified without a type that requires more. An arc is
+    drawn with chords within `ARC_BEND` of it. Raises ScenarioError for a line that cannot be read.
 
     >>> text = "AC D\nAN CTR\nAL GND\nAH 2500ft AMSL\nV X=46:00:00N 014:00:00E\nDC 5"
     >>> [(where, entries["radius_m"], entries["ceiling_amsl_m"]) for where, entries in openair_zones(text, "a file")]
@@ -117,7 +117,7 @@ def _clean_line(line: str) -> str:
 
 
 def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str]:
-    """Return the location of an airspace in its file, and the entries of its zone or the reason why it is skipped.
+    """Return an airspace's location in its file, and its zone's entries or the reason why it is skipped.
 
     Raises ScenarioError if the airspace does not have exactly one shape.
     """
@@ -144,7 +144,7 @@ def _finish_block(block: _Block, source: str) -> tuple[str, dict[str, Any] | str
 
 
 def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
-    """Return the outline of an airway: its segments, extended by half its width to both sides and beyond its ends."""
+    """Return the outline of an airway: its segments, extended by half its width on all sides."""
     if len(block.airway) < 2 or not block.width > 0.0:
         raise ScenarioError(
             f"{source}: DY: an airway needs at least two points, and a width (V W=) before them", file=source
@@ -164,6 +164,7 @@ def _airway_rings(block: _Block, source: str) -> list[list[_Position]]:
 
 
 def _read_times(block: _Block, text: str) -> None:
+    """Add a period in which the airspace is active; NONE means that a NOTAM states it."""
     if text.upper() == "NONE":
         block.times.append(BY_NOTAM)
         return
@@ -173,7 +174,7 @@ def _read_times(block: _Block, text: str) -> None:
 
 
 def _limit_reader(key: str) -> Callable[[_Block, str], None]:
-    """Return the function for AL or AH, which sets the limit of this key in openAIP's form."""
+    """Return the function for AL or AH, which sets the limit with this key in openAIP's form."""
 
     def read(block: _Block, text: str) -> None:
         if key in block.limits:
@@ -204,7 +205,7 @@ def _parse_limit(text: str, key: str) -> dict[str, Any] | None:
 
 
 def _read_variable(block: _Block, text: str) -> None:
-    """Set the centre, the direction of arcs or the width of an airway (V)."""
+    """Set the centre of arcs and circles, the direction of arcs, or the width of an airway (V)."""
     name, _, value = (part.strip() for part in text.partition("="))
     if name.upper() == "X":
         block.centre = _parse_position(value)
@@ -330,8 +331,9 @@ def _parse_degrees(text: str, max_degrees: float) -> float:
 
 
 def _required_centre(block: _Block) -> _Position:
+    """Return the centre of arcs and circles. Raises ValueError if no line has set it."""
     if block.centre is None:
-        raise ValueError("a centre (V X=) must come before it")
+        raise ValueError("a centre (V X=) must come before this line")
     return block.centre
 
 
@@ -344,7 +346,7 @@ def _bearing_and_distance(centre: _Position, position: _Position) -> tuple[float
 def _arc_positions(
     centre: _Position, radii: Sequence[float], first_bearing: float, last_bearing: float, clockwise: bool
 ) -> list[_Position]:
-    """Return positions along an arc, including both ends, close enough together for chords within `ARC_BEND` of it.
+    """Return positions along an arc, including both ends, for chords within `ARC_BEND` of it.
 
     radii: radius at the first and at the last bearing, m; the radius changes linearly between them.
     first_bearing, last_bearing: degrees; equal bearings mean a full circle.

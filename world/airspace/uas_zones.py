@@ -31,7 +31,7 @@ _FoundZone = tuple[str, dict[str, Any] | str]
 
 
 def is_ed269(data: Mapping[str, Any]) -> bool:
-    """Return True if JSON data is ED-269: its features have a list of volumes.
+    """Return True if JSON data is ED-269: its first feature has a list of volumes.
 
     >>> is_ed269({"features": [{"geometry": [{"horizontalProjection": {}}]}]}), is_ed269({"features": []})
     (True, False)
@@ -58,7 +58,7 @@ def _zone_properties(properties: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def ed269_zones(data: Mapping[str, Any], source: str) -> Iterator[_FoundZone]:
-    """Yield each volume's location in the file and its [[zones]] entries, or the reason why it restricts no flight.
+    """Yield each volume's location in the file and its [[zones]] entries, or why it restricts no flight.
 
     Raises ScenarioError for an invalid volume.
     """
@@ -107,9 +107,12 @@ def _ed269_volume(volume: Any, source: str) -> dict[str, Any]:
 
 
 def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: str) -> Iterator[_FoundZone]:
-    """Yield the entries of each layer of an ED-318 feature, in the form of `ed269_zones`.
+    """Yield the location and the [[zones]] entries of each layer of an ED-318 feature.
 
-    location: location of the feature in the file, for messages.  index: index of the feature, from 0.
+    location: location of the feature in the file, for messages.
+    index: index of the feature, from 0.
+
+    A feature that restricts no flight yields its location and the reason, as in `ed269_zones`.
     """
     properties = _zone_properties(feature["properties"])
     name = _one_line_name(properties.get("name")) or _one_line_name(properties.get("identifier")) or f"zone {index + 1}"
@@ -133,7 +136,7 @@ def ed318_zones(feature: Mapping[str, Any], location: str, index: int, source: s
 
 
 def _flatten_geometries(geometry: Any) -> Iterator[Any]:
-    """Yield a geometry, or the geometries of a collection."""
+    """Yield a geometry, or the geometries of a collection, which may contain collections."""
     parts = geometry.get("geometries") if isinstance(geometry, dict) else None
     if isinstance(parts, list):
         for part in parts:
@@ -143,7 +146,7 @@ def _flatten_geometries(geometry: Any) -> Iterator[Any]:
 
 
 def _ed318_layer(geometry: Any, default_layer: Mapping[str, Any], source: str) -> Iterator[dict[str, Any]]:
-    """Yield the entries of each part of a geometry.
+    """Yield the [[zones]] entries of each part of a geometry.
 
     default_layer: table with the vertical limits of a geometry that has no layer of its own.
     """
@@ -220,7 +223,7 @@ def _circle_entries(centre: Any, radius: Any, source: str) -> dict[str, float]:
 
 
 def _one_line_name(value: Any) -> str:
-    """Return a name in one line; of several texts the first English text, or the first text if none is English."""
+    """Return a name in one line; of several texts, the first English text, or else the first text."""
     if isinstance(value, list):
         texts = [
             text_entry
@@ -275,6 +278,8 @@ def _parse_moment(value: Any, extreme_offset: timedelta) -> datetime | None:
 def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: Mapping[str, Any]) -> Period:
     """Convert one entry of a schedule to a period.
 
+    start, end: limits of the schedule.
+
     Sunrise, sunset and hours without a UTC offset are replaced by the whole day.
     """
     stated_days = schedule_entry.get("day") or []
@@ -296,7 +301,9 @@ def _daily_period(start: datetime | None, end: datetime | None, schedule_entry: 
 def _minute_of_day(value: Any, *, rounds_up: bool = False) -> int | None:
     """Return a time as minutes after 00:00 UTC of the stated day, or None if it has no UTC offset.
 
-    rounds_up: True to round a part of a minute up.  The result is negative for a time on the previous day in UTC.
+    rounds_up: True to round a part of a minute up.
+
+    The result is negative for a time on the previous day in UTC.
     """
     if value is None or value == "":
         return None

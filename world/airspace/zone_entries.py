@@ -57,11 +57,11 @@ _FAA_NOT_APPLICABLE = -9998.0
 
 
 def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Convert a zone's properties to entries of a [[zones]] table; the zone is an exclusion if no kind is stated.
+    """Convert a zone's properties to entries of a [[zones]] table, by default of an exclusion.
 
     A flight level or a height above the ellipsoid bounds an exclusion with a margin on the safe side:
-    `FLIGHT_LEVEL_ERROR`, and the range of the geoid.  Raises ScenarioError for an invalid limit, for either of these
-    two on an inclusion, and for an unknown property that looks like a key of a scenario file.
+    `FLIGHT_LEVEL_ERROR`, and the range of the geoid. Raises ScenarioError for an invalid limit, for either of these two
+    on an inclusion, and for an unknown property that looks like a key of a scenario file.
 
     >>> zone_entries({"lowerLimit": {"value": 0, "unit": 1, "referenceDatum": 0}, "ceiling_agl_m": 90.0}, "a file")
     {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
@@ -115,7 +115,7 @@ def published_entries(limits: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _comparable_limit(limit: Any) -> tuple[bool, float] | None:
-    """Return True for a height above ground or False for an altitude, and the limit, m; None for an invalid limit."""
+    """Return a limit in m, after True for a height above ground or False for an altitude; None if invalid."""
     if not isinstance(limit, dict):
         return None
     try:
@@ -141,7 +141,10 @@ def _faa_limits(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
 
 
 def _limit_entry(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
-    """Convert a limit in openAIP's form to an entry of a [[zones]] table; return no entry for the ground as a floor."""
+    """Convert a limit in openAIP's form to an entry of a [[zones]] table.
+
+    A floor at the ground gives no entry. Raises ScenarioError for an invalid limit.
+    """
     if not isinstance(value, dict):
         allowed = "expected a table of value, unit and referenceDatum"
         raise ScenarioError.at(source, key, value, allowed, shown="")

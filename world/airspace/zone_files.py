@@ -91,7 +91,9 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
 def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple[str, dict[str, Any]]:
     """Return the location of a GeoJSON feature for messages, and the [[zones]] entries of its zone.
 
-    index: index of the feature, from 0, for the default name.  Raises ScenarioError if the feature is not a zone.
+    index: index of the feature, from 0, for the default name.
+
+    Raises ScenarioError if the feature is not a zone.
     """
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
         raise ScenarioError(f"{source}: {location}: expected a Feature", file=source, field=location)
@@ -108,7 +110,7 @@ def _geojson_zone(feature: Any, location: str, index: int, source: str) -> tuple
     entries: dict[str, Any] = {"name": name, **zone_entries(properties, f"{source}: {label}")}
     try:
         if geometry_type == "Point":
-            lat, lon = _corner(coordinates)
+            lat, lon = _parse_corner(coordinates)
             if "radius_m" not in entries:
                 message = f"{source}: {label}: radius_m: missing; a point is the centre of a cylinder"
                 raise ScenarioError(message, file=source, field="radius_m")
@@ -142,11 +144,14 @@ def _check_holes(parts: list[list[list[tuple[float, float]]]], source: str) -> N
 
 def _parse_rings(coordinates: Any) -> list[list[tuple[float, float]]]:
     """Convert a polygon's coordinates to rings of (latitude, longitude)."""
-    return [[_corner(corner) for corner in ring] for ring in coordinates]
+    return [[_parse_corner(corner) for corner in ring] for ring in coordinates]
 
 
-def _corner(coordinates: Any) -> tuple[float, float]:
-    """Return the latitude and longitude of a GeoJSON position.  Raises TypeError if it is not a list of numbers."""
+def _parse_corner(coordinates: Any) -> tuple[float, float]:
+    """Return the latitude and longitude of a GeoJSON position.
+
+    Raises TypeError if it is not a list of numbers.
+    """
     if not isinstance(coordinates, list) or not all(type(value) in (int, float) for value in coordinates):
         raise TypeError("no position")
     lon, lat = coordinates[0], coordinates[1]
@@ -205,7 +210,10 @@ def _kml_text(element: _Element, tag: str) -> str:
 
 
 def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
-    """Return the [[zones]] entries of a placemark, without its name.  Raises ScenarioError if it is not a zone."""
+    """Return the [[zones]] entries of a placemark, without its name.
+
+    Raises ScenarioError if the placemark is not a zone.
+    """
     entries = zone_entries(_extended_data(placemark, source), source)
     polygons, points = _find_descendants(placemark, "Polygon"), _find_descendants(placemark, "Point")
     if not polygons:
@@ -322,7 +330,10 @@ class FileZones:
 
 
 def is_zone_file(path: Path) -> bool:
-    """Return True if a file contains zones, judged by its suffix; for .txt by the first OpenAir command."""
+    """Return True if a file contains zones, judged by its suffix; for .txt by its first line.
+
+    The first line must be an OpenAir command.
+    """
     suffix = path.suffix.lower()
     if suffix != ".txt":
         return suffix in SUFFIXES
@@ -337,8 +348,10 @@ def is_zone_file(path: Path) -> bool:
 def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) -> FileZones:
     """Read the zones of one or more files of a scenario.
 
-    source: name of the scenario in messages.  base: folder of relative paths.  Raises ScenarioError as
-    `read_zone_file` does, and for more zones than a scenario may have.
+    source: name of the scenario in messages.
+    base: folder of relative paths.
+
+    Raises ScenarioError as `read_zone_file` does, and for more zones than a scenario may have.
     """
     all_zones = FileZones()
     for file in [files] if isinstance(files, str) else files:
@@ -353,8 +366,10 @@ def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) 
 def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZones:
     """Read the zones of a file, in the format of its suffix.
 
-    source: name of the file in messages.  max_zones: maximum number of zones.  Raises ScenarioError for a file that
-    cannot be read, for more zones than ``max_zones``, and for an invalid zone.
+    source: name of the file in messages.
+    max_zones: maximum number of zones.
+
+    Raises ScenarioError for a file that cannot be read, for more zones than ``max_zones``, and for an invalid zone.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -408,9 +423,9 @@ def read_zone_file(path: Path, source: str, max_zones: int = MAX_ZONES) -> FileZ
 
 
 def _repair_outline(entries: dict[str, Any], max_crossings: int, source: str) -> tuple[list[str], int]:
-    """Repair the outline in a zone's entries if it is from an authority's file, and remove the marks from the entries.
+    """Repair the outline of a zone from an authority's file, and remove the marks from its entries.
 
-    Returns notes about the zone, and the number of crossings of its outline.  Raises ScenarioError for more crossings
+    Returns notes about the zone, and the number of crossings of its outline. Raises ScenarioError for more crossings
     than ``max_crossings``.
     """
     is_published = entries.pop(PUBLISHED, False)

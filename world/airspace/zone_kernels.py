@@ -39,7 +39,11 @@ EDGE = record_dtype("east", "north", "to_east", "to_north")
 
 @by_reference
 class ZoneRecords(NamedTuple):
-    """Zones for compiled code: (z,) of `ZONE` in the given order, and (e,) of `EDGE`, the edges of all polygons."""
+    """Zones for compiled code.
+
+    zones: (z,) of `ZONE`, in the given order.
+    edges: (e,) of `EDGE`, the edges of all polygons.
+    """
 
     zones: Records
     edges: Records
@@ -78,7 +82,7 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
 
 
 def _set_boxes(zones: Records, edges: Records) -> None:
-    """Set the boxes of polygons from their edges."""
+    """Set the bounding boxes of polygons from their edges."""
     polygons = np.flatnonzero(~zones["round"])
     if polygons.size:
         # Every polygon has edges, and the edges of a polygon are consecutive.
@@ -108,7 +112,7 @@ def _level_record(level: ZoneLevel | None, default_height: float) -> tuple[float
 
 @inlined
 def box_distance(records: ZoneRecords, z: int, west: float, east: float, south: float, north: float) -> float:
-    """Return the horizontal distance between the box of zone z and another box, m; 0 if they meet."""
+    """Return the horizontal distance between the bounding box of zone z and a box, m; 0 if they meet."""
     zone = records.zones[z]
     east_gap = max(0.0, zone.west - east, west - zone.east)
     north_gap = max(0.0, zone.south - north, south - zone.north)
@@ -129,9 +133,9 @@ def distance_to_edge(edge: Record, east: float, north: float) -> float:
 
 @inner
 def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tuple[float, int]:
-    """Return the horizontal distance from a position to the outline of zone z, m, and the index of the nearest edge.
+    """Return the distance from a position to the outline of zone z, m, and the index of the nearest edge.
 
-    The distance is negative inside.  The index is -1 for a cylinder, which has no edges.
+    The horizontal distance is negative inside. The index is -1 for a cylinder, which has no edges.
     """
     zone = records.zones[z]
     if zone.round:
@@ -160,7 +164,7 @@ def nearest_edge(records: ZoneRecords, z: int, east: float, north: float) -> tup
 
 @compiled
 def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:
-    """Return the horizontal distance from a position to the outline of zone z, m; negative inside its shape."""
+    """Return the horizontal distance from a position to the outline of zone z, m; negative inside."""
     distance, _ = nearest_edge(records, z, east, north)
     return distance
 
@@ -169,10 +173,12 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
 def height_outside_band(zone: Record, up: float, ground: float) -> float:
     """Return the height by which an altitude is below a zone's floor or above its ceiling, m.
 
-    The result is negative between floor and ceiling: minus the distance to the nearer of the two.
+    zone: a record of `ZONE`.
+    up: altitude, m AMSL.
+    ground: altitude of the ground below, m AMSL; if it is NaN (unknown), the result is NaN for a zone with levels above
+        ground.
 
-    zone: a record of `ZONE`.  up: altitude, m AMSL.  ground: altitude of the ground below, m AMSL; if it is NaN
-    (unknown), the result is NaN for a zone with levels above ground.
+    The result is negative between floor and ceiling: minus the distance to the nearer of the two.
     """
     floor: float = zone.floor + ground if zone.floor_above_ground else zone.floor
     ceiling: float = zone.ceiling + ground if zone.ceiling_above_ground else zone.ceiling
@@ -185,12 +191,13 @@ def height_outside_band(zone: Record, up: float, ground: float) -> float:
 def inside_fraction(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, begin_fraction: float, end_fraction: float
 ) -> float:
-    """Return the length of a part of the segment a-b inside the shape of zone z, as a fraction of the segment.
+    """Return the length of a part of the segment a-b inside zone z, as a fraction of the segment.
 
     begin_fraction, end_fraction: limits of the part; 0 and 1 for the whole segment.
+
     Exact: entries and exits alternate, so the fraction inside is the sum of the exit fractions minus the sum of the
-    entry fractions, each clipped to the part.  A segment along an edge is outside if it is to the right of the edge,
-    and inside if it is to the left.
+    entry fractions, each clipped to the part. A segment along an edge is outside if it is to the right of the edge, and
+    inside if it is to the left.
     """
     zone = records.zones[z]
     dx, dy = bx - ax, by - ay
@@ -228,9 +235,13 @@ def inside_fraction(
 
 @inlined
 def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float) -> tuple[float, float]:
-    """Return the squared distance from an edge's first corner to a segment, and the nearest point as a fraction.
+    """Return the squared distance from an edge's first corner to a segment, m^2, and the nearest point.
 
-    ax, ay: start of the segment.  dx, dy: its vector.  run2: squared length of the vector, m^2.
+    ax, ay: start of the segment.
+    dx, dy: vector of the segment.
+    run2: squared length of the vector, m^2.
+
+    The nearest point is a fraction of the segment.
     """
     fraction = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
     fraction = min(1.0, max(0.0, fraction))
@@ -240,10 +251,10 @@ def _corner_distance2(edge: Record, ax: float, ay: float, dx: float, dy: float, 
 
 @inner
 def segment_distance(records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float) -> tuple[float, float]:
-    """Return the smallest horizontal distance from the segment a-b to the shape of zone z, m, and the nearest point.
+    """Return the horizontal distance from the segment a-b to zone z, m, and the segment's nearest point.
 
-    The nearest point is a fraction of the segment.  If the segment meets the shape, the distance is 0, and the point is
-    inside the shape or on its outline; `edge_distance` gives the depth.  Exact: two straight pieces that do not cross
+    The nearest point is a fraction of the segment. If the segment meets the shape, the distance is 0, and the point is
+    inside the shape or on its outline; `edge_distance` gives the depth. Exact: two straight pieces that do not cross
     are nearest at an end of one of them.
     """
     zone = records.zones[z]

@@ -29,10 +29,12 @@ _DAY = timedelta(days=1)
 
 @dataclass(frozen=True, slots=True)
 class Period:
-    """One period, in UTC.
+    """One period of a zone's activity, in UTC.
 
-    start, end: None if unknown.  days: days of the week, 0 for Monday; empty for all.
-    first, last: minutes of the day, None for the whole day; a last that is not after the first is on the next day.
+    start, end: None if unknown.
+    days: days of the week, 0 for Monday; empty for all.
+    first, last: minutes of the day, None for the whole day; a last minute that is not after the first is on the next
+        day.
     """
 
     start: datetime | None = None
@@ -42,7 +44,7 @@ class Period:
     last: int | None = None
 
     def text(self) -> str:
-        """Return the line that `parse_period` reads.
+        """Return the period as the line that `parse_period` reads.
 
         >>> Period(days=frozenset({5, 6}), first=420, last=1200).text()
         '../.. SAT,SUN 07:00/20:00'
@@ -56,7 +58,9 @@ class Period:
 
 
 def parse_period(text: str) -> Period | None:
-    """Parse the period in a line of text; return None for `BY_NOTAM`.  Raises ValueError for an invalid period.
+    """Parse the period in a line of text; return None for `BY_NOTAM`.
+
+    Raises ValueError for an invalid period.
 
     >>> parse_period("2026-05-01T00:00Z/.. SAT,SUN 07:00/20:00").days == {5, 6}
     True
@@ -118,9 +122,11 @@ def _parse_part(text: str) -> datetime:
 
 
 def parse_span(text: str) -> tuple[datetime, datetime]:
-    """Parse the time span of a flight, ``START`` or ``START/END`` with UTC offsets; return its start and end.
+    """Parse the time span of a flight; return its start and end.
 
-    A span without an end lasts `DEFAULT_SPAN`.  Raises ValueError for any other text, for an end before the start, and
+    text: ``START`` or ``START/END``, with UTC offsets.
+
+    A span without an end lasts `DEFAULT_SPAN`. Raises ValueError for any other text, for an end before the start, and
     for more than `LONGEST_SPAN`.
 
     >>> [f"{time:%H:%M}" for time in parse_span("2026-05-01T10:00+02:00")]

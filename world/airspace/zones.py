@@ -81,11 +81,13 @@ class Zone:
 
 
 def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
-    """Make a polygon from its outlines and holes, in any order and direction, with corners (east, north) m.
+    """Make a polygon from its outlines and holes, in any order and direction.
 
-    A point is inside if an odd number of rings contain it.  A corner that repeats the previous corner, or closes a
-    ring, is omitted.  Raises ValueError for a ring of fewer than three corners, for a ring that crosses itself, for
-    rings that cross each other, for a polygon of no area, and for too many corners or edges (`check_edges`).
+    rings: corners (east, north) m of each ring.
+
+    A point is inside if an odd number of rings contain it. A corner that repeats the previous corner, or closes a ring,
+    is omitted. Raises ValueError for a ring of fewer than three corners, for a ring that crosses itself, for rings that
+    cross each other, for a polygon of no area, and for too many corners or edges (`check_edges`).
 
     >>> make_polygon([[(0.0, 0.0), (0.0, 90.0), (90.0, 90.0), (90.0, 0.0), (0.0, 0.0)]]).rings
     (((90.0, 0.0), (90.0, 90.0), (0.0, 90.0), (0.0, 0.0)),)
@@ -144,7 +146,9 @@ def _orient_ring(ring: Ring, depth: int) -> Ring:
 
 
 def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
-    """Make a cylinder.  Raises ValueError for a radius of zero or below, and for values that are not finite.
+    """Make a cylinder.
+
+    Raises ValueError for a radius of zero or below, and for values that are not finite.
 
     >>> make_cylinder(0.0, 0.0, 0.0)
     Traceback (most recent call last):
@@ -159,7 +163,7 @@ def make_cylinder(east: float, north: float, radius: float) -> Cylinder:
 
 
 def is_hole(ring: Ring) -> bool:
-    """Return True if a ring of a `Polygon` bounds a hole, and so runs clockwise.
+    """Return True if a ring of a `Polygon` bounds a hole, which means that it runs clockwise.
 
     >>> is_hole(((0.0, 0.0), (0.0, 90.0), (90.0, 90.0)))
     True
@@ -193,10 +197,12 @@ def repair_rings(
 ) -> tuple[list[list[list[float]]], int] | None:
     """Repair rings that cross; return the rings of the enclosed area and the number of edge crossings.
 
-    Returns no rings for an outline that encloses no area.
-    rings: rings of [latitude, longitude], the outline first.  A ring that is not inside another one is a part of the
-    area, not a hole; a ring of fewer than three different corners is dropped.  The area grows by `REPAIR_MARGIN_DEG` on
-    all sides.  Returns None if there is nothing to repair.  Raises ValueError for more crossings than
+    rings: rings of [latitude, longitude], the outline first.
+    max_crossings: maximum number of crossings.
+
+    A ring that is not inside another ring is a part of the area, not a hole; a ring of fewer than three different
+    corners is dropped. The area grows by `REPAIR_MARGIN_DEG` on all sides. Returns no rings for an outline that
+    encloses no area, and None if there is nothing to repair. Raises ValueError for more crossings than
     ``max_crossings``, and for too many corners or edges (`check_edges`).
 
     >>> made, crossings = repair_rings([[[0, 0], [2, 2], [2, 0], [0, 2]]])
@@ -232,9 +238,9 @@ def repair_rings(
 def _enclosed_area(rings: Sequence[shapely.Polygon]) -> shapely.Geometry:
     """Return the area that rings enclose, each repaired separately.
 
-    A ring inside an odd number of others is a hole in them.
-    A ring inside another one may extend beyond it by `REPAIR_MARGIN_DEG`; of two identical rings neither is inside the
-    other. A ring that crosses another one, touches it from outside or is separate from it is a part of the area.
+    A ring inside an odd number of other rings is a hole in them. A ring inside another ring may extend beyond it by
+    `REPAIR_MARGIN_DEG`; of two identical rings neither is inside the other. A ring that crosses another ring, touches
+    it from outside or is separate from it is a part of the area.
     """
     areas = shapely.make_valid(np.array(rings), method="structure", keep_collapsed=False)
     areas = areas[shapely.area(areas) > 0.0]

@@ -62,7 +62,9 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
 
 
 def add_corner_count(count: int, shape: Polygon | Cylinder) -> int:
-    """Add the number of a shape's corners to a count, and return it; raise ValueError above `MAX_MAP_CORNERS`.
+    """Return a count of corners increased by the corners of a shape.
+
+    Raises ValueError above `MAX_MAP_CORNERS`.
 
     >>> add_corner_count(4, make_polygon([[(0.0, 0.0), (90.0, 0.0), (90.0, 90.0)]]))
     7
@@ -78,8 +80,9 @@ def add_corner_count(count: int, shape: Polygon | Cylinder) -> int:
 def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> tuple[Zone, ...]:
     """Convert the zones of a scenario file to zones on its map.
 
-    source: name of the file in messages.  Raises ScenarioError for an invalid shape, and for a level above ground
-    without terrain.
+    source: name of the file in messages.
+
+    Raises ScenarioError for an invalid shape, and for a level above ground without terrain.
     """
     zones, corners = [], 0
     for k, table in enumerate(tables):
@@ -111,7 +114,9 @@ _DEGREE_LENGTH_M = 111_000.0
 def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, bounds: Floats) -> list[ZoneTable]:
     """Return the inclusions of a file, and its exclusions within `MAX_ZONE_DISTANCE` of the area.
 
-    source: name of the file in messages.  bounds: (2, 2) m, west and east, south and north of the area.
+    source: name of the file in messages.
+    bounds: (2, 2) m, west and east, south and north of the area.
+
     Raises ScenarioError for an invalid shape among the omitted zones; `make_zones` checks the others.
     """
     zones_nearby = []
@@ -127,7 +132,10 @@ def select_near_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigi
 
 
 def _check_rings(table: ZoneTable) -> None:
-    """Raise ValueError if the rings in degrees of a zone are not a valid polygon; they are not projected on the map."""
+    """Raise ValueError if the rings in degrees of a zone are not a valid polygon.
+
+    The rings are not projected on the map.
+    """
     rings = table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if rings and rings[0]:
         centre_longitude = rings[0][0][1]
@@ -140,7 +148,10 @@ def _check_rings(table: ZoneTable) -> None:
 
 
 def _is_near_area(table: ZoneTable, origin: GeoOrigin, bounds: Floats) -> bool:
-    """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of the area, or if it is not in degrees."""
+    """Return True if a zone's bounding box is within `MAX_ZONE_DISTANCE` of the area.
+
+    Also return True for a zone that is not stated in degrees.
+    """
     max_distance, corners = MAX_ZONE_DISTANCE, table.rings_deg if table.polygon_deg is None else [table.polygon_deg]
     if table.lat_deg is not None and table.lon_deg is not None:
         max_distance, corners = MAX_ZONE_DISTANCE + (table.radius_m or 0.0), [[[table.lat_deg, table.lon_deg]]]
@@ -191,8 +202,10 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
 def first_violated_zone(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:
     """Return the first zone that a position violates, or None if it violates none.
 
-    point: (3,) m.  If the ground height is not known, the position is taken to be between a floor and a ceiling that
-    are heights above ground.
+    point: (3,) m.
+
+    If the ground height is not known, the position is taken to be between a floor and a ceiling that are heights above
+    ground.
 
     >>> from world.airspace.zones import Cylinder
     >>> mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 200.0), ceiling=ZoneLevel(300.0, "amsl"))
@@ -243,7 +256,7 @@ def zone_rings(zone: Zone) -> tuple[Floats, ...]:
 
 
 def zone_parts(zone: Zone) -> list[tuple[Floats, ...]]:
-    """Return the parts of a zone, with rings as in `zone_rings`: the outline of each part and then its holes.
+    """Return the parts of a zone, each as its outline and its holes, with rings as in `zone_rings`.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
     >>> [len(part) for part in zone_parts(zone)]
@@ -274,7 +287,8 @@ def _ring_area(ring: Floats) -> float:
 def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Floats:
     """Return the altitude of a floor or a ceiling above each point of the ground, m AMSL, (n,).
 
-    ground: altitudes of the ground, m AMSL, (n,).  default: altitude if the level is None, m AMSL.
+    ground: altitudes of the ground, m AMSL, (n,).
+    default: altitude if the level is None, m AMSL.
 
     >>> level_heights(ZoneLevel(120.0, "ground"), np.array([10.0, 30.0]), 0.0).tolist()
     [130.0, 150.0]
@@ -285,9 +299,10 @@ def level_heights(level: ZoneLevel | None, ground: Floats, default: float) -> Fl
 
 
 def zone_walls(zone: Zone, terrain: Terrain | None, default_floor: float, default_ceiling: float) -> list[Floats]:
-    """Return the walls of a zone, one array (k, 2, 3) per ring: the lower and upper end of each corner's edge, m.
+    """Return the walls of a zone, one array (k, 2, 3) per ring: lower and upper end at each corner, m.
 
     default_floor, default_ceiling: altitudes for an unknown ground and for a zone without a ceiling, m AMSL.
+
     A floor below the ground is raised to the ground.
 
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0), ceiling=ZoneLevel(120.0, "amsl"))

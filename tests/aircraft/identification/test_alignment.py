@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aircraft.identification.alignment import align, invert_first_order_lag
-from aircraft.identification.estimate import _log_unexplained, align_clocks
+from aircraft.identification.estimate import _log_unexplained, estimate_clocks
 from aircraft.identification.flight_record import GRID_HZ, apply_lag
 from aircraft.identification.regression import Fit
 from tests.aircraft.identification.flown_truth import flown_truth
@@ -21,7 +21,7 @@ def test_accelerometers_are_found_to_be_as_late_as_they_were_made() -> None:
 
 def test_stretches_stand_behind_each_other_and_are_smoothed_apart() -> None:
     flown = flown_truth()
-    record = flown.records[0].part(40.0)
+    record = flown.records[0].central_part(40.0)
     signals = align([record, record], [flown.estimate.clocks[0]] * 2, 0.1)
     half = round(40.0 * GRID_HZ)
     assert signals.edges == (0, half, 2 * half)
@@ -35,8 +35,8 @@ def test_stretches_stand_behind_each_other_and_are_smoothed_apart() -> None:
 
 def test_the_clocks_of_one_log_are_one() -> None:
     flown = flown_truth()
-    part = flown.records[0].part(60.0)
-    first, second = align_clocks([part, part], flown.base)
+    part = flown.records[0].central_part(60.0)
+    first, second = estimate_clocks([part, part], flown.base)
     assert first == second
 
 

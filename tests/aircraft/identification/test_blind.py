@@ -7,7 +7,7 @@ import numpy as np
 from aircraft.identification.alignment import Clocks, align
 from aircraft.identification.blind import DRAWS, Band, band_limits, uninformative_note
 from aircraft.identification.flight_record import GRID_HZ, FlightRecord
-from aircraft.identification.level import level_signals
+from aircraft.identification.level import remove_sensor_biases
 
 # Number of trials of the coverage.
 _TRIALS = 20_000
@@ -52,7 +52,7 @@ def test_a_band_as_wide_as_without_a_model_is_named() -> None:
         Band(name, "", along, low, high, np.zeros(3), unchanged)
         for name, unchanged in (("bank", 0.9), ("pitch", 1.1), ("power", np.nan))
     )
-    assert uninformative_note([bank, pitch, power]).startswith("the model says nothing of bank: ")
+    assert uninformative_note([bank, pitch, power]).startswith("the model does not predict bank: ")
     assert not uninformative_note([pitch, power])
 
 
@@ -83,10 +83,10 @@ def test_biases_come_from_the_earlier_part() -> None:
     """A gyro bias of the earlier part is removed from the judged part, and a change of it within that part stays."""
     earlier = align([_steady_record(_GYRO_BIAS)], [Clocks()], 0.0)
     judged = align([_steady_record(1.5 * _GYRO_BIAS)], [Clocks()], 0.0)
-    rates = level_signals(judged, reference=earlier).rates[:, 0]
+    rates = remove_sensor_biases(judged, reference=earlier).rates[:, 0]
     assert np.allclose(rates, 0.5 * _GYRO_BIAS)
     # Without a reference, the bias of the part itself is removed: that would be knowledge of the judged part.
-    assert np.allclose(level_signals(judged).rates[:, 0], 0.0)
+    assert np.allclose(remove_sensor_biases(judged).rates[:, 0], 0.0)
 
 
 def test_rows_between_two_times() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
-from aircraft.identification.flow import attitude_alpha, flow_from_forces
+from aircraft.identification.flow import alpha_from_attitude, flow_from_forces
 from aircraft.identification.parameters import prior_means
 from planfly.identification.base_numbers import base_model
 from tests.aircraft.identification.made_signals import steady
@@ -21,7 +21,7 @@ def signals(
 
 
 def degrees(one: Any, level: float = 0.0) -> float:
-    return math.degrees(float(attitude_alpha(one, math.radians(level))[0]))
+    return math.degrees(float(alpha_from_attitude(one, math.radians(level))[0]))
 
 
 def test_level_flight_has_its_pitch_as_angle_of_attack() -> None:

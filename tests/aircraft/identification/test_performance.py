@@ -6,7 +6,7 @@ import pytest
 
 from aircraft.catalog import load_aircraft
 from aircraft.identification.parameters import prior_means
-from aircraft.identification.performance import fastest_level, performance
+from aircraft.identification.performance import max_level_speeds, performance
 from flight.dynamics.envelope_tables import load_envelope
 from planfly.identification.base_numbers import base_model
 
@@ -14,7 +14,7 @@ from planfly.identification.base_numbers import base_model
 @pytest.mark.parametrize("name", ["aerosonde", "x8", "zagi"])
 def test_the_fastest_level_flight_is_the_envelopes(name: str) -> None:
     aircraft = load_aircraft(name)
-    (found,) = fastest_level(base_model(aircraft), prior_means(), 1.1673)
+    (found,) = max_level_speeds(base_model(aircraft), prior_means(), 1.1673)
     assert found == pytest.approx(load_envelope(aircraft).level_speeds(500.0)[1], rel=0.01)
 
 

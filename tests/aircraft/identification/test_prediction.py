@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.identification.alignment import Signals, align
-from aircraft.identification.level import lateral_biases, level_signals
+from aircraft.identification.level import gyro_and_lateral_biases, remove_sensor_biases
 from aircraft.identification.parameters import INDEX
 from aircraft.identification.prediction import QUANTITIES, GustFilter, Predictor, predict_log, whiteness
 from tests.aircraft.identification.flown_truth import flown_truth
@@ -18,7 +18,7 @@ HORIZON = 0.5
 def raw_signals() -> Signals:
     """One minute of the flight with its sensors' biases."""
     flown = flown_truth()
-    return align([flown.records[0].part(60.0)], flown.estimate.clocks[:1], 0.1)
+    return align([flown.records[0].central_part(60.0)], flown.estimate.clocks[:1], 0.1)
 
 
 def rms(signals: Signals, values: np.ndarray, model: int = 1) -> np.ndarray:
@@ -27,14 +27,14 @@ def rms(signals: Signals, values: np.ndarray, model: int = 1) -> np.ndarray:
 
 
 def test_an_identified_model_predicts_far_better_than_constant_rates() -> None:
-    signals, values = level_signals(raw_signals()), flown_truth().estimate.values
+    signals, values = remove_sensor_biases(raw_signals()), flown_truth().estimate.values
     # Roll, pitch and yaw rate: the pitch rate is small, and much of it is light turbulence.
     assert (rms(signals, values) < np.array([0.2, 0.95, 0.4, 0.2, 1.0, 1.0]) * rms(signals, values, model=0))[:4].all()
 
 
 @pytest.mark.parametrize("name", ["aileron-power", "elevator-power", "weathercock"])
 def test_a_changed_sign_predicts_worse_than_constant_rates(name: str) -> None:
-    signals, values = level_signals(raw_signals()), flown_truth().estimate.values.copy()
+    signals, values = remove_sensor_biases(raw_signals()), flown_truth().estimate.values.copy()
     values[INDEX[name]] *= -1.0
     assert (rms(signals, values) / rms(signals, values, model=0))[:3].max() > 1.0
 
@@ -43,8 +43,10 @@ def test_biases_of_gyros_and_accelerometers_are_found_and_leave_the_predictions(
     raw, values = raw_signals(), flown_truth().estimate.values
     gyro, right = np.array([0.03, -0.02, 0.02]), 0.3
     biased = replace(raw, rates=raw.rates + gyro, acceleration=raw.acceleration + np.array([0.0, right, 0.0]))
-    assert (lateral_biases(biased) - lateral_biases(raw))[0] == pytest.approx([*gyro, right], abs=1e-9)
-    clean, mended = level_signals(raw), level_signals(biased)
+    assert (gyro_and_lateral_biases(biased) - gyro_and_lateral_biases(raw))[0] == pytest.approx(
+        [*gyro, right], abs=1e-9
+    )
+    clean, mended = remove_sensor_biases(raw), remove_sensor_biases(biased)
     assert rms(mended, values) == pytest.approx(rms(clean, values), rel=0.02)
     # Without this, half a second of the roll gyro's bias is 0.9 degrees of bank.
     bank = QUANTITIES.index("bank")
@@ -53,7 +55,7 @@ def test_biases_of_gyros_and_accelerometers_are_found_and_leave_the_predictions(
 
 
 def test_trimmed_surfaces_leave_the_predictions() -> None:
-    signals, values = level_signals(raw_signals()), flown_truth().estimate.values
+    signals, values = remove_sensor_biases(raw_signals()), flown_truth().estimate.values
     trimmed = replace(signals, surfaces=signals.surfaces + np.radians([1.5, 2.0, 1.0]))
     # The force of the surfaces remains; their moments are trimmed away.
     assert (rms(trimmed, values) < 1.3 * rms(signals, values))[:4].all()

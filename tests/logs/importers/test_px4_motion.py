@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aircraft.identification.estimate import align_clocks, aligned_signals, fit_parameters
+from aircraft.identification.estimate import aligned_signals, estimate_clocks, fit_parameters
 from logs.importers.motion import MotionLog
 from logs.importers.motion_log import read_motion
 from logs.importers.open_log import open_log
@@ -302,7 +302,7 @@ def test_the_same_flight_gives_the_same_aircraft(tmp_path: Path) -> None:
     # PX4 logs its servo outputs at 25 Hz, with another delay than ArduPlane.
     found, expected = (
         fit_parameters(aligned_signals(each, clocks, flown.base), flown.base)
-        for each, clocks in ((records, align_clocks(records, flown.base)), (flown.records, flown.estimate.clocks))
+        for each, clocks in ((records, estimate_clocks(records, flown.base)), (flown.records, flown.estimate.clocks))
     )
     assert found.with_current
     off = np.abs(found.values - expected.values) / flown.estimate.sds

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aircraft.catalog import make_own_folder, read_aircraft
+from aircraft.catalog import copy_aircraft_folder, read_aircraft
 from aircraft.data_sheet import DataSheet
 from planfly.campaigns.campaign_base import (
     CampaignBase,
@@ -172,7 +172,7 @@ def test_an_aircraft_brings_its_draws(sheet: Path) -> None:
 
 
 def test_a_copy_of_an_aircraft_has_its_draws(sheet: Path) -> None:
-    names = make_own_folder(sheet / "copy", read_aircraft(sheet / "foam"))
+    names = copy_aircraft_folder(sheet / "copy", read_aircraft(sheet / "foam"))
     assert {"draws.csv", "uncertainty.toml"} <= set(names)
     assert (sheet / "copy" / "draws.csv").read_bytes() == (sheet / "foam" / "draws.csv").read_bytes()
 

@@ -46,7 +46,7 @@ def test_a_servo_the_other_way_round_is_named_by_its_output() -> None:
     flown = flown_truth()
     servos = dict(read_servos(PRIOR.folder / "ardupilot.toml"))
     servos["aileron"] = servos["aileron"].reversed
-    records = [record.part(60.0) for record in flight_records(changed(), PRIOR, servos)]
+    records = [record.central_part(60.0) for record in flight_records(changed(), PRIOR, servos)]
     assert "output 1 seems reversed" in refused(estimate_model(records, flown.base))
 
 
@@ -125,7 +125,7 @@ def test_a_mass_that_changes_within_the_logs_is_refused() -> None:
 
 def test_under_10_hz_the_performance_alone_is_estimated() -> None:
     flown = flown_truth()
-    slow = estimate_model([record.part(60.0) for record in flown.records], flown.base, dynamics=False)
+    slow = estimate_model([record.central_part(60.0) for record in flown.records], flown.base, dynamics=False)
     assert not slow.dynamics
     for name in ("roll-damping", "elevator-power", "yaw-damping", "pitch-offset"):
         assert slow.log_fractions()[INDEX[name]] == pytest.approx(0.0, abs=1e-9)

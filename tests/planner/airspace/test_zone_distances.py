@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.airspace.scenarios import ring_distance, star
-from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_excess
+from planner.airspace.zone_distances import ZONE_MARGIN, measure_zone_margin, zone_penetration
 from planner.airspace.zone_limits import ZoneMargins, add_margins
 from tests.soak import scaled
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneKind, ZoneLevel, make_polygon
@@ -38,7 +38,7 @@ def charge() -> Charge:
     ) -> float:
         zones = add_margins([zone], FAR, GROUND, MARGINS)
         ends = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
-        return float(zone_excess(zones, GROUND.heights, GROUND.to_pixel.record, 40.0, *ends, beside, below, above))
+        return float(zone_penetration(zones, GROUND.heights, GROUND.to_pixel.record, 40.0, *ends, beside, below, above))
 
     return made
 

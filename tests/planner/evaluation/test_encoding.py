@@ -10,13 +10,13 @@ from hypothesis import strategies as st
 from planner.evaluation.encoding import (
     ENCODINGS,
     Space,
-    bearing,
-    frames_along,
-    polar,
-    polar_45,
-    rotated,
+    bearing_encoding,
+    polar_45_encoding,
+    polar_encoding,
+    rotated_encoding,
     rotated_frame,
     rotated_vectors,
+    route_frames,
     sample_route,
     straight_frames,
 )
@@ -27,14 +27,14 @@ ROUTE = np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0], [-100.0, 50.0]])
 
 
 def test_along_is_the_length_of_the_route_and_across_is_to_its_left() -> None:
-    frames = frames_along(ROUTE)
+    frames = route_frames(ROUTE)
     np.testing.assert_allclose(frames.edges, [0.0, 100.0, 150.0, 350.0])
     world = frames.to_world([[40.0, 7.0, 1.0], [120.0, 7.0, 2.0], [250.0, 7.0, 3.0]])
     np.testing.assert_allclose(world, [[40.0, 7.0, 1.0], [93.0, 20.0, 2.0], [0.0, 43.0, 3.0]], atol=1e-9)
 
 
 def test_positions_come_back_from_their_frames() -> None:
-    frames = frames_along(ROUTE)
+    frames = route_frames(ROUTE)
     points = np.random.default_rng(1).uniform(-500.0, 500.0, (5, 3, 3))
     np.testing.assert_allclose(frames.to_frame(frames.to_world(points)), points, atol=1e-9)
 
@@ -44,7 +44,7 @@ def test_frames_of_a_straight_route_are_the_rotated_frame() -> None:
     frame = rotated_frame(start, destination)
     edges = np.linspace(0.0, frame.length, 6)
     points = np.random.default_rng(2).uniform(-500.0, 500.0, (5, 3))
-    along = frames_along(np.linspace(start[:2], destination[:2], 6))
+    along = route_frames(np.linspace(start[:2], destination[:2], 6))
     straight = straight_frames(*frame[:4], edges)
     np.testing.assert_array_equal(straight.to_world(points), frame.to_world(points))
     np.testing.assert_array_equal(straight.to_frame(points), frame.to_frame(points))
@@ -53,9 +53,9 @@ def test_frames_of_a_straight_route_are_the_rotated_frame() -> None:
 
 
 def test_a_piece_without_length_has_the_course_of_the_piece_before_it() -> None:
-    frames = frames_along(np.array([[0.0, 0.0], [0.0, 80.0], [0.0, 80.0], [60.0, 80.0]]))
+    frames = route_frames(np.array([[0.0, 0.0], [0.0, 80.0], [0.0, 80.0], [60.0, 80.0]]))
     np.testing.assert_allclose(frames.sine, [1.0, 1.0, 0.0], atol=1e-12)
-    first = frames_along(np.array([[5.0, 5.0], [5.0, 5.0], [5.0, 85.0]]))
+    first = route_frames(np.array([[5.0, 5.0], [5.0, 5.0], [5.0, 85.0]]))
     np.testing.assert_allclose(first.sine, [1.0, 1.0], atol=1e-12)
 
 
@@ -125,7 +125,7 @@ def test_decoded_paths_keep_their_ends(name: str, count: int) -> None:
 
 
 def test_rotated_waypoints_lie_each_in_its_interval() -> None:
-    encoding = rotated(space(), 7)
+    encoding = rotated_encoding(space(), 7)
     vectors = np.random.default_rng(2).uniform(encoding.lower, encoding.upper, (200, 15))
     along = rotated_frame(space().start, space().destination).to_frame(encoding.decode(vectors))[:, 1:-1, 0]
     interval = np.floor(along / 2000.0 - 1e-12)
@@ -134,7 +134,7 @@ def test_rotated_waypoints_lie_each_in_its_interval() -> None:
 
 
 def test_box_across_covers_the_map_and_no_more() -> None:
-    encoding = rotated(space(), 4)
+    encoding = rotated_encoding(space(), 4)
     frame = rotated_frame(space().start, space().destination)
     for side in (encoding.lower, encoding.upper):
         for i in range(2):
@@ -143,13 +143,13 @@ def test_box_across_covers_the_map_and_no_more() -> None:
             edge = frame.to_world(np.column_stack([along, np.full(9, side[3 * i + 1]), np.zeros(9)]))
             inside = (np.abs(edge[:, 0] - 4000.0) <= 5000.0 + 1e-6) & (np.abs(edge[:, 1] - 2500.0) <= 4500.0 + 1e-6)
             assert inside.any()
-    narrow = rotated(space(1500.0), 4)
+    narrow = rotated_encoding(space(1500.0), 4)
     assert narrow.lower[1] == -1500.0
     assert narrow.upper[4] == 1500.0
 
 
 def test_polar_step_of_the_straight_line() -> None:
-    encoding = polar(space(), 6)
+    encoding = polar_encoding(space(), 6)
     path = encoding.decode(np.tile([2000.0, 0.0, 500.0], 4)[None])[0]
     np.testing.assert_allclose(path[1:5, :2], np.outer(np.arange(1, 5), [1600.0, 1200.0]), atol=1e-9)
 
@@ -159,9 +159,9 @@ def test_polar_angles_turn_from_the_leg_before_and_bearings_from_the_line() -> N
     vector = np.column_stack([np.full(4, 1000.0), turns, np.full(4, 500.0)]).ravel()[None]
     line = np.arctan2(space().destination[1], space().destination[0])
     for make, courses in (
-        (polar, [10.0, 30.0, -10.0, 5.0]),
-        (polar_45, [10.0, 30.0, -10.0, 5.0]),
-        (bearing, [10.0, 20.0, -40.0, 15.0]),
+        (polar_encoding, [10.0, 30.0, -10.0, 5.0]),
+        (polar_45_encoding, [10.0, 30.0, -10.0, 5.0]),
+        (bearing_encoding, [10.0, 20.0, -40.0, 15.0]),
     ):
         steps = np.diff(make(space(), 6).decode(vector)[0, :5, :2], axis=0)
         np.testing.assert_allclose(np.degrees(np.arctan2(steps[:, 1], steps[:, 0]) - line), courses, atol=1e-9)
@@ -169,7 +169,7 @@ def test_polar_angles_turn_from_the_leg_before_and_bearings_from_the_line() -> N
 
 
 def test_the_range_of_the_angle_is_in_the_box() -> None:
-    for make, widest in ((polar, 180.0), (polar_45, 45.0), (bearing, 180.0)):
+    for make, widest in ((polar_encoding, 180.0), (polar_45_encoding, 45.0), (bearing_encoding, 180.0)):
         encoding = make(space(), 6)
         np.testing.assert_allclose(np.degrees(encoding.lower[1::3]), -widest)
         np.testing.assert_allclose(np.degrees(encoding.upper[1::3]), widest)

@@ -56,7 +56,7 @@ def test_the_least_height_is_that_of_every_sample_though_most_are_passed_over(pr
     for path, value in zip(paths, front_values(data, None, paths), strict=True):
         heights = []
         for a, b in itertools.pairwise(path):
-            count = 1 + int(np.hypot(*(b - a)[:2]) / data.sample_pitch)
+            count = 1 + int(np.hypot(*(b - a)[:2]) / data.sample_spacing)
             points = a + np.linspace(0.0, 1.0, count + 1)[:, None] * (b - a)
             heights.append(points[:, 2] - terrain.height(points[:, 0], points[:, 1]))
         assert value[Value.CLEARANCE] == pytest.approx(np.concatenate(heights).min(), abs=1e-6)
@@ -78,7 +78,7 @@ def test_no_sample_is_passed_over_on_ground_as_steep_as_can_be(problem: Problem,
     # Over the ridge at 300 m, and before that, 1 km away, at 1 m more above the ground.
     low = 200.0 - steep * 1000.0 + 101.0
     path = np.array([[begin, north, low], [begin, north + 10.0, 300.0 + fall], [end, north, 300.0 - fall]])
-    count = 1 + int(np.hypot(2000.0, 10.0) / data.sample_pitch)
+    count = 1 + int(np.hypot(2000.0, 10.0) / data.sample_spacing)
     share = np.linspace(0.0, 1.0, count + 1)
     over = 300.0 + fall - 2.0 * fall * share - (200.0 - steep * np.abs(begin + 2000.0 * share - top))
     assert over.min() < 101.0 - 1e-3

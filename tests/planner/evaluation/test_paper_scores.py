@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.path_limits import Limits
-from planner.evaluation.encoding import rotated
+from planner.evaluation.encoding import rotated_encoding
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import Problem, make_problem
 from world.scenario import Scenario
@@ -59,7 +59,7 @@ def by_the_book(problem: Problem, path: np.ndarray) -> tuple[list[int], list[flo
 @given(st.integers(0, 10_000), st.sampled_from([4, 8, 12]))
 def test_paper_criteria(numbers: Problem, seed: int, waypoints: int) -> None:
     rng = np.random.default_rng(seed)
-    encoding = rotated(numbers.space, waypoints)
+    encoding = rotated_encoding(numbers.space, waypoints)
     path = encoding.decode(rng.uniform(encoding.lower, encoding.upper, (1, encoding.lower.size)))
     path[:, 1:-1] += rng.normal(0, 300, path[:, 1:-1].shape)
     counts, objectives = paper_scores(numbers.search, path)

@@ -81,7 +81,7 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
         rise = rng.normal(0.0, 100.0)
         # Just clear of the ground, or just below what is wanted.
         wanted = float((ground - rise * share).max()) + required.clearance + required.buffer
-        step = float(slopes.max()) * required.sample_pitch + abs(rise) / run * required.sample_pitch
+        step = float(slopes.max()) * required.sample_spacing + abs(rise) / run * required.sample_spacing
         for off in (0.5, -step):
             height = wanted + off
             line = a[0], a[1], height, b[0], b[1], height + rise

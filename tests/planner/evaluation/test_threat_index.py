@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.path_limits import Limits
-from planner.evaluation.encoding import rotated
+from planner.evaluation.encoding import rotated_encoding
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import THREAT, make_problem
@@ -63,7 +63,7 @@ def test_cells_change_no_score(
         threat_cells=make_threat_cells(units.position, units.detection_radius, far),
         missiles=make_missile_index(data.threats, side=1e9),
     )
-    encoding = rotated(space, 12)
+    encoding = rotated_encoding(space, 12)
     paths = encoding.decode(rng.uniform(encoding.lower, encoding.upper, (60, encoding.lower.size)))
     for one, two in zip(evaluate(data, paths), evaluate(everything, paths), strict=True):
         np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-15)

@@ -12,7 +12,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planfly.workflow.airframe import load_airframe
 from planner.plan import Certificate, Plan
-from planner.search.lay_ground_ways import FinalModel, with_ground_ways
+from planner.search.lay_ground_ways import FinalModel, add_departure_and_approach
 from tests.setups import spec_around
 from world.arrays import Floats
 from world.geometry import leg_courses, leg_runs
@@ -61,7 +61,7 @@ def laid(heights: Ground = level, law: FinalModel = LAW, **tables: Any) -> Plan:
     certificate = Certificate(0.1, 100.0, 0.1, 50.0, 500.0, 100.0, ())
     zeros = np.zeros(4)
     plan = Plan(scenario, PATH, zeros, zeros, certificate, 1, "umda", 10, np.zeros((1, 3)))
-    return with_ground_ways(plan, replace(limits(), wind=scenario.wind), law)
+    return add_departure_and_approach(plan, replace(limits(), wind=scenario.wind), law)
 
 
 def degrees(course: float) -> float:
@@ -179,7 +179,7 @@ def test_what_is_flown_stays_and_is_not_laid_out_again() -> None:
     assert before.ways is not None
     # Meanwhile walls stand about home.
     flown = replace(before, scenario=scenario_of(ring(200.0), **NORTH), flown_legs=1, ways=None)
-    again = with_ground_ways(flown, limits(), LAW, before.ways.climb)
+    again = add_departure_and_approach(flown, limits(), LAW, before.ways.climb)
     assert again.ways is not None
     assert again.ways.climb is before.ways.climb
     assert again.feasible
@@ -191,7 +191,7 @@ def test_a_high_start_is_climbed_to_in_laps() -> None:
     path = PATH + np.array([0.0, 0.0, 600.0])
     certificate, zeros = Certificate(0.1, 100.0, 0.1, 50.0, 500.0, 100.0, ()), np.zeros(4)
     plan = Plan(scenario, path, zeros, zeros, certificate, 1, "umda", 10, np.zeros((1, 3)))
-    found = with_ground_ways(plan, limits(), LAW)
+    found = add_departure_and_approach(plan, limits(), LAW)
     assert found.feasible, found.certificate.problems
     assert found.ways is not None
     assert found.ways.climb is not None

@@ -11,7 +11,7 @@ from planfly.workflow.airframe import load_airframe
 from planner.evaluation.certify import certify, least_height
 from planner.plan import Plan, plan_json
 from planner.search import plan_front as fronts
-from planner.search.plan_front import Front, fit_margins, front_task, noticed_amounts, plan_front
+from planner.search.plan_front import Front, fit_margins, front_task, noticeable_gains, plan_front
 from world.scenario import Scenario, load_scenario
 
 GENERATIONS = 4
@@ -59,10 +59,10 @@ def test_no_plan_is_better_than_another_in_everything(front: Front) -> None:
 def test_each_plan_gains_something_that_is_noticed(front: Front, scenario: Scenario, limits: Limits) -> None:
     """0.1 % of length and time, 1 % of exposure and 1 m: so much better than any other, one of two is in something."""
     rows, default = front.objectives(), front.default
-    amounts = noticed_amounts(default, "time")
+    amounts = noticeable_gains(default, "time")
     assert amounts.tolist() == [0.001 * default.length, 0.01 * default.exposure, 1.0, 0.001 * default.time]
     assert default.exposure > 1.0
-    assert noticed_amounts(replace(default, exposure=0.5, energy=4e5), "energy").tolist()[1::2] == [0.01, 400.0]
+    assert noticeable_gains(replace(default, exposure=0.5, energy=4e5), "energy").tolist()[1::2] == [0.01, 400.0]
     for k, one in enumerate(rows):
         for other in rows[:k]:
             assert (np.abs(one - other) > amounts).any()

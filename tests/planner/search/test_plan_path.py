@@ -57,7 +57,7 @@ def test_every_algorithm_runs_within_its_evaluations(scenario: Scenario, limits:
     np.testing.assert_array_equal(plan.waypoints[-1], scenario.destination)
     assert seen
     assert all(0 <= done <= total for done, total, _ in seen)
-    if not ALGORITHMS[name].tightened:
+    if not ALGORITHMS[name].final_shortening:
         assert plan.evaluations == 60 + 25 * 30
         assert len(plan.history) == 26
     again = parse_plan(plan_json(plan), "plan.json")

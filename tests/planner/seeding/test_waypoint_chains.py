@@ -11,7 +11,7 @@ from aircraft.path_limits import Limits
 from planner.evaluation.leg_constraints import precompute_limits
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding.waypoint_chains import free_points, waypoint_chains
-from planner.seeding.waypoint_fitting import leg_cost
+from planner.seeding.waypoint_fitting import penalised_leg_cost
 from world.arrays import Floats
 from world.scenario import Scenario
 
@@ -36,7 +36,7 @@ def near_the_line(data: ProblemArrays, spread: float, seed: int) -> Floats:
 
 
 def leg_cost_of(data: ProblemArrays, a: Floats, b: Floats, enough: float) -> float:
-    return float(leg_cost(data, precompute_limits(data), np.array(a), np.array(b), enough))
+    return float(penalised_leg_cost(data, precompute_limits(data), np.array(a), np.array(b), enough))
 
 
 def length(path: Floats) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import ENCODINGS, rotated_vectors
 from planner.evaluation.problem import make_problem
-from planner.seeding.waypoint_fitting import tighten
+from planner.seeding.waypoint_fitting import move_all_waypoints
 from world.arrays import Floats
 from world.scenario import Scenario
 
@@ -26,7 +26,7 @@ def test_moves_straighten_a_zigzag(small: Callable[..., Scenario], make_limits: 
     def length(numbers: Floats) -> float:
         return float(np.linalg.norm(np.diff(encoding.decode(numbers[None])[0], axis=0), axis=1).sum())
 
-    moved, made = tighten(problem.search, encoding, vector, 8, 1.0)
+    moved, made = move_all_waypoints(problem.search, encoding, vector, 8, 1.0)
     assert made > 0
     assert (moved >= encoding.lower).all()
     assert (moved <= encoding.upper).all()

@@ -228,7 +228,7 @@ FAULTS = {
     HEAD + "DP 46:00:00N\n": "line 5: DP '46:00:00N': expected a position",
     HEAD + "DP 91:00:00N 008:00:00E\n": "line 5: DP '91:00:00N 008:00:00E': allowed 0..90 degrees",
     HEAD + "DP 46:61:00N 008:00:00E\n": "line 5: DP '46:61:00N 008:00:00E': expected degrees, and minutes and seconds",
-    HEAD + "DC 5\n": "line 5: DC '5': a centre (V X=) must come before it",
+    HEAD + "DC 5\n": "line 5: DC '5': a centre (V X=) must come before this line",
     HEAD + "V X=46:00:00N 008:00:00E\nDC five": "line 6: DC 'five': expected a number of at least 0",
     HEAD + "V D=left": "line 5: V 'D=left': allowed D=+ (clockwise) or D=-",
     HEAD + "V X=46:00:00N 008:00:00E\nDA 5, 270": "line 6: DA '5, 270': expected radius, first and last bearing",
