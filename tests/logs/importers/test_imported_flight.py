@@ -111,9 +111,7 @@ def test_a_bench_log_is_refused() -> None:
     raw = example_raw_log()
     still = raw.series["position"]
     values = np.broadcast_to(still.values[0], still.values.shape)
-    with pytest.raises(
-        LogError, match="contains no flight: in 92 s the ground speed never stayed above 6 m/s for 20 s"
-    ):
+    with pytest.raises(LogError, match="contains no flight: in 92 s the ground speed never stayed above 6 m/s for"):
         make_flight(with_series(raw, position=LogSeries("POS", still.time, values)))
 
 
